@@ -1,0 +1,43 @@
+"""Errors with one clear sentence, sorted by whose fault they are.
+
+The command line turns :class:`InputError` into exit code 2 (the user can put it right) and
+:class:`MachineError` into exit code 1 (the machine failed), and prints the sentence alone.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class BtTasksimError(Exception):
+    """Root of every error that this framework raises on purpose."""
+
+
+class InputError(BtTasksimError, ValueError):
+    """Bad input: one clear sentence that says what is wrong, where, and what to do."""
+
+
+class MachineError(BtTasksimError, RuntimeError):
+    """The machine failed: a full disk, a lost connection, an engine that stopped."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Says which known names are nearest to an unknown one.
+
+    Args:
+        name: The name that was not found.
+        known: The names that would have been right.
+
+    Returns:
+        The end of a sentence, to be put right behind it: ``; did you mean 'a' or 'b'?``, or where nothing
+        is near ``; known: a, b, c``, or where nothing is known ``; none is known``.
+    """
+    names = sorted(set(known))
+    if not names:
+        return "; none is known"
+    folded = {candidate.casefold(): candidate for candidate in names}
+    close = difflib.get_close_matches(name.casefold(), list(folded), n=3, cutoff=0.6)
+    if close:
+        return f"; did you mean {' or '.join(repr(folded[match]) for match in close)}?"
+    return f"; known: {', '.join(names)}"
