@@ -22,6 +22,8 @@ import tempfile
 from pathlib import Path
 from urllib.parse import unquote
 
+from private_apt import Apt, UnavailableError, own_sources, release
+
 PROJECT = Path(__file__).resolve().parents[1]
 DRIVER_LIBRARY = "libvulkan_lvp.so"
 PACKAGES = ["mesa-vulkan-drivers", "libx11-6"]
@@ -47,10 +49,6 @@ camera.take_picture()
 red, green, blue, _ = camera.get_picture("Color")[8, 8]
 assert red > 0.1 and green < 0.5 * red, (red, green, blue)
 """
-
-
-class NoDriver(Exception):
-    """No driver can be had here; the message ends the sentence 'No rendering: ...'."""
 
 
 def load_runtime_module(folder: Path) -> str:
@@ -86,122 +84,6 @@ def renders(folder: Path | None = None) -> tuple[bool, str]:
     return done.returncode == 0, lines[-1] if lines else f"exit status {done.returncode}"
 
 
-def release(os_release: Path = Path("/etc/os-release")) -> tuple[str, str]:
-    """Return the distribution's id and the code name of its release ('debian', 'bookworm')."""
-    values = {}
-    if os_release.is_file():
-        for line in os_release.read_text(encoding="utf-8").splitlines():
-            key, _, value = line.partition("=")
-            values[key] = value.strip().strip("\"'")
-    return values.get("ID", ""), values.get("VERSION_CODENAME", "")
-
-
-def own_sources(apt: Path, codename: str, backports: str | None) -> dict[str, str]:
-    """Copy the machine's package sources of its own release, with a further suite where one is asked for.
-
-    Both of apt's formats are read: one-line ``.list`` files and ``.sources`` paragraphs. Sources of other
-    origin (a suite that is not named after the release) are left out.
-
-    Returns:
-        File names and their contents, for a ``sourceparts`` folder.
-    """
-
-    def ours(suite: str) -> bool:
-        return suite == codename or suite.startswith((codename + "-", codename + "/"))
-
-    lines: list[str] = []
-    paragraphs: list[str] = []
-    listed = [apt / "sources.list", *sorted((apt / "sources.list.d").glob("*.list"))]
-    for file in (file for file in listed if file.is_file()):
-        for line in file.read_text(encoding="utf-8").splitlines():
-            words = line.partition("#")[0].split()
-            if not words or words[0] != "deb":
-                continue
-            start = 1
-            if words[1].startswith("["):
-                start = next((i for i, word in enumerate(words) if word.endswith("]")), 0) + 1
-            suite = words[start + 1] if len(words) > start + 1 else ""
-            if ours(suite):
-                lines.append(" ".join(words))
-                if backports and suite == codename:
-                    lines.append(" ".join([*words[: start + 1], backports, *words[start + 2 :]]))
-    for file in sorted((apt / "sources.list.d").glob("*.sources")):
-        text = "\n".join(
-            line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")
-        )
-        for paragraph in text.split("\n\n"):
-            fields = paragraph.strip().splitlines()
-            for i, field in enumerate(fields):
-                if field.lower().startswith("suites:"):
-                    suites = [suite for suite in field.split()[1:] if ours(suite)]
-                    if backports and codename in suites and backports not in suites:
-                        suites.append(backports)
-                    if suites:
-                        fields[i] = "Suites: " + " ".join(suites)
-                        paragraphs.append("\n".join(fields))
-    files = {}
-    if lines:
-        files["own.list"] = "\n".join(lines) + "\n"
-    if paragraphs:
-        files["own.sources"] = "\n\n".join(paragraphs) + "\n"
-    return files
-
-
-class Apt:
-    """apt-get with lists, cache and package state of its own in one folder."""
-
-    def __init__(self, folder: Path, sources: dict[str, str], suite: str | None) -> None:
-        """Lay out the folder.
-
-        Args:
-            folder: an empty folder.
-            sources: files of the sources folder, as ``own_sources`` gives them.
-            suite: the suite to prefer, or None for the release's own.
-        """
-        self.debs = folder / "debs"
-        for name in ("sources", "lists/partial", "archives/partial", "cache", "debs"):
-            (folder / name).mkdir(parents=True)
-        (folder / "status").touch()
-        for name, text in sources.items():
-            (folder / "sources" / name).write_text(text, encoding="utf-8")
-        # Read after the machine's own settings (proxies stay), so that its hooks can be taken out.
-        (folder / "apt.conf").write_text(
-            "#clear APT::Update::Post-Invoke;\n"
-            "#clear APT::Update::Post-Invoke-Success;\n"
-            "#clear DPkg::Post-Invoke;\n"
-            f'Dir::Etc::sourcelist "/dev/null";\nDir::Etc::sourceparts "{folder}/sources";\n'
-            f'Dir::State::Lists "{folder}/lists";\nDir::State::status "{folder}/status";\n'
-            f'Dir::Cache "{folder}/cache";\nDir::Cache::archives "{folder}/archives";\n'
-            'APT::Sandbox::User "root";\nDebug::NoLocking "1";\nAcquire::Languages "none";\n'
-            'Acquire::Retries "1";\nAcquire::http::Timeout "20";\nAcquire::https::Timeout "20";\n',
-            encoding="utf-8",
-        )
-        self._command = ["apt-get", "-c", str(folder / "apt.conf"), *(["-t", suite] if suite else [])]
-
-    def __call__(self, *arguments: str) -> str:
-        """Run apt-get and return what it prints.
-
-        Raises:
-            NoDriver: it failed, with its own last complaint.
-        """
-        try:
-            done = subprocess.run(
-                [*self._command, *arguments],
-                cwd=self.debs,
-                capture_output=True,
-                text=True,
-                timeout=600,
-                env={**os.environ, "LC_ALL": "C", "DEBIAN_FRONTEND": "noninteractive"},
-            )
-        except subprocess.TimeoutExpired:
-            raise NoDriver(f"apt-get {arguments[0]} did not finish within 600 s") from None
-        if done.returncode != 0:
-            complaints = [line for line in done.stderr.splitlines() if line.startswith("E:")]
-            said = complaints[0][2:].strip() if complaints else f"exit status {done.returncode}"
-            raise NoDriver(f"apt-get {arguments[0]} said '{said}'")
-        return done.stdout
-
-
 def closure(printed: str) -> list[str]:
     """Pick the packages to fetch from what ``apt-get --print-uris install`` printed.
 
@@ -235,7 +117,7 @@ def needed(library: Path, folder: Path) -> list[Path]:
         elif len(words) > 2 and Path(words[2]).parent == folder:
             found.append(folder / words[0])
     if missing:
-        raise NoDriver(f"the fetched driver lacks {', '.join(missing)}")
+        raise UnavailableError(f"the fetched driver lacks {', '.join(missing)}")
     return found
 
 
@@ -255,10 +137,9 @@ def unpack(debs: Path, root: Path, into: Path) -> None:
         if library.is_file() and library.parent.parent.name == "lib" and not (every / library.name).exists():
             shutil.copy2(library, every / library.name)
     if not (every / DRIVER_LIBRARY).is_file():
-        raise NoDriver("the packages of this release hold no lavapipe")
-    keep = {every / DRIVER_LIBRARY, every / "libX11.so.6"}
-    for library in list(keep):
-        keep.update(needed(library, every))
+        raise UnavailableError("the packages of this release hold no lavapipe")
+    asked = {every / DRIVER_LIBRARY, every / "libX11.so.6"}
+    keep = asked.union(*(needed(library, every) for library in asked))
     # A library needs more libraries than any of those it needs, so counting puts them in a loadable order.
     order = sorted(keep, key=lambda library: (len(needed(library, every)), library.name))
     (into / "lib").mkdir(parents=True)
@@ -275,29 +156,34 @@ def fetch(folder: Path) -> None:
     """Bring the driver into ``folder``, whole or not at all.
 
     Raises:
-        NoDriver: it cannot be had, or SAPIEN does not render with it.
+        UnavailableError: it cannot be had, or SAPIEN does not render with it.
     """
     for tool in ("apt-get", "dpkg", "ldd"):
         if shutil.which(tool) is None:
-            raise NoDriver(f"this machine has no {tool} to fetch a software driver with")
+            raise UnavailableError(f"this machine has no {tool} to fetch a software driver with")
     system, codename = release()
     suite = BACKPORTS.get(codename)
     sources = own_sources(Path("/etc/apt"), codename, suite) if codename else {}
     if not sources:
-        raise NoDriver(f"no package source of this release ({system} {codename}) is configured".replace("  ", " "))
+        raise UnavailableError(
+            f"no package source of this release ({system} {codename}) is configured".replace("  ", " ")
+        )
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".vulkan-fetch-") as name:
         work = Path(name)
         apt = Apt(work / "apt", sources, suite)
         apt("update")
         packages = closure(apt("--no-install-recommends", "--print-uris", "-qq", "-y", "install", *PACKAGES))
-        print(f"Fetching Mesa's software Vulkan driver and its libraries ({len(packages)} packages) ...", flush=True)
+        print(
+            f"Fetching Mesa's software Vulkan driver and its libraries ({len(packages)} packages) ...",
+            flush=True,
+        )
         apt("-qq", "download", *packages)
         (work / "root").mkdir()
         unpack(apt.debs, work / "root", work / "driver")
         ok, why = renders(work / "driver")
         if not ok:
-            raise NoDriver(f"SAPIEN does not render with the fetched driver ({why})")
+            raise UnavailableError(f"SAPIEN does not render with the fetched driver ({why})")
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(work / "driver", folder)
 
@@ -320,7 +206,7 @@ def main(arguments: list[str] | None = None) -> int:
     else:
         try:
             fetch(folder)
-        except (NoDriver, OSError, subprocess.SubprocessError) as error:
+        except (UnavailableError, OSError, subprocess.SubprocessError) as error:
             print(f"No rendering: {error}; everything else works, pictures and videos are left out.")
             return 0
         print(f"Rendering with the software driver in {folder.name}.")

@@ -1,0 +1,60 @@
+# make demo   a demonstration becomes a tree, and the tree runs      make test   all tests
+# make bench  measurements, as ratios                                make lint   format, lint, types, imports
+# Each does all the set-up first; a second call finds it done. Nothing outside this folder changes.
+
+SHELL := /bin/bash
+VENV := .venv
+PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -q
+EXTRAS := sim,train,plan,report,ros,remote,mujoco,dev
+PYTEST_FLAGS ?= -n logical --maxprocesses 4
+
+.PHONY: demo test bench lint format style types imports setup clean
+
+demo: setup
+	$(VENV)/bin/bt-tasksim demo
+
+test: setup
+	$(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
+
+bench: setup
+	$(VENV)/bin/bt-tasksim bench
+
+lint: format style types imports
+
+format: $(VENV)/packages.stamp
+	$(VENV)/bin/ruff format --check .
+
+style: $(VENV)/packages.stamp
+	$(VENV)/bin/ruff check .
+
+types: $(VENV)/packages.stamp
+	$(VENV)/bin/mypy
+
+imports: $(VENV)/packages.stamp
+	$(VENV)/bin/lint-imports
+
+setup: $(VENV)/packages.stamp $(VENV)/rendering.stamp
+
+clean:
+	rm -rf $(VENV) .vulkan
+
+$(VENV)/made.stamp: tools/make_venv.py
+	@python=$$(for name in python3.11 python3.12 python3.13 python3; do \
+	    "$$name" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { command -v "$$name"; break; }; \
+	  done); \
+	if [ -z "$$python" ]; then echo "bt-tasksim needs Python 3.11 or newer, and none was found." >&2; exit 1; fi; \
+	echo "Making a virtual environment with $$python ..."; "$$python" tools/make_venv.py $(VENV)
+	@touch $@
+
+# torch first, so that nothing else chooses its build. mani_skill brings OpenCV's desktop build, which needs
+# libGL; the headless one is the same version and goes over it, last.
+$(VENV)/packages.stamp: $(VENV)/made.stamp pyproject.toml constraints.txt
+	@echo "Installing packages (2.6 GB in all; some minutes the first time) ..."
+	@$(PIP) install -c constraints.txt setuptools torch
+	@$(PIP) install -c constraints.txt --no-build-isolation --config-settings editable_mode=compat -e '.[$(EXTRAS)]'
+	@$(PIP) install -c constraints.txt --no-deps --force-reinstall opencv-python-headless
+	@touch $@
+
+# Stays undone where no driver can be had, so that the next call tries again.
+$(VENV)/rendering.stamp: $(VENV)/packages.stamp tools/fetch_vulkan_driver.py
+	@$(VENV)/bin/python tools/fetch_vulkan_driver.py --stamp $@
