@@ -4,7 +4,7 @@
 
 SHELL := /bin/bash
 VENV := .venv
-PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -q
+PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
 EXTRAS := sim,train,plan,report,ros,remote,mujoco,dev
 PYTEST_FLAGS ?= -n logical --maxprocesses 4
 
@@ -38,7 +38,7 @@ setup: $(VENV)/packages.stamp $(VENV)/rendering.stamp
 clean:
 	rm -rf $(VENV) .vulkan
 
-$(VENV)/made.stamp: tools/make_venv.py
+$(VENV)/made.stamp:
 	@python=$$(for name in python3.11 python3.12 python3.13 python3; do \
 	    "$$name" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { command -v "$$name"; break; }; \
 	  done); \
