@@ -1,0 +1,1 @@
+"""The environment engine pipeline: kinematics, physics, rendering, post-process."""

@@ -1,0 +1,183 @@
+"""The environment engine pipeline: four roles in a fixed order, each engine replaceable.
+
+An engine is any object with the methods of its role below. The pipeline is all that the runner knows: a
+robot, a simulator, or parts of both in other processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+from bt_tasksim.poses import Array
+from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.world import Command, Hidden, JointTarget, Observation, WorldModel, WorldState
+
+
+@dataclass(frozen=True)
+class CameraModel:
+    """A calibrated camera.
+
+    Attributes:
+        name: Its name.
+        width: Pixels.
+        height: Pixels.
+        matrix: Intrinsic matrix ``(3, 3)``, pixels (OpenCV convention: x right, y down, z forward).
+        pose: Pose ``(7,)`` of the camera's optical frame (OpenCV convention) in the robot base frame.
+    """
+
+    name: str
+    width: int
+    height: int
+    matrix: Array
+    pose: Array
+
+
+@dataclass(frozen=True)
+class Image:
+    """What one camera saw.
+
+    Attributes:
+        camera: The camera.
+        colour: ``(height, width, 3)`` uint8, RGB.
+        depth: ``(height, width)`` float32 metres along the optical axis; 0 where nothing was seen.
+    """
+
+    camera: CameraModel
+    colour: Array
+    depth: Array | None
+
+
+@runtime_checkable
+class KinematicsEngine(Protocol):
+    """Turns commands into joint targets; the only one that knows arm joints."""
+
+    def reset(self, configuration: ActorConfiguration) -> None:
+        """Prepare for an episode."""
+
+    def solve(self, command: Command, state: WorldState) -> JointTarget:
+        """Joint target that brings the tool to ``command.tool`` in one control period.
+
+        Raises:
+            UnreachableError: The arm cannot be there; says by how much it misses.
+        """
+
+
+@runtime_checkable
+class PhysicsEngine(Protocol):
+    """Moves the world on by one control period."""
+
+    def reset(self, configuration: ActorConfiguration) -> WorldState:
+        """A fresh scene, at rest, and its state."""
+
+    def step(self, target: JointTarget) -> WorldState:
+        """The state one control period later."""
+
+    def hidden(self) -> Hidden | None:
+        """What only a simulator knows; None on a real robot."""
+
+
+@runtime_checkable
+class RenderingEngine(Protocol):
+    """Draws the world, or fetches the pictures of real cameras."""
+
+    def reset(self, configuration: ActorConfiguration) -> None:
+        """Prepare for an episode."""
+
+    def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
+        """What the named camera sees now."""
+
+
+@runtime_checkable
+class PostProcessEngine(Protocol):
+    """Turns states and images into observations."""
+
+    def reset(self, configuration: ActorConfiguration, model: WorldModel) -> None:
+        """Prepare for an episode."""
+
+    def cameras(self, needed: bool) -> tuple[str, ...]:
+        """Cameras whose images `observe` wants at this instant; ``needed``: a concept asked for a look."""
+
+    def observe(self, state: WorldState, images: Mapping[str, Image]) -> Observation:
+        """The observation of this instant."""
+
+
+class EnginePipeline:
+    """Kinematics, physics, rendering and post-process, in that order.
+
+    Args:
+        kinematics: See `KinematicsEngine`.
+        physics: See `PhysicsEngine`.
+        postprocess: See `PostProcessEngine`.
+        rendering: See `RenderingEngine`; None where nothing is ever drawn.
+    """
+
+    def __init__(
+        self,
+        kinematics: KinematicsEngine,
+        physics: PhysicsEngine,
+        postprocess: PostProcessEngine,
+        rendering: RenderingEngine | None = None,
+    ) -> None:
+        self.kinematics = kinematics
+        self.physics = physics
+        self.postprocess = postprocess
+        self.rendering = rendering
+        self.state: WorldState | None = None
+        self.last: Command = Command()
+
+    def reset(self, configuration: ActorConfiguration, model: WorldModel) -> Observation:
+        """Begin an episode; returns its first observation."""
+        self.kinematics.reset(configuration)
+        self.state = self.physics.reset(configuration)
+        if self.rendering is not None:
+            self.rendering.reset(configuration)
+        self.postprocess.reset(configuration, model)
+        self.last = Command()
+        return self._observe(needed=True)
+
+    def step(self, command: Command, *, look: bool = False) -> Observation:
+        """One control period: a part of the command that nobody wrote keeps its last target.
+
+        Args:
+            command: What the tree asks for.
+            look: A concept wants fresh images for the next observation.
+
+        Raises:
+            UnreachableError: The tool target is out of reach.
+        """
+        if self.state is None:
+            raise RuntimeError("the pipeline was stepped before it was reset")
+        self.last = command.over(self.last)
+        target = self.kinematics.solve(self.last, self.state)
+        self.state = self.physics.step(target)
+        return self._observe(needed=look)
+
+    def hidden(self) -> Hidden | None:
+        """The physics state, in simulation."""
+        return self.physics.hidden()
+
+    def render(self, camera: str, *, depth: bool = False) -> Image:
+        """A picture for a recording.
+
+        Raises:
+            RuntimeError: There is no rendering engine or no episode.
+        """
+        if self.rendering is None or self.state is None:
+            raise RuntimeError("nothing can be drawn: the pipeline has no rendering engine or was not reset")
+        return self.rendering.render(self.state, camera, depth=depth)
+
+    def close(self) -> None:
+        """Let go of what the engines hold."""
+        for engine in (self.kinematics, self.physics, self.rendering, self.postprocess):
+            close: Any = getattr(engine, "close", None)
+            if close is not None:
+                close()
+
+    def _observe(self, needed: bool) -> Observation:
+        state = self.state
+        assert state is not None
+        cameras = self.postprocess.cameras(needed)
+        images = {name: self.render(name, depth=True) for name in cameras}
+        return self.postprocess.observe(state, images)

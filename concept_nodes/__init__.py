@@ -1,0 +1,1 @@
+"""Concepts and conditions, one file each."""
