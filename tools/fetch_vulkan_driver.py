@@ -4,7 +4,7 @@
 SAPIEN needs the device extension VK_KHR_external_semaphore_fd, which Mesa's software driver (lavapipe) has
 since version 24.3. The Debian packages are downloaded with package lists of the project's own and unpacked
 into the folder: no root, and nothing on the machine changes. Where no driver can be had, one sentence says
-so and the exit status is still 0: everything but pictures works without.
+so and the exit status is still 0.
 
 Run it with the project's Python (it asks SAPIEN): ``.venv/bin/python tools/fetch_vulkan_driver.py``.
 """
@@ -49,6 +49,16 @@ camera.take_picture()
 red, green, blue, _ = camera.get_picture("Color")[8, 8]
 assert red > 0.1 and green < 0.5 * red, (red, green, blue)
 """
+
+
+def lacking() -> str:
+    """Name what this machine goes without when no driver was fetched."""
+    loads = subprocess.run([sys.executable, "-W", "ignore", "-c", "import sapien"], capture_output=True)
+    return (
+        "rendering"
+        if loads.returncode == 0
+        else "simulation ('apt install libx11-6' brings it) and no rendering"
+    )
 
 
 def load_runtime_module(folder: Path) -> str:
@@ -207,7 +217,7 @@ def main(arguments: list[str] | None = None) -> int:
         try:
             fetch(folder)
         except (UnavailableError, OSError, subprocess.SubprocessError) as error:
-            print(f"No rendering: {error}; everything else works, pictures and videos are left out.")
+            print(f"No {lacking()}: {error}; what does not need it works without.")
             return 0
         print(f"Rendering with the software driver in {folder.name}.")
     if options.stamp:
