@@ -22,6 +22,21 @@ class MachineError(BtTasksimError, RuntimeError):
     """The machine failed: a full disk, a lost connection, an engine that stopped."""
 
 
+class UnreachableError(InputError):
+    """A tool pose that the arm cannot bring about.
+
+    Args:
+        message: The sentence.
+        distance: Metres by which the nearest pose misses.
+        angle: Radians by which the nearest pose misses.
+    """
+
+    def __init__(self, message: str, distance: float, angle: float) -> None:
+        super().__init__(message)
+        self.distance = distance
+        self.angle = angle
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Says which known names are nearest to an unknown one.
 
