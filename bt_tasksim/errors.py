@@ -37,6 +37,10 @@ class UnreachableError(InputError):
         self.angle = angle
 
 
+class CommandConflictError(InputError):
+    """Two leaves of a tree wrote the same part of the command in one tick."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Says which known names are nearest to an unknown one.
 
