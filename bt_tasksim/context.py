@@ -211,4 +211,4 @@ class Context:
 
     def seen(self, elapsed: float) -> Seen:
         """The view of this tick's observation."""
-        return Seen(self.observation, self.world, self.robot, elapsed)
+        return Seen(self.observation, self.world, self.robot, np.float64(elapsed))

@@ -41,6 +41,10 @@ class CommandConflictError(InputError):
     """Two leaves of a tree wrote the same part of the command in one tick."""
 
 
+class LeafError(BtTasksimError, RuntimeError):
+    """A leaf raised an exception; the message names the leaf, and ``__cause__`` is what it raised."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Says which known names are nearest to an unknown one.
 

@@ -17,15 +17,21 @@ from bt_tasksim.poses import Array
 from bt_tasksim.resources import asset
 from bt_tasksim.world import PlaceModel
 
+LOOKS = ("matte", "wood", "metal")
+
 
 @dataclass(frozen=True)
 class Box:
-    """A solid box of a fixture: pose ``(7,)`` in its frame, full size (m), RGB colour, friction."""
+    """A solid box of a fixture: pose ``(7,)`` in its frame, full size (m), sRGB colour, friction.
+
+    ``look`` says what it is drawn like: ``matte``, ``wood`` or ``metal``.
+    """
 
     pose: tuple[float, ...]
     size: tuple[float, float, float]
     colour: tuple[float, float, float] = (0.6, 0.5, 0.4)
     friction: float = 0.6
+    look: str = "matte"
 
 
 @dataclass(frozen=True)
@@ -94,6 +100,7 @@ class Fixture:
                 size=_floats(b["size"], 3),
                 colour=_floats(b.get("colour", (0.6, 0.5, 0.4)), 3),
                 friction=float(b.get("friction", 0.6)),
+                look=_look(b.get("look", "matte")),
             )
             for b in data["boxes"]
         )
@@ -111,6 +118,12 @@ class Fixture:
             for p in data["places"]
         )
         return cls(str(data["name"]), pose, boxes, places)
+
+
+def _look(name: Any) -> str:
+    if name not in LOOKS:
+        raise ValueError(f"unknown look '{name}'{nearest(str(name), LOOKS)}")
+    return str(name)
 
 
 def _floats(values: Any, n: int) -> Any:

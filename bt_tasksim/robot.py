@@ -84,6 +84,8 @@ class RobotDescription:
         pad_links: Names of these links.
         task_mask: Weights ``(6,)`` of the tool pose's components in the inverse kinematics, tool frame
             (x, y, z, rotations about x, y, z): 0 leaves one free, for arms of fewer than six joints.
+        envelope: Boxes ``(pose (7,), full size (3,))`` in the tool frame that hold the hand and the end of the
+            arm, for keeping clear of obstacles.
         cameras: By name: pose, size and field of view; see the rendering engine.
         source: Path of the data file.
     """
@@ -115,6 +117,7 @@ class RobotDescription:
     pads: Pads
     pad_links: tuple[str, ...]
     task_mask: Array
+    envelope: tuple[tuple[Array, tuple[float, float, float]], ...]
     cameras: Mapping[str, Any]
     source: Path
 
@@ -206,6 +209,13 @@ def _description(data: Mapping[str, Any], path: Path) -> RobotDescription:
         pads=Pads(**{k: float(v) for k, v in data["pads"]["surface"].items()}),
         pad_links=tuple(data["pads"]["links"]),
         task_mask=_vector(data.get("task_mask", [1.0] * 6), 6, "task_mask"),
+        envelope=tuple(
+            (
+                np.array([*_vector(b["position"], 3, "envelope.position"), 1.0, 0.0, 0.0, 0.0]),
+                tuple(_vector(b["size"], 3, "envelope.size").tolist()),
+            )
+            for b in data["envelope"]
+        ),
         cameras=data.get("cameras", {}),
         source=path,
     )

@@ -19,7 +19,7 @@ import numpy as np
 from bt_tasksim import poses
 from bt_tasksim.errors import InputError, nearest
 from bt_tasksim.fixtures import Fixture, load_fixture
-from bt_tasksim.shapes import KINDS, Shape, ShapeSize, object_model, resting_height, shape
+from bt_tasksim.shapes import KINDS, Shape, ShapeSize, object_model, resting_height, shape, size_range
 from bt_tasksim.world import ObjectModel, Obstacle, PlaceModel, WorldModel
 
 STREAMS = {"evaluation": 0, "training": 1, "validation": 2, "demonstration": 3}
@@ -37,7 +37,8 @@ class ObjectSpec:
             for the place's own default.
         centre: Centre ``(2,)`` of that rectangle in the place's frame, metres.
         yaw: Half width in radians of the range of its heading.
-        size: Low and high full sizes ``((3,), (3,))`` in metres; None for the kind's own range.
+        size: Low and high full sizes ``((3,), (3,))`` in metres; None for the kind's own range, or the size
+            of the mesh file.
         mass: Low and high, kg.
         friction: Low and high friction coefficient.
         exponents: Low and high shape exponents ``(e1, e2)`` of a superellipsoid.
@@ -340,7 +341,7 @@ def _draw_object(
 ) -> ObjectActor:
     kind = spec.kinds[int(rng.integers(len(spec.kinds)))]
     entry = KINDS[kind]
-    low, high = spec.size or entry.size_range
+    low, high = spec.size or size_range(kind, spec.mesh)
     size = tuple(float(v) for v in rng.uniform(low, high))
     if entry.round:
         size = (size[0], size[0], size[2])

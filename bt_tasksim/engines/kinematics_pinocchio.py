@@ -38,6 +38,8 @@ _PULL = 0.05
 """Share of the way to the preferred posture that one tracking step asks of the null space."""
 _PULL_LIMIT = 0.01
 """Largest such step of any joint, rad."""
+_SWING, _SWING_PER_METRE = 0.5, 10.0
+"""A tracked arm may change its posture by so much at once (rad; rad per metre that the tool goes)."""
 _RESTARTS = 24
 _LOCAL, _BASE = pin.ReferenceFrame.LOCAL, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _XYZQUAT = np.array([0, 1, 2, 4, 5, 6, 3])
@@ -114,7 +116,8 @@ class PinocchioKinematics:
             Positions ``(n_joints,)`` and the velocities ``(n_joints,)`` that lead there from the last target.
 
         Raises:
-            UnreachableError: No posture brings the tool there; nothing has changed then.
+            UnreachableError: No posture brings the tool there, or only one that the arm would have to swing
+                to while the tool hardly moves; the target has not changed then.
         """
         if self._target is None:
             start = np.array(state.joint_position, float)
@@ -164,9 +167,15 @@ class PinocchioKinematics:
         if error <= _TOLERANCE:
             return q
         q, error = self._iterate(last, pose, _HARDER)
-        if error <= _TOLERANCE or self._missed(q, pose) is None:
+        missed = None if error <= _TOLERANCE else self._missed(q, pose)
+        if missed is None:
             return q
-        return self._search(pose, [self._rest], last, best=q)
+        far = self._error(last, pose)
+        swing = _SWING + _SWING_PER_METRE * float(np.linalg.norm(far[:3])) + 2.0 * float(np.linalg.norm(far[3:]))
+        other = self._search(pose, [self._rest], last, best=q)
+        if float(np.abs(other - last).max()) > swing:
+            raise _unreachable(self.robot.name, pose, *missed, "without swinging into another posture")
+        return other
 
     def inverse(self, pose: Array, seed: Array | None = None, posture: Array | None = None) -> Array:
         """Joints ``(n_arm,)`` that bring the tool to a pose, in the posture nearest to the preferred one.
@@ -415,10 +424,10 @@ def _body(model: Any, name: str, robot: RobotDescription) -> int:
     return int(model.getBodyId(name))
 
 
-def _unreachable(robot: str, pose: Any, distance: float, angle: float) -> UnreachableError:
+def _unreachable(robot: str, pose: Any, distance: float, angle: float, how: str = "") -> UnreachableError:
     x, y, z = pose.translation
     return UnreachableError(
-        f"{robot} cannot bring its tool to ({x:.3f}, {y:.3f}, {z:.3f}) m: "
+        f"{robot} cannot bring its tool to ({x:.3f}, {y:.3f}, {z:.3f}) m{' ' * bool(how)}{how}: "
         f"the nearest pose misses by {1000 * distance:.1f} mm and {np.rad2deg(angle):.1f} degrees",
         distance,
         angle,

@@ -1,0 +1,107 @@
+"""Cameras as data: where they stand, how large their pictures are, and what a pixel sees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim import poses
+from bt_tasksim.engines.pipeline import CameraModel
+from bt_tasksim.errors import InputError
+from bt_tasksim.poses import Array
+
+
+@dataclass(frozen=True)
+class CameraSpec:
+    """A camera that stands still.
+
+    Attributes:
+        position: ``(3,)`` in the robot base frame, metres.
+        look_at: Point ``(3,)`` in the middle of the picture, robot base frame, metres.
+        size: Width and height in pixels.
+        field_of_view: Vertical opening angle, radians.
+    """
+
+    position: tuple[float, float, float]
+    look_at: tuple[float, float, float]
+    size: tuple[int, int] = (640, 480)
+    field_of_view: float = math.radians(45.0)
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any], owner: str) -> CameraSpec:
+        """A camera from plain data, as in a robot's file; ``field_of_view`` is in degrees there.
+
+        Args:
+            data: ``position``, ``look_at`` and, if wanted, ``size`` and ``field_of_view``.
+            owner: What it belongs to, for the error's sentence.
+
+        Raises:
+            InputError: Something is missing or makes no camera.
+        """
+        try:
+            unknown = set(data) - {"position", "look_at", "size", "field_of_view"}
+            if unknown:
+                raise ValueError(f"unknown entry '{sorted(unknown)[0]}'")
+            px, py, pz = (float(v) for v in data["position"])
+            tx, ty, tz = (float(v) for v in data["look_at"])
+            width, height = (int(v) for v in data.get("size", (640, 480)))
+            angle = math.radians(float(data.get("field_of_view", 45.0)))
+        except (KeyError, TypeError, ValueError) as error:
+            reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+            raise InputError(f"{owner}: {reason}") from error
+        if not (1 <= width <= 8192 and 1 <= height <= 8192 and 0 < angle < math.pi):
+            raise InputError(f"{owner}: a camera of {width}x{height} pixels and {math.degrees(angle):g} degrees")
+        if math.dist((px, py, pz), (tx, ty, tz)) < 1e-6:
+            raise InputError(f"{owner}: it looks at the point where it stands")
+        return cls((px, py, pz), (tx, ty, tz), (width, height), angle)
+
+    def model(self, name: str) -> CameraModel:
+        """The calibrated camera."""
+        width, height = self.size
+        focal = height / 2 / math.tan(self.field_of_view / 2)
+        matrix = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]], float)
+        forward = np.array(self.look_at) - np.array(self.position)
+        up = np.array([0.0, 0.0, 1.0])
+        if np.linalg.norm(np.cross(forward, up)) < 1e-6 * np.linalg.norm(forward):
+            up = np.array([1.0, 0.0, 0.0])
+        rotation = poses.frame_from_axes(forward, -up)
+        return CameraModel(name, width, height, matrix, poses.pose(self.position, rotation))
+
+
+CAMERAS: dict[str, CameraSpec] = {
+    "overview": CameraSpec((-0.62, -1.22, 1.02), (0.36, -0.02, 0.24), field_of_view=math.radians(42.0)),
+    "scene": CameraSpec((-0.12, 0.62, 0.95), (0.55, -0.05, 0.16), field_of_view=math.radians(48.0)),
+}
+"""Cameras of every scene: one for people, one for perception (RGB-D, fixed beside the robot)."""
+
+
+def project(camera: CameraModel, point: Array) -> tuple[Array, Array]:
+    """Where a camera sees points.
+
+    Args:
+        camera: The camera.
+        point: Points ``(..., 3)``, robot base frame, metres.
+
+    Returns:
+        Pixels ``(..., 2)``, x right and y down, the first pixel's centre at (0.5, 0.5); and depths ``(...)``
+        along the optical axis in metres, negative behind the camera.
+    """
+    local = poses.transform(poses.inverse(camera.pose), point)
+    depth = local[..., 2]
+    pixel = (local @ camera.matrix.T)[..., :2] / depth[..., None]
+    return pixel, depth
+
+
+def unproject(camera: CameraModel, depth: Array) -> Array:
+    """Points ``(height, width, 3)``, robot base frame, of a depth image ``(height, width)`` in metres.
+
+    Pixels in which nothing was seen (depth 0) give the camera's own position.
+    """
+    v, u = np.mgrid[0 : camera.height, 0 : camera.width] + 0.5
+    x = (u - camera.matrix[0, 2]) / camera.matrix[0, 0]
+    y = (v - camera.matrix[1, 2]) / camera.matrix[1, 1]
+    return poses.transform(camera.pose, np.stack([x * depth, y * depth, depth], axis=-1))

@@ -1,0 +1,371 @@
+"""Physics by SAPIEN (PhysX 5), one fresh scene an episode, without any rendering."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim import poses
+from bt_tasksim.engines.vulkan import use_software_driver
+from bt_tasksim.errors import MachineError
+from bt_tasksim.poses import Array
+from bt_tasksim.robot import RobotDescription
+from bt_tasksim.scene import ActorConfiguration, Disturbance
+from bt_tasksim.shapes import BoxPiece
+from bt_tasksim.world import Hidden, JointTarget, WorldState
+
+CONTACT_OFFSET = 0.004
+"""Metres within which PhysX looks for contacts."""
+POSITION_ITERATIONS = 15
+"""Of the solver, as ManiSkill's default."""
+TOUCH_FORCE = 0.05
+"""N from which a contact counts as a touch."""
+
+_ARM_BIT = 1 << 8  # shapes that share a bit of group 2 do not collide with each other
+_HAND_BIT = 1 << 9
+
+
+class SapienPhysics:
+    """The physics engine on SAPIEN.
+
+    The arm's links do not collide with one another; hands, fingers, objects and fixtures do. Links carry no
+    weight, as the controllers of real arms compensate it, so the wrist's wrench needs no correction.
+
+    Args:
+        robot: The robot.
+
+    Raises:
+        MachineError: SAPIEN is not installed.
+    """
+
+    def __init__(self, robot: RobotDescription) -> None:
+        use_software_driver()
+        try:
+            import sapien
+            import sapien.physx as physx
+        except ImportError as error:
+            raise MachineError(
+                f"SAPIEN physics cannot start: {error}; install the simulation extra: pip install 'bt-tasksim[sim]'"
+            ) from error
+        self._sapien = sapien
+        self._physx = physx
+        self.robot = robot
+        self._scene: Any = None
+
+    # ---- building ---------------------------------------------------------------------------------------
+
+    def reset(self, configuration: ActorConfiguration) -> WorldState:
+        """See `PhysicsEngine.reset`."""
+        sapien, physx = self._sapien, self._physx
+        physx.set_scene_config(enable_enhanced_determinism=False, bounce_threshold=2.0)
+        physx.set_body_config(solver_position_iterations=POSITION_ITERATIONS, solver_velocity_iterations=1)
+        physx.set_shape_config(contact_offset=CONTACT_OFFSET, rest_offset=0.0)
+        physx.set_default_material(0.5, 0.5, 0.0)
+        self._system = physx.PhysxCpuSystem()
+        self._scene = sapien.Scene([self._system])
+        self._scene.set_timestep(1.0 / configuration.physics_frequency)
+        self._dt = 1.0 / configuration.physics_frequency
+        self._substeps = configuration.physics_frequency // configuration.control_frequency
+        self._time = 0.0
+        self._steps = 0
+        self._materials: dict[float, Any] = {}
+        self._bodies: dict[Any, tuple[str, int]] = {}
+        self._keep: list[Any] = []
+        self._penetration = 0.0
+        self._contacts_step = -1
+        self._build_fixtures(configuration)
+        self._build_objects(configuration)
+        self._build_robot(configuration)
+        self._disturbance = configuration.disturbance
+        self._disturbed = _DISTURBANCE_WAITING if configuration.disturbance else _DISTURBANCE_OVER
+        self._held_since: float | None = None
+        self._pushed_until = 0.0
+        self._n_bodies = len(configuration.objects) + len(configuration.fixtures)
+        return self._state()
+
+    def _material(self, friction: float) -> Any:
+        if friction not in self._materials:
+            self._materials[friction] = self._physx.PhysxMaterial(friction, friction, 0.0)
+        return self._materials[friction]
+
+    def _pose(self, pose: Any) -> Any:
+        p = [float(v) for v in pose]
+        return self._sapien.Pose(p[:3], p[3:])
+
+    def _build_fixtures(self, configuration: ActorConfiguration) -> None:
+        n = len(configuration.objects)
+        for k, fixture in enumerate(configuration.fixtures):
+            body = self._physx.PhysxRigidStaticComponent()
+            for box in fixture.boxes:
+                shape = self._physx.PhysxCollisionShapeBox([s / 2 for s in box.size], self._material(box.friction))
+                shape.set_local_pose(self._pose(box.pose))
+                body.attach(shape)
+            self._add(body, fixture.name, fixture.pose)
+            self._bodies[body] = ("fixture", n + k)
+
+    def _build_objects(self, configuration: ActorConfiguration) -> None:
+        self._objects: list[Any] = []
+        for k, actor in enumerate(configuration.objects):
+            geometry = actor.shape()
+            body = self._physx.PhysxRigidDynamicComponent()
+            material = self._material(actor.friction)
+            for piece in geometry.collision:
+                if isinstance(piece, BoxPiece):
+                    shape = self._physx.PhysxCollisionShapeBox(list(piece.half_size), material)
+                    shape.set_local_pose(self._pose(piece.pose))
+                else:
+                    vertices = np.asarray(piece.vertices, np.float32)
+                    shape = self._physx.PhysxCollisionShapeConvexMesh(vertices, [1.0, 1.0, 1.0], material)
+                body.attach(shape)
+            body.set_mass(actor.mass)
+            body.set_cmass_local_pose(self._pose(geometry.mass.pose))
+            body.set_inertia([float(v) * actor.mass for v in geometry.mass.inertia])
+            body.set_max_depenetration_velocity(1.0)
+            self._add(body, actor.name, actor.pose)
+            self._bodies[body] = ("object", k)
+            self._objects.append(body)
+
+    def _add(self, body: Any, name: str, pose: Any) -> None:
+        entity = self._sapien.Entity()
+        entity.name = name
+        entity.add_component(body)
+        entity.set_pose(self._pose(pose))
+        self._scene.add_entity(entity)
+        self._keep.append(entity)
+
+    def _build_robot(self, configuration: ActorConfiguration) -> None:
+        robot = self.robot
+        loader = self._scene.create_urdf_loader()
+        loader.fix_root_link = True
+        builder = loader.parse(str(robot.urdf))[0][0]
+        for link in builder.link_builders:
+            link.visual_records.clear()
+        builder.disable_self_collisions = False
+        articulation = builder.build()
+        self._articulation = articulation
+        links = {link.name: link for link in articulation.get_links()}
+        self._links = links
+        pads = self._physx.PhysxMaterial(robot.pads.friction, robot.pads.friction, 0.0)
+        hand = _links_below(articulation, links[robot.wrist_link])
+        tip_of = {name: i for i, tip in enumerate(robot.tips) for name in tip.links}
+        base = links[robot.base_link]
+        for name, link in links.items():
+            link.set_disable_gravity(True)
+            in_hand = name in hand
+            for shape in link.get_collision_shapes():
+                bits = _ARM_BIT if not in_hand else (_ARM_BIT if name not in tip_of else 0) | _HAND_BIT * 0
+                shape.set_collision_groups([1, 1, bits, 0])
+                if name in robot.pad_links:
+                    shape.set_physical_material(pads)
+                    shape.set_patch_radius(robot.pads.patch_radius)
+                    shape.set_min_patch_radius(robot.pads.min_patch_radius)
+            kind = "base" if link is base else ("hand" if in_hand else "arm")
+            self._bodies[link] = (kind, tip_of.get(name, -1))
+        joints = {joint.name: joint for joint in articulation.get_active_joints()}
+        order = [joint.name for joint in articulation.get_active_joints()]
+        self._joints = [joints[name] for name in robot.joints]
+        self._index = np.array([order.index(name) for name in robot.joints])
+        n_arm = len(robot.arm_joints)
+        for i, joint in enumerate(self._joints):
+            drive = robot.arm_drive if i < n_arm else robot.hand_drive
+            joint.set_friction(0.1 if i < n_arm else 0.0)
+            joint.set_drive_properties(drive.stiffness, drive.damping, force_limit=drive.force_limit, mode="force")
+        self._stiffness = np.array([robot.arm_drive.stiffness] * n_arm + [robot.hand_drive.stiffness] * len(robot.hand_joints))
+        self._damping = np.array([robot.arm_drive.damping] * n_arm + [robot.hand_drive.damping] * len(robot.hand_joints))
+        self._limit = np.array([robot.arm_drive.force_limit] * n_arm + [robot.hand_drive.force_limit] * len(robot.hand_joints))
+        start = np.array(configuration.joint_position or np.concatenate([robot.rest, robot.hand_open]))
+        q = np.zeros(len(order), np.float32)
+        q[self._index] = start
+        articulation.set_qpos(q)
+        self._target = start.copy()
+        self._velocity_target = np.zeros_like(start)
+        for joint, value in zip(self._joints, start, strict=True):
+            joint.set_drive_target(float(value))
+            joint.set_drive_velocity_target(0.0)
+        self._tool_link = links[robot.tool_link]
+        self._wrist = [link.name for link in articulation.get_links()].index(robot.wrist_link)
+        self._wrist_link = links[robot.wrist_link]
+        self._tool_identity = bool(np.array_equal(robot.tool_pose, [0, 0, 0, 1, 0, 0, 0]))
+        self._tip_links = [links[tip.links[0]] for tip in robot.tips]
+        self._tip_points = [np.array(tip.point) for tip in robot.tips]
+
+    # ---- running ----------------------------------------------------------------------------------------
+
+    def step(self, target: JointTarget) -> WorldState:
+        """See `PhysicsEngine.step`."""
+        position, velocity = target.position, target.velocity
+        changed = (position != self._target) | (velocity != self._velocity_target)
+        if changed.any():
+            p, v = position.tolist(), velocity.tolist()
+            for i in changed.nonzero()[0].tolist():
+                joint = self._joints[i]
+                joint.set_drive_target(p[i])
+                joint.set_drive_velocity_target(v[i])
+            self._target, self._velocity_target = position, velocity
+        if self._disturbed == _DISTURBANCE_OVER:
+            step = self._system.step
+            for _ in range(self._substeps):
+                step()
+        else:
+            for _ in range(self._substeps):
+                self._disturb()
+                self._system.step()
+        self._steps += 1
+        self._time += self._dt * self._substeps
+        return self._state()
+
+    def _state(self) -> WorldState:
+        articulation = self._articulation
+        q = articulation.get_qpos()[self._index].astype(np.float64)
+        v = articulation.get_qvel()[self._index].astype(np.float64)
+        # The drives' own law; SAPIEN reports no effort of drives.
+        effort = self._stiffness * (self._target - q) + self._damping * (self._velocity_target - v)
+        np.clip(effort, -self._limit, self._limit, out=effort)
+        tool = _array(self._tool_link.entity_pose)
+        if not self._tool_identity:
+            tool = poses.multiply(tool, self.robot.tool_pose)
+        tips = np.array(
+            [poses.transform(_array(link.entity_pose), point) for link, point in zip(self._tip_links, self._tip_points, strict=True)]
+        )
+        objects = np.array([_array(body.entity_pose) for body in self._objects]).reshape(-1, 7)
+        velocities = np.array(
+            [[*body.linear_velocity.tolist(), *body.angular_velocity.tolist()] for body in self._objects]
+        ).reshape(-1, 6)
+        self._read_contacts()
+        return WorldState(
+            time=np.float64(self._time),
+            joint_position=q,
+            joint_velocity=v,
+            joint_effort=effort,
+            tip_force=self._tip_force,
+            wrench=self._wrench(tool),
+            tool_pose=tool,
+            tips=tips,
+            objects=objects,
+            velocities=velocities,
+        )
+
+    def _wrench(self, tool: Array) -> Array:
+        """External wrench at the tool, from the wrist joint's incoming force.
+
+        SAPIEN reports the force that the wrist's parent exerts on it in the link's frame; at rest the
+        world's force on the hand is its opposite. Moments are moved to the tool origin: t' = t + r x f.
+        """
+        incoming = -self._articulation.get_link_incoming_joint_forces()[self._wrist].astype(np.float64)
+        wrist = _array(self._wrist_link.entity_pose)
+        q_inv = tool[3:] * _CONJUGATE
+        force = poses.rotate(wrist[3:], incoming[:3])
+        torque = poses.rotate(wrist[3:], incoming[3:]) + poses.cross(wrist[:3] - tool[:3], force)
+        return np.concatenate([poses.rotate(q_inv, force), poses.rotate(q_inv, torque)])
+
+    def _read_contacts(self) -> None:
+        n = len(self._objects)
+        tip_force = np.zeros((len(self.robot.tips), 3))
+        hand_force = [0.0] * n
+        distance = [math.inf] * n
+        support: set[tuple[int, int]] = set()
+        rate = 1.0 / self._dt
+        deepest = self._penetration
+        for contact in self._system.get_contacts():
+            a, b = contact.bodies
+            kind_a, i = self._bodies.get(a, ("none", 0))
+            kind_b, j = self._bodies.get(b, ("none", 0))
+            if kind_a == "base" or kind_b == "base":
+                continue
+            points = contact.points
+            separation = min(point.separation for point in points)
+            if -separation > deepest:
+                deepest = -separation
+                self.deepest_pair = (a.entity.name, b.entity.name, -separation, self._time)
+            if separation > 0.002:
+                if kind_a != "object" and kind_b != "object":
+                    continue
+            x = y = z = 0.0
+            for point in points:
+                px, py, pz = point.impulse.tolist()
+                x, y, z = x + px, y + py, z + pz
+            x, y, z = x * rate, y * rate, z * rate
+            size = math.sqrt(x * x + y * y + z * z)
+            if kind_b in ("hand", "arm"):  # the impulse acts on the first body
+                a, b, kind_a, kind_b, i, j, x, y, z = b, a, kind_b, kind_a, j, i, -x, -y, -z
+            if kind_a == "hand" and i >= 0:
+                tip_force[i] += (x, y, z)
+                if kind_b == "hand" and j >= 0:
+                    tip_force[j] -= (x, y, z)
+            if kind_b == "object" and kind_a in ("hand", "arm"):
+                hand_force[j] += size
+                distance[j] = min(distance[j], max(separation, 0.0))
+            elif size > TOUCH_FORCE or separation < 5e-4:
+                if kind_a == "object":
+                    support.add((i, j))
+                if kind_b == "object":
+                    support.add((j, i))
+        self._tip_force = tip_force
+        self._hand_force, self._hand_distance, self._support = hand_force, distance, support
+        self._penetration = deepest
+
+    def hidden(self) -> Hidden:
+        """See `PhysicsEngine.hidden`."""
+        tool = _array(self._tool_link.entity_pose)
+        if not self._tool_identity:
+            tool = poses.multiply(tool, self.robot.tool_pose)
+        support = np.zeros((len(self._objects), self._n_bodies), bool)
+        for i, j in self._support:
+            support[i, j] = True
+        return Hidden(
+            time=np.float64(self._time),
+            objects=np.array([_array(body.entity_pose) for body in self._objects]).reshape(-1, 7),
+            velocities=np.array(
+                [[*b.linear_velocity.tolist(), *b.angular_velocity.tolist()] for b in self._objects]
+            ).reshape(-1, 6),
+            hand_force=np.array(self._hand_force),
+            hand_distance=np.array(self._hand_distance),
+            support=support,
+            penetration=np.float64(self._penetration),
+            tool_pose=tool,
+        )
+
+    # ---- disturbance ------------------------------------------------------------------------------------
+
+    def _disturb(self) -> None:
+        """Push the object out of the hand, once, some time after it was first held clear of its support."""
+        disturbance: Disturbance | None = self._disturbance
+        assert disturbance is not None
+        k = next(i for i, b in enumerate(self._objects) if b.entity.name == disturbance.object)
+        held = self._hand_force[k] > 1.0 and not any(i == k for i, _ in self._support)
+        if self._disturbed == _DISTURBANCE_WAITING:
+            if not held:
+                return
+            if self._held_since is None:
+                self._held_since = self._time
+            if self._time - self._held_since < disturbance.delay:
+                return
+            self._disturbed = _DISTURBANCE_PUSHING
+            self._pushed_until = self._time + disturbance.limit
+        self._read_contacts()
+        if self._time > self._pushed_until or self._hand_force[k] <= 0.0:
+            self._disturbed = _DISTURBANCE_OVER
+            return
+        body = self._objects[k]
+        body.wake_up()
+        body.add_force_at_point(list(disturbance.force), body.entity_pose.p)
+
+
+_DISTURBANCE_WAITING, _DISTURBANCE_PUSHING, _DISTURBANCE_OVER = range(3)
+_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def _array(pose: Any) -> Array:
+    return np.array([*pose.p.tolist(), *pose.q.tolist()])
+
+
+def _links_below(articulation: Any, root: Any) -> set[str]:
+    """Names of a link and of all links that it carries."""
+    names = {root.name}
+    for joint in articulation.get_joints():
+        parent, child = joint.get_parent_link(), joint.get_child_link()
+        if parent is not None and parent.name in names:
+            names.add(child.name)
+    return names

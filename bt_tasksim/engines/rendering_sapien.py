@@ -1,0 +1,233 @@
+"""Rendering by SAPIEN, in a scene of its own without any physics.
+
+The scene is fed with joint positions and object poses, so any physics engine, or a real robot's sensors, can
+stand before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim.engines import looks
+from bt_tasksim.engines.cameras import CAMERAS, CameraSpec
+from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.engines.pipeline import CameraModel, Image
+from bt_tasksim.engines.urdf_visuals import LinkVisual, load_visuals
+from bt_tasksim.engines.vulkan import use_software_driver
+from bt_tasksim.errors import InputError, MachineError, nearest
+from bt_tasksim.poses import Array
+from bt_tasksim.robot import RobotDescription, load_robot
+from bt_tasksim.scene import ActorConfiguration, ObjectActor
+from bt_tasksim.world import WorldState
+
+ALIASES = {"perception": "scene"}
+_FLOOR = -0.75
+_NEAR, _FAR = 0.02, 20.0
+
+
+class SapienRendering:
+    """A `RenderingEngine`; one instance serves any number of episodes.
+
+    Args:
+        cameras: Further cameras by name, or other ones in place of `bt_tasksim.engines.cameras.CAMERAS`; a
+            robot's data file may bring its own, too.
+        shadow_size: Width of the shadow map in pixels; 0 for no shadows.
+
+    Raises:
+        MachineError: SAPIEN finds no render device on this machine.
+    """
+
+    def __init__(self, cameras: Mapping[str, CameraSpec] | None = None, shadow_size: int = 1024) -> None:
+        use_software_driver()
+        try:
+            import sapien
+            from sapien import render
+        except ImportError:
+            raise MachineError(
+                "rendering needs the package sapien: install bt-tasksim with its extra 'sim'"
+            ) from None
+        render.set_log_level("error")
+        try:
+            self._system = render.RenderSystem()
+            self._scene = sapien.Scene([self._system])
+        except RuntimeError as error:
+            raise MachineError(
+                f"SAPIEN finds no Vulkan device to draw with ({error}): fetch the software driver with "
+                f"'make demo', or run without rendering"
+            ) from error
+        self._sapien, self._render = sapien, render
+        self._own = dict(cameras or {})
+        self._specs: dict[str, CameraSpec] = {}
+        self._cameras: dict[str, tuple[CameraSpec, CameraModel, Any, Any]] = {}
+        self._robot: RobotDescription | None = None
+        self._kinematics: PinocchioKinematics | None = None
+        self._links: dict[str, Any] = {}
+        self._objects: list[Any] = []
+        self._fixtures: list[Any] = []
+        self._drawn: tuple[Any, ...] = ()
+        looks.add_lights(self._scene, shadow_size)
+        self._add_floor()
+
+    def reset(self, configuration: ActorConfiguration) -> None:
+        """Prepare for an episode: its robot, fixtures and objects.
+
+        Raises:
+            InputError: The robot's file or one of its meshes is missing or wrong.
+        """
+        robot = load_robot(configuration.robot)
+        if robot is not self._robot:
+            self._build_robot(robot)
+        if configuration.fixtures != self._drawn:
+            self._remove(self._fixtures)
+            for fixture in configuration.fixtures:
+                shapes = []
+                for box in fixture.boxes:
+                    shape = looks.plank_shape(box.size, looks.material(box.colour, box.look))
+                    shape.local_pose = self._pose(np.array(box.pose))
+                    shapes.append(shape)
+                self._fixtures.append(self._add(fixture.name, shapes, fixture.pose_array()))
+            self._drawn = configuration.fixtures
+        self._remove(self._objects)
+        self._objects = [self._add_object(actor) for actor in configuration.objects]
+
+    def camera(self, name: str) -> CameraModel:
+        """The calibrated camera of a name.
+
+        Raises:
+            InputError: There is no such camera.
+        """
+        return self._camera(name)[1]
+
+    def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
+        """What the named camera sees now.
+
+        Args:
+            state: Unbatched; without object poses (a real robot) objects stay where they were drawn.
+            camera: Its name.
+            depth: Fetch the depth image, too.
+
+        Raises:
+            InputError: There is no such camera.
+            RuntimeError: The engine was not reset.
+        """
+        if self._kinematics is None:
+            raise RuntimeError("nothing can be drawn: the rendering engine was not reset")
+        _, model, component, _ = self._camera(camera)
+        for name, pose in self._kinematics.link_poses(state.joint_position, list(self._links)).items():
+            self._links[name].set_pose(self._pose(pose))
+        if state.objects is not None:
+            for entity, pose in zip(self._objects, state.objects, strict=True):
+                entity.set_pose(self._pose(pose))
+        self._scene.update_render()
+        component.take_picture()
+        colour = component.get_picture("Color")
+        pixels = np.round(255 * np.clip(colour[..., :3], 0, 1)).astype(np.uint8)
+        if not depth:
+            return Image(model, pixels, None)
+        position = component.get_picture("Position")
+        metres = np.where(position[..., 3] < 1, -position[..., 2], 0).astype(np.float32)
+        return Image(model, pixels, metres)
+
+    def close(self) -> None:
+        """Let go of the scene."""
+        self._remove(self._objects)
+        self._remove(self._fixtures)
+        self._remove(list(self._links.values()))
+        self._links, self._cameras, self._robot, self._kinematics, self._drawn = {}, {}, None, None, ()
+
+    def _camera(self, name: str) -> tuple[CameraSpec, CameraModel, Any, Any]:
+        name = ALIASES.get(name, name)
+        specs = self._specs or {**CAMERAS, **self._own}
+        spec = specs.get(name)
+        if spec is None:
+            raise InputError(f"unknown camera '{name}'{nearest(name, [*specs, *ALIASES])}")
+        known = self._cameras.get(name)
+        if known is not None and known[0] == spec:
+            return known
+        if known is not None:
+            self._scene.remove_entity(known[3])
+        model = spec.model(name)
+        component = self._render.RenderCameraComponent(model.width, model.height)
+        component.set_perspective_parameters(
+            _NEAR, _FAR,
+            float(model.matrix[0, 0]), float(model.matrix[1, 1]),
+            float(model.matrix[0, 2]), float(model.matrix[1, 2]), 0.0,
+        )  # fmt: skip
+        # SAPIEN's camera looks along x, with y to the left and z up.
+        to_optical = np.array([0.5, 0.5, -0.5, 0.5])
+        entity = self._sapien.Entity()
+        entity.add_component(component)
+        pose = self._pose(model.pose) * self._pose(np.array([0, 0, 0, *to_optical]))
+        entity.set_pose(pose)
+        self._scene.add_entity(entity)
+        self._cameras[name] = (spec, model, component, entity)
+        return self._cameras[name]
+
+    def _build_robot(self, robot: RobotDescription) -> None:
+        specs = {
+            name: CameraSpec.from_data(data, f"robot file '{robot.source}': camera '{name}'")
+            for name, data in robot.cameras.items()
+        }
+        kinematics, visuals = PinocchioKinematics(robot), load_visuals(robot.urdf)
+        self._remove(list(self._links.values()))
+        by_link: dict[str, list[LinkVisual]] = {}
+        for visual in visuals:
+            by_link.setdefault(visual.link, []).append(visual)
+        self._links = {
+            name: self._add(name, [self._link_shape(v) for v in parts], np.array([0, 0, 0, 1, 0, 0, 0.0]))
+            for name, parts in by_link.items()
+        }
+        self._robot, self._kinematics, self._specs = robot, kinematics, {**CAMERAS, **specs, **self._own}
+
+    def _link_shape(self, visual: LinkVisual) -> Any:
+        render = self._render
+        coat = looks.material(visual.colour or (0.75, 0.75, 0.76))
+        size = np.array(visual.size)
+        pose = self._pose(np.array(visual.pose))
+        match visual.kind:
+            case "mesh":
+                own = None if visual.colour is None else coat
+                shape = render.RenderShapeTriangleMesh(visual.mesh, size, own)
+            case "box":
+                shape = render.RenderShapeBox(size / 2, coat)
+            case "sphere":
+                shape = render.RenderShapeSphere(float(size[0]), coat)
+            case _:
+                shape = render.RenderShapeCylinder(float(size[0]), float(size[1]) / 2, coat)
+                # SAPIEN's cylinder lies along x.
+                pose = pose * self._sapien.Pose([0, 0, 0], [0.5**0.5, 0, 0.5**0.5, 0])
+        shape.local_pose = pose
+        return shape
+
+    def _add_object(self, actor: ObjectActor) -> Any:
+        shape = looks.mesh_shape(actor.shape().visual, looks.material(actor.colour))
+        return self._add(actor.name, [shape], np.array(actor.pose))
+
+    def _add_floor(self) -> None:
+        coat = self._render.RenderMaterial(
+            base_color=looks.linear((0.80, 0.81, 0.83)), metallic=0, roughness=0.95, specular=0.1
+        )
+        floor = looks.plank_shape((16.0, 16.0, 0.02), coat)
+        self._add("floor", [floor], np.array([0.0, 0.0, _FLOOR - 0.01, 1, 0, 0, 0]))
+
+    def _add(self, name: str, shapes: list[Any], pose: Array) -> Any:
+        body = self._render.RenderBodyComponent()
+        for shape in shapes:
+            body.attach(shape)
+        entity = self._sapien.Entity()
+        entity.name = name
+        entity.add_component(body)
+        entity.set_pose(self._pose(pose))
+        self._scene.add_entity(entity)
+        return entity
+
+    def _remove(self, entities: list[Any]) -> None:
+        for entity in entities:
+            self._scene.remove_entity(entity)
+        entities.clear()
+
+    def _pose(self, pose: Array) -> Any:
+        return self._sapien.Pose(pose[:3], pose[3:])

@@ -1,0 +1,124 @@
+"""What a URDF's links look like."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from defusedxml.ElementTree import parse
+
+from bt_tasksim import poses
+from bt_tasksim.errors import InputError
+
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class LinkVisual:
+    """One visible part of a link.
+
+    Attributes:
+        link: Name of the link.
+        pose: Pose ``(7,)`` in the link's frame.
+        kind: ``mesh``, ``box``, ``cylinder`` (its axis is z) or ``sphere``.
+        size: Scale ``(3,)`` of a mesh, full size ``(3,)`` of a box, radius and length, or radius; metres.
+        mesh: Path of the mesh file.
+        colour: RGB, 0 to 1; None where the mesh brings its own.
+    """
+
+    link: str
+    pose: tuple[float, ...]
+    kind: str
+    size: tuple[float, ...]
+    mesh: str | None
+    colour: Colour | None
+
+
+@lru_cache(maxsize=32)
+def load_visuals(urdf: Path) -> tuple[LinkVisual, ...]:
+    """All visible parts of a URDF, link by link.
+
+    Raises:
+        InputError: The file is no URDF, or one of its meshes is missing.
+    """
+    try:
+        root = parse(urdf).getroot()
+    except (ElementTree.ParseError, OSError, ValueError) as error:
+        raise InputError(f"URDF '{urdf}' cannot be read: {error}") from error
+    named = {m.get("name", ""): _colour(m) for m in root.findall("material")}
+    visuals = []
+    for link in root.findall("link"):
+        for visual in link.findall("visual"):
+            try:
+                visuals.append(_visual(link.get("name", ""), visual, named, urdf))
+            except (AttributeError, IndexError, TypeError, ValueError) as error:
+                if isinstance(error, InputError):
+                    raise
+                raise InputError(f"URDF '{urdf}': link '{link.get('name')}': bad visual: {error}") from error
+    return tuple(visuals)
+
+
+def _visual(
+    link: str, visual: ElementTree.Element, named: dict[str, Colour | None], urdf: Path
+) -> LinkVisual:
+    origin = visual.find("origin")
+    xyz = _floats(origin.get("xyz", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
+    rpy = _floats(origin.get("rpy", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
+    geometry = visual.find("geometry")
+    if geometry is None or len(geometry) == 0:
+        raise ValueError("it has no geometry")
+    form = geometry[0]
+    kind, mesh, size = form.tag, None, (1.0, 1.0, 1.0)
+    match kind:
+        case "mesh":
+            size = _floats(form.get("scale", "1 1 1"))
+            mesh = str(_mesh_path(form.get("filename", ""), urdf))
+        case "box":
+            size = _floats(form.get("size", ""))
+        case "cylinder":
+            size = (float(form.get("radius", "")), float(form.get("length", "")))
+        case "sphere":
+            size = (float(form.get("radius", "")),)
+        case _:
+            raise ValueError(f"unknown geometry '{kind}'")
+    material = visual.find("material")
+    colour = None
+    if material is not None:
+        colour = _colour(material) or named.get(material.get("name", ""))
+    pose = poses.pose(xyz, _from_rpy(*rpy))
+    return LinkVisual(link, tuple(float(v) for v in pose), kind, size, mesh, colour)
+
+
+def _from_rpy(roll: float, pitch: float, yaw: float) -> poses.Array:
+    """Unit quaternion ``(4,)`` of URDF's roll, pitch and yaw: about fixed x, then y, then z."""
+    x, y, z = (poses.from_rotation_vector(v) for v in np.diag([roll, pitch, yaw]))
+    return poses.quat_multiply(z, poses.quat_multiply(y, x))
+
+
+def _mesh_path(filename: str, urdf: Path) -> Path:
+    plain = filename.removeprefix("file://")
+    if plain.startswith("package://"):
+        inside = plain.removeprefix("package://")
+        below = inside.partition("/")[2]
+        candidates = [folder / name for folder in urdf.parents for name in (inside, below)]
+    else:
+        candidates = [urdf.parent / plain]
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate.resolve()
+    raise InputError(f"URDF '{urdf}': no mesh file '{filename}'")
+
+
+def _colour(material: ElementTree.Element) -> Colour | None:
+    colour = material.find("color")
+    if colour is None:
+        return None
+    r, g, b = _floats(colour.get("rgba", "1 1 1 1"))[:3]
+    return r, g, b
+
+
+def _floats(text: str) -> tuple[float, ...]:
+    return tuple(float(v) for v in text.split())

@@ -1,0 +1,185 @@
+"""Collision-free ways for a hand that carries something, among boxes.
+
+The hand and what it holds are boxes that move with the tool; coal answers whether they touch an obstacle. A
+straight way is tried first, then the way out of and into fixtures along their access, then a shortest path
+on a lattice of tool positions (Hart, Nilsson and Raphael, "A formal basis for the heuristic determination of
+minimum cost paths", 1968, by networkx). Everything is deterministic.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import networkx as nx
+import numpy as np
+
+from bt_tasksim import poses
+from bt_tasksim.errors import BtTasksimError
+from bt_tasksim.poses import Array
+from bt_tasksim.world import Obstacle
+
+MARGIN = 0.012
+"""Metres of free space kept around everything."""
+_STEP = 0.03
+_CELL = 0.05
+
+
+class NoWayError(BtTasksimError):
+    """There is no collision-free way."""
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What moves with the tool.
+
+    Attributes:
+        hand: Boxes ``(pose (7,), full size (3,))`` in the tool frame.
+        extent: Full size ``(3,)`` of the held object's bounding box, metres.
+        grip: Pose ``(7,)`` of the object in the tool frame.
+    """
+
+    hand: Sequence[tuple[Array, tuple[float, float, float]]]
+    extent: tuple[float, float, float]
+    grip: Array
+
+
+def clear_path(
+    start: Array,
+    goal: Array,
+    carried: Carried,
+    obstacles: Sequence[Obstacle],
+    exits: tuple[Array, Array] | None = None,
+) -> list[Array]:
+    """Tool poses from start to goal, joined by clear straight lines.
+
+    Args:
+        start: Tool pose ``(7,)``.
+        goal: Tool pose ``(7,)``.
+        carried: What moves with the tool.
+        obstacles: What to keep clear of.
+        exits: Displacements ``(3,)`` that take the tool out of the fixture it starts in and out of the one
+            it ends in.
+
+    Raises:
+        NoWayError: No way was found.
+    """
+    checker = _Checker(carried, obstacles)
+    if checker.clear(start, goal):
+        return [start, goal]
+    if exits is not None:
+        out, into = start.copy(), goal.copy()
+        out[:3] += exits[0]
+        into[:3] += exits[1]
+        middle = [p for p, e in ((out, exits[0]), (into, exits[1])) if float(np.abs(e).sum()) > 0]
+        for way in _between(start, middle, goal):
+            if checker.clear_way(way):
+                return way
+    return _lattice(start, goal, checker)
+
+
+def _between(start: Array, middle: list[Array], goal: Array) -> list[list[Array]]:
+    plain = [start, *middle, goal]
+    ways = [plain]
+    high = max(float(p[2]) for p in plain) + 0.05
+    lifted = []
+    for p in middle or (start, goal):
+        q = p.copy()
+        q[2] = high
+        lifted.append(q)
+    ways.append([start, *lifted, goal])
+    return ways
+
+
+class _Checker:
+    def __init__(self, carried: Carried, obstacles: Sequence[Obstacle]) -> None:
+        import coal
+
+        self._coal = coal
+        boxes = [*carried.hand, (carried.grip, carried.extent)]
+        self._moving = [
+            (poses.pose(p[:3], p[3:]), coal.Box(*(float(s) for s in size))) for p, size in boxes
+        ]
+        self._fixed = [
+            (
+                coal.Box(*(float(s) + 2 * MARGIN for s in o.size)),
+                coal.Transform3s(poses.to_matrix(o.pose[3:]), o.pose[:3]),
+                o.pose[:3],
+                float(np.linalg.norm(o.size)) / 2 + MARGIN,
+            )
+            for o in obstacles
+        ]
+        self._radius = [float(np.linalg.norm(size)) / 2 for _, size in boxes]
+        self._request = coal.CollisionRequest()
+
+    def free(self, tool: Array) -> bool:
+        coal = self._coal
+        for (local, box), radius in zip(self._moving, self._radius, strict=True):
+            p = poses.multiply(tool, local)
+            frame = None
+            for other, at, centre, reach in self._fixed:
+                if float(np.linalg.norm(p[:3] - centre)) > radius + reach:
+                    continue
+                if frame is None:
+                    frame = coal.Transform3s(poses.to_matrix(p[3:]), p[:3])
+                if coal.collide(box, frame, other, at, self._request, coal.CollisionResult()):
+                    return False
+        return True
+
+    def clear(self, a: Array, b: Array) -> bool:
+        length = float(np.linalg.norm(b[:3] - a[:3])) + 0.1 * float(poses.angle_between(a[3:], b[3:]))
+        n = max(2, int(np.ceil(length / _STEP)) + 1)
+        # The ends are where the object is lifted from and put down: there it may be near its support.
+        return all(self.free(poses.interpolate(a, b, f)) for f in np.linspace(0.0, 1.0, n))
+
+    def clear_way(self, way: Sequence[Array]) -> bool:
+        return all(self.clear(a, b) for a, b in itertools.pairwise(way))
+
+
+def _lattice(start: Array, goal: Array, checker: _Checker) -> list[Array]:
+    low = np.minimum(start[:3], goal[:3]) - 0.35
+    high = np.maximum(start[:3], goal[:3]) + 0.35
+    low[2] = max(low[2], 0.02)
+    counts = np.ceil((high - low) / _CELL).astype(int) + 1
+    span = max(float(np.linalg.norm(goal[:3] - start[:3])), 1e-6)
+
+    def pose_at(cell: tuple[int, ...]) -> Array:
+        p = low + _CELL * np.array(cell)
+        f = float(np.clip((p - start[:3]) @ (goal[:3] - start[:3]) / span**2, 0.0, 1.0))
+        return poses.pose(p, poses.interpolate(start, goal, f)[3:])
+
+    free = {c for c in itertools.product(*(range(n) for n in counts)) if checker.free(pose_at(c))}
+    graph = nx.Graph()
+    moves = [m for m in itertools.product((-1, 0, 1), repeat=3) if m > (0, 0, 0)]
+    for cell in sorted(free):
+        for move in moves:
+            other = tuple(c + m for c, m in zip(cell, move, strict=True))
+            if other in free:
+                graph.add_edge(cell, other, weight=float(np.linalg.norm(move)))
+    for end in (start, goal):
+        key = "start" if end is start else "goal"
+        near = sorted(free, key=lambda c: float(np.linalg.norm(low + _CELL * np.array(c) - end[:3])))[:20]
+        for cell in near:
+            if checker.clear(end, pose_at(cell)):
+                graph.add_edge(key, cell, weight=float(np.linalg.norm(pose_at(cell)[:3] - end[:3])) / _CELL)
+    try:
+        cells = nx.shortest_path(graph, "start", "goal", weight="weight")
+    except (nx.NetworkXNoPath, nx.NodeNotFound) as error:
+        raise NoWayError(
+            f"no way for the hand from {np.round(start[:3], 3).tolist()} to {np.round(goal[:3], 3).tolist()} m "
+            f"that keeps {1000 * MARGIN:.0f} mm clear of the fixtures: give via-points, or move the fixtures apart"
+        ) from error
+    way = [start, *(pose_at(c) for c in cells[1:-1]), goal]
+    return _shortcut(way, checker)
+
+
+def _shortcut(way: list[Array], checker: _Checker) -> list[Array]:
+    out, i = [way[0]], 0
+    while i < len(way) - 1:
+        j = len(way) - 1
+        while j > i + 1 and not checker.clear(way[i], way[j]):
+            j -= 1
+        out.append(way[j])
+        i = j
+    return out

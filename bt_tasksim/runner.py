@@ -1,0 +1,304 @@
+"""The tick loop: one tree, one scene, one episode after the other.
+
+One tick is one control period. The tree writes a command, the pipeline carries it out and observes, and so
+on until the tree ends. In simulation the outcome is then judged by the physics state (`bt_tasksim.judge`).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_tasksim.concept import ConceptNode
+from bt_tasksim.context import Context
+from bt_tasksim.engines.pipeline import EnginePipeline
+from bt_tasksim.engines.registry import EngineOptions, build_pipeline
+from bt_tasksim.errors import BtTasksimError, LeafError, UnreachableError
+from bt_tasksim.judge import Verdict, at_rest, judge
+from bt_tasksim.robot import load_robot
+from bt_tasksim.scene import ActorConfiguration, Scene
+from bt_tasksim.world import Command, Observation, WorldModel
+
+LONGEST = 120.0
+"""Seconds of an episode after which it is stopped."""
+SETTLE = 2.0
+"""Longest time in seconds for which things may come to rest after the tree has ended."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One tick, as a recorder gets it."""
+
+    observation: Observation
+    command: Command
+    tree_status: Status
+    pipeline: EnginePipeline
+
+
+@dataclass
+class Result:
+    """What became of an episode.
+
+    Attributes:
+        status: The tree's own status at the end.
+        why: One sentence: the judged outcome, or the reason why the tree failed.
+        success: The tree ended SUCCESS and the physics state agrees.
+        reason: A short, countable reason for failure; empty on success.
+        verdict: The judgement by the physics state, None on a real robot.
+        seed: Seed of the episode.
+        control_steps: Control periods until the tree ended.
+        sim_time: Seconds of the episode until the tree ended.
+        wall_time: Seconds it took.
+        policies: Policy in use by leaf.
+        configuration: The world as drawn.
+    """
+
+    status: Status
+    why: str
+    success: bool
+    reason: str
+    verdict: Verdict | None
+    seed: int
+    control_steps: int
+    sim_time: float
+    wall_time: float
+    policies: dict[str, str]
+    configuration: ActorConfiguration
+
+
+@dataclass
+class Runner:
+    """Runs one tree in one scene.
+
+    Args:
+        tree: The tree's root.
+        scene: The scene.
+        options: Which engines.
+        pipeline: A pipeline of one's own, instead of ``options``.
+        longest: Seconds of an episode after which it is stopped.
+
+    Raises:
+        InputError: The tree, the scene or the options do not fit.
+    """
+
+    tree: Behaviour
+    scene: Scene
+    options: EngineOptions = field(default_factory=EngineOptions)
+    pipeline: EnginePipeline | None = None
+    longest: float = LONGEST
+
+    def __post_init__(self) -> None:
+        from trees.authoring import check_tree
+
+        check_tree(self.tree)
+        self.robot = load_robot(self.scene.robot)
+        if self.pipeline is None:
+            self.pipeline = build_pipeline(self.robot, self.options)
+        self.context = Context(self.robot)
+        for node in self.tree.iterate():
+            node.setup(context=self.context)
+
+    def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:
+        """Draw a world, reset the engines and the tree."""
+        configuration = self.scene.sample(seed, stream)
+        return configuration, self.reset(configuration)
+
+    def reset(self, configuration: ActorConfiguration) -> WorldModel:
+        """Reset the engines and the tree to a world."""
+        assert self.pipeline is not None
+        world = configuration.world_model([tip.name for tip in self.robot.tips], self.robot.opening)
+        self.tree.stop(Status.INVALID)
+        self.context.hidden = self.pipeline.hidden
+        self.context.begin(world, self.pipeline.reset(configuration, world))
+        return world
+
+    def run(self, seed: int, stream: str = "evaluation", record: Callable[[Step], None] | None = None) -> Result:
+        """One episode.
+
+        Args:
+            seed: Seed of the draw.
+            stream: Stream of draws.
+            record: Called after every tick.
+
+        Raises:
+            LeafError: A leaf raised an exception; every node has ended and the robot holds.
+        """
+        started = time.perf_counter()
+        configuration, world = self.begin(seed, stream)
+        return self.finish(configuration, world, started, record)
+
+    def finish(
+        self,
+        configuration: ActorConfiguration,
+        world: WorldModel,
+        started: float | None = None,
+        record: Callable[[Step], None] | None = None,
+    ) -> Result:
+        """Tick until the tree ends, let things come to rest, and judge."""
+        assert self.pipeline is not None
+        started = time.perf_counter() if started is None else started
+        context, pipeline, tree = self.context, self.pipeline, self.tree
+        steps, reason, why = 0, "", ""
+        limit = round(self.longest * configuration.control_frequency)
+        while True:
+            self.tick()
+            if record is not None:
+                record(Step(context.observation, context.command, tree.status, pipeline))
+            if tree.status != Status.RUNNING:
+                break
+            if steps >= limit:
+                tree.stop(Status.INVALID)
+                reason, why = "time over", f"not done within {self.longest:g} s"
+                break
+            try:
+                context.advance(pipeline.step(context.command, look=context.look))
+            except UnreachableError as error:
+                tree.stop(Status.INVALID)
+                reason, why = "out of reach", str(error)
+                break
+            steps += 1
+        status = tree.status
+        sim_time = context.time
+        verdict = self._settle_and_judge(configuration, world, record)
+        if status == Status.SUCCESS:
+            if verdict is not None:
+                reason, why = verdict.reason, verdict.why
+        elif not reason:
+            leaf = failed_leaf(tree)
+            reason = f"{leaf.name} failed" if leaf is not None else "tree failed"
+            why = f"{leaf.name}: {leaf.feedback_message}" if leaf is not None else tree.feedback_message
+        return Result(
+            status=status,
+            why=why,
+            success=status == Status.SUCCESS and not reason,
+            reason=reason,
+            verdict=verdict,
+            seed=configuration.seed,
+            control_steps=steps,
+            sim_time=sim_time,
+            wall_time=time.perf_counter() - started,
+            policies={
+                leaf.name: leaf.policy_in_use.name for leaf in tree.iterate() if isinstance(leaf, ConceptNode)
+            },
+            configuration=configuration,
+        )
+
+    def tick(self) -> None:
+        """Tick the tree once.
+
+        Raises:
+            LeafError: A leaf raised; every node has ended.
+            BtTasksimError: A leaf found an error of its own kind; every node has ended.
+        """
+        try:
+            for _ in self.tree.tick():
+                pass
+        except BaseException as error:
+            culprit = raising_leaf(error, self.tree)
+            end_all(self.tree, culprit)
+            if isinstance(error, BtTasksimError) or not isinstance(error, Exception):
+                raise
+            name = culprit.name if culprit is not None else self.tree.name
+            raise LeafError(f"leaf '{name}' raised {type(error).__name__}: {error}") from error
+
+    def _settle_and_judge(
+        self, configuration: ActorConfiguration, world: WorldModel, record: Callable[[Step], None] | None
+    ) -> Verdict | None:
+        pipeline = self.pipeline
+        assert pipeline is not None
+        hidden = pipeline.hidden()
+        if hidden is None:
+            return None
+        quiet = 0
+        for _ in range(round(SETTLE * configuration.control_frequency)):
+            quiet = quiet + 1 if at_rest(hidden) else 0
+            if quiet >= 4:
+                break
+            try:
+                self.context.advance(pipeline.step(Command()))
+            except UnreachableError:
+                break
+            if record is not None:
+                record(Step(self.context.observation, Command(), self.tree.status, pipeline))
+            hidden = pipeline.hidden()
+            assert hidden is not None
+        return judge(configuration, world, hidden)
+
+
+def raising_leaf(error: BaseException, tree: Behaviour) -> Behaviour | None:
+    """The innermost behaviour of a tree in whose methods an exception was raised."""
+    nodes = {id(node) for node in tree.iterate()}
+    found = None
+    trace = error.__traceback__
+    while trace is not None:
+        owner = trace.tb_frame.f_locals.get("self")
+        if isinstance(owner, Behaviour) and id(owner) in nodes:
+            found = owner
+        trace = trace.tb_next
+    return found
+
+
+def end_all(tree: Behaviour, culprit: Behaviour | None) -> None:
+    """End every running node and the one that raised; py_trees' own `stop` misses some of them."""
+    for node in tree.iterate():
+        if node.status == Status.RUNNING or node is culprit:
+            if not node.children:
+                node.stop(Status.INVALID)
+            else:
+                node.terminate(Status.INVALID)
+                node.status = Status.INVALID
+                node.iterator = node.tick()
+
+
+def failed_leaf(tree: Behaviour) -> Behaviour | None:
+    """The leaf that made the tree fail: the last one in order of the tree that says FAILURE."""
+    found = None
+    for node in tree.iterate():
+        if not node.children and node.status == Status.FAILURE and node.feedback_message:
+            found = node
+            break
+    return found or tree.tip()
+
+
+def run(
+    tree: Behaviour,
+    scene: Scene,
+    seed: int = 0,
+    *,
+    video: str | None = None,
+    options: EngineOptions | None = None,
+    **engines: Any,
+) -> Result:
+    """Run a tree once in a scene.
+
+    Args:
+        tree: The tree's root.
+        scene: The scene.
+        seed: Seed of the draw.
+        video: Path of a video to write.
+        options: Which engines; or name them by keyword, such as ``noise="none"``, ``perception="camera"``.
+        **engines: See `EngineOptions`.
+
+    Returns:
+        What became of it; ``result.status`` and ``result.why`` say it in short.
+    """
+    if options is None:
+        options = EngineOptions(**({"rendering": video is not None} | engines))
+    runner = Runner(tree, scene, options)
+    if video is None:
+        return runner.run(seed)
+    from bt_tasksim.report.video import VideoRecorder
+
+    with VideoRecorder(video) as recorder:
+        return runner.run(seed, record=recorder)
+
+
+def held_command(observation: Observation) -> Command:
+    """The command that holds the robot where it is."""
+    return Command(tool=observation.tool_pose, hand=np.asarray(observation.closure)[..., None])

@@ -1,0 +1,198 @@
+"""Bring: carry a held object through free space to a place, clear of everything on the way."""
+
+from __future__ import annotations
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from bt_tasksim import poses
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.context import Known, Seen
+from bt_tasksim.errors import InputError
+from bt_tasksim.motion import plan, sample
+from bt_tasksim.parameters import Metres, MetresPerSecond, ObjectName, PlaceName, Points, Position
+from bt_tasksim.planning import Carried, clear_path
+from bt_tasksim.poses import Array
+from bt_tasksim.world import Command, ObjectModel
+from concept_nodes.grasp import resting_place
+from concept_nodes.holding import HOLDING, holding, tool_distance
+from concept_nodes.pick import MoveMemory, arrived, miss
+
+
+class Bring(ConceptModel):
+    """Carry a held object to a place or a position (keeps free space: NC).
+
+    The object ends ``hover`` above the place (above the rim of a bin), over the place's origin and with its
+    heading, up to the object's symmetry. The way goes through ``via`` where it is given; else a straight
+    line where that is clear of the fixtures, else a planned path.
+
+    Args:
+        target: The held object.
+        to: The place, or another object to bring it above.
+        position: Where the object's centre ends, robot base frame; instead of ``to``.
+        via: Positions of the object's centre on the way, relative to the destination, base-frame axes.
+        hover: Free height that remains under the object.
+        speed: Peak speed of the tool.
+    """
+
+    target: ObjectName
+    to: PlaceName | None = None
+    position: Position | None = None
+    via: Points = ()
+    hover: Metres = 0.06
+    speed: MetresPerSecond = 0.5
+
+    maintains = (HOLDING,)
+    default_timeout = 15.0
+    default_tolerance = 0.01
+
+    def initial_state(self, seen: Seen) -> str:
+        """The object must be in the hand."""
+        if (self.to is None) == (self.position is None):
+            raise InputError(f"leaf '{self.name}': give either 'to' or 'position'")
+        if not bool(holding(seen, self.target)):
+            return f"{self.target} is not held ({1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool)"
+        return ""
+
+    def begin(self, seen: Seen) -> MoveMemory:
+        """Find the way."""
+        now, model = seen.object(self.target), seen.model(self.target)
+        goal, origin = self._goal(seen, now, model)
+        grip = poses.multiply(poses.inverse(now), seen.tool)
+        tool_goal = poses.multiply(goal, grip)
+        if self.via:
+            fractions = np.linspace(0.0, 1.0, len(self.via) + 2)[1:-1]
+            middle = [
+                poses.multiply(poses.pose(origin + np.asarray(v), poses.interpolate(now, goal, f)[3:]), grip)
+                for v, f in zip(self.via, fractions, strict=True)
+            ]
+            way = [seen.tool, *middle, tool_goal]
+        else:
+            carried = Carried(seen.robot.envelope, model.extent, poses.inverse(grip))
+            way = clear_path(
+                seen.tool, tool_goal, carried, seen.world.obstacles, self._exits(seen, tool_goal)
+            )
+        return MoveMemory(plan(way, self.speed, blend=0.04))
+
+    def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
+        """Follow the path; the hand keeps its grip."""
+        return Command(tool=sample(memory.path, seen.elapsed))
+
+    def done(self, seen: Seen, memory: MoveMemory) -> Array:
+        """The tool has come to the end of the path."""
+        return arrived(seen, memory.path, self.tolerance)
+
+    def maintained(self, goal: str, seen: Seen, memory: MoveMemory) -> Array:
+        """The object is still in the hand."""
+        return holding(seen, self.target)
+
+    def necessary_cost(self, seen: Seen, memory: MoveMemory) -> Array:
+        """Distance of the tool from the end of the path, metres."""
+        return miss(seen, memory.path)
+
+    def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
+        """1 unless the object hangs in the hand, clear of everything else."""
+        free = ~known.supported(self.target) & (known.hand_force(self.target) > 0.2)
+        xp = array_namespace(known.hidden.objects)
+        return xp.where(xp.asarray(free), 0.0, 1.0)
+
+    def explain(self, seen: Seen, memory: MoveMemory) -> str:
+        """How far the tool still is from its goal, and the object from the tool."""
+        return (
+            f"tool {1000 * float(miss(seen, memory.path)):.0f} mm from its goal, "
+            f"{self.target} {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool"
+        )
+
+    def _goal(self, seen: Seen, now: Array, model: ObjectModel) -> tuple[Array, Array]:
+        """Pose of the object at the end, and the destination's origin that ``via`` refers to."""
+        if self.position is not None:
+            position = np.asarray(self.position, float)
+            return poses.pose(position, now[3:]), position
+        assert self.to is not None
+        frame, rim = destination(seen, self.to)
+        goal = standing_pose(frame, now, model, rim + self.hover)
+        return goal, frame[:3]
+
+    def _exits(self, seen: Seen, tool_goal: Array) -> tuple[Array, Array]:
+        """Displacements that take the tool out of what it starts in, and out of where it ends."""
+        place = resting_place(seen, self.target) or _place_below(seen, self.target)
+        out = np.zeros(3) if place is None else -place.clearance * place.access
+        into = np.zeros(3)
+        if self.to is not None and self.to in seen.world.places:
+            goal = seen.place(self.to)
+            into = -goal.clearance * goal.access
+            if goal.kind == "bin":
+                into = np.zeros(3)
+        return out, into
+
+
+def destination(seen: Seen, name: str) -> tuple[Array, float]:
+    """Frame ``(7,)`` of a place, or of the top of an object, and the height in metres of its rim."""
+    if name in seen.world.places:
+        place = seen.place(name)
+        return place.pose, (place.height if place.kind == "bin" else 0.0)
+    below, model = seen.object(name), seen.model(name)
+    top = below.copy()
+    top[2] += model.extent[2] / 2
+    return top, 0.0
+
+
+def standing_pose(frame: Array, now: Array, model: ObjectModel, height: float) -> Array:
+    """Pose of an object that stands upright ``height`` above a frame, turned as little as its symmetry allows.
+
+    Args:
+        frame: Pose ``(7,)`` of the place.
+        now: Present pose ``(7,)`` of the object.
+        model: The object.
+        height: Free height below it, metres.
+    """
+    position = poses.transform(frame, np.array([0.0, 0.0, height + _half_height(now, model)]))
+    turns: list[Array] = []
+    if model.cubic:
+        turns = [poses.quat_multiply(frame[3:], q) for q in _CUBE]
+    elif model.symmetry == 0:
+        up = poses.rotate(now[3:], np.array([0.0, 0.0, 1.0]))
+        axis = poses.cross(up, poses.rotate(frame[3:], np.array([0.0, 0.0, 1.0])))
+        angle = float(np.arctan2(np.linalg.norm(axis), up @ poses.rotate(frame[3:], np.array([0.0, 0.0, 1.0]))))
+        length = float(np.linalg.norm(axis))
+        tilt = axis / length * angle if length > 1e-9 else np.zeros(3)
+        turns = [poses.quat_multiply(poses.from_rotation_vector(tilt), now[3:])]
+    else:
+        turns = [
+            poses.quat_multiply(frame[3:], poses.yaw(2 * np.pi * k / model.symmetry))
+            for k in range(model.symmetry)
+        ]
+    best = min(turns, key=lambda q: round(float(poses.angle_between(now[3:], q)), 9))
+    return poses.pose(position, best)
+
+
+def _half_height(now: Array, model: ObjectModel) -> float:
+    if not model.cubic:
+        return model.extent[2] / 2
+    return max(model.extent) / 2
+
+
+def _place_below(seen: Seen, target: str) -> object:
+    """The place of a fixture above which a lifted object is, where that fixture would be in its way out."""
+    pose = seen.object(target)
+    best = None
+    for place in seen.world.places.values():
+        local = poses.transform(poses.inverse(place.pose), pose[:3])
+        inside = all(abs(float(local[i]) - place.centre[i]) <= place.extent[i] / 2 for i in range(2))
+        if inside and 0.0 < float(local[2]) < min(place.height, 0.4) and (best is None or local[2] < best[0]):
+            best = (float(local[2]), place)
+    return best[1] if best else None
+
+
+def _cube_rotations() -> list[Array]:
+    quarter = [poses.yaw(k * np.pi / 2) for k in range(4)]
+    tips = [np.array([1.0, 0.0, 0.0, 0.0])]
+    for axis in (0, 1):
+        for angle in (np.pi / 2, np.pi, -np.pi / 2) if axis == 0 else (np.pi / 2, -np.pi / 2):
+            v = np.zeros(3)
+            v[axis] = angle
+            tips.append(poses.from_rotation_vector(v))
+    return [poses.quat_multiply(q, t) for t in tips for q in quarter]
+
+
+_CUBE = _cube_rotations()

@@ -1,0 +1,230 @@
+"""Grasp: come to an object, close the hand on it, and notice when it is held."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from bt_tasksim import poses
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.context import Known, Seen
+from bt_tasksim.motion import Path, plan, sample
+from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, ObjectName, Ratio
+from bt_tasksim.poses import Array
+from bt_tasksim.world import Command, ObjectModel, PlaceModel
+from concept_nodes.holding import HOLDING, tool_distance
+
+SETTLED = 3
+"""Ticks for which opposing contacts and a still hand must be seen."""
+DOWN = (0.0, 0.0, -1.0)
+
+
+class GraspMemory(NamedTuple):
+    """What a grasp remembers; batch dimensions ``(...)``.
+
+    Attributes:
+        path: Tool path to the grasp pose.
+        closing: Seconds since the hand began to close; negative before.
+        closure: Closure at the previous tick.
+        settled: Ticks in a row with opposing contacts and a still hand.
+        preshape: Closure at which the hand comes.
+    """
+
+    path: Path
+    closing: Array
+    closure: Array
+    settled: Array
+    preshape: Array
+
+
+class Grasp(ConceptModel):
+    """Grasp an object (makes the hand's contacts; the object's own contact with its support is kept).
+
+    The tool comes to a pose above the object (against ``approach``), straight on to the grasp pose, and the
+    hand closes along ``closing``. Done when opposing fingertips have contact and the hand has come to rest.
+
+    Args:
+        target: The object.
+        approach: Direction in which the tool comes, robot base frame; by default that of the place where
+            the object stands.
+        closing: Direction in which the fingers close, in the object's frame; by default the best of its
+            known grasp axes that fits the hand.
+        standoff: How far before the grasp pose the straight approach begins.
+        speed: Peak speed of the tool.
+        grip: Closure that is commanded when closing; 1 presses as hard as the hand's drives may.
+    """
+
+    target: ObjectName
+    approach: Direction | None = None
+    closing: Direction | None = None
+    standoff: Metres = 0.10
+    speed: MetresPerSecond = 0.5
+    grip: Ratio = 1.0
+
+    reaches = (HOLDING,)
+    default_timeout = 12.0
+    observables = ("hand_position", "contacts", "tool_pose", "objects", "time")
+
+    def initial_state(self, seen: Seen) -> str:
+        """The object must be known and fit into the hand."""
+        model = seen.model(self.target)
+        if self.closing is None and min(model.grasp_widths) > seen.world.opening:
+            return (
+                f"{self.target} is {1000 * min(model.grasp_widths):.0f} mm wide, "
+                f"the hand opens {1000 * seen.world.opening:.0f} mm"
+            )
+        return ""
+
+    def begin(self, seen: Seen) -> GraspMemory:
+        """Choose the grasp pose and plan the way to it."""
+        goal = grasp_pose(seen, self.target, self.approach, self.closing)
+        back = goal.copy()
+        back[:3] -= self.standoff * poses.rotate(goal[3:], np.array([0.0, 0.0, 1.0]))
+        path = plan([*_way_out(seen, back), back, goal], self.speed, blend=0.03)
+        return GraspMemory(path, np.float64(-1.0), seen.closure, np.int64(0), np.float64(0.0))
+
+    def command(self, action: Array, seen: Seen, memory: GraspMemory) -> Command:
+        """Follow the path with the hand open, then close."""
+        xp = array_namespace(memory.closing)
+        closing = xp.where(memory.closing >= 0.0, self.grip, memory.preshape)
+        return Command(tool=sample(memory.path, seen.elapsed), hand=xp.asarray(closing)[..., None])
+
+    def advance(self, seen: Seen, memory: GraspMemory) -> GraspMemory:
+        """Begin to close when the tool has arrived; count the ticks at which the hand holds still."""
+        xp = array_namespace(seen.tool)
+        arrived = (seen.elapsed >= memory.path.duration) & (self._miss(seen, memory) < self.tolerance)
+        late = seen.elapsed >= memory.path.duration + 1.0
+        begun = memory.closing >= 0.0
+        closing = xp.where(
+            begun, memory.closing + seen.world.control_period, xp.where(arrived | late, 0.0, memory.closing)
+        )
+        still = xp.abs(seen.closure - memory.closure) < 0.01
+        good = seen.opposed() & still & begun
+        return memory._replace(
+            closing=closing, closure=seen.closure, settled=xp.where(good, memory.settled + 1, 0)
+        )
+
+    def done(self, seen: Seen, memory: GraspMemory) -> Array:
+        """Opposing contacts and a still hand, some ticks long."""
+        return memory.settled >= SETTLED
+
+    def violated(self, seen: Seen, memory: GraspMemory) -> Array:
+        """The hand has closed on nothing."""
+        return (memory.closing > 0.8) & (seen.closure > 0.97 * self.grip)
+
+    def necessary_cost(self, seen: Seen, memory: GraspMemory) -> Array:
+        """Mean distance of the fingertips to where they would touch the object, metres."""
+        gap = seen.observation.tips - seen.observation.contact_points
+        xp = array_namespace(gap)
+        return xp.mean(xp.sqrt(xp.sum(gap * gap, axis=-1)), axis=-1)
+
+    def sufficient_cost(self, known: Known, memory: GraspMemory) -> Array:
+        """1 unless the hand presses on the object."""
+        force = known.hand_force(self.target)
+        xp = array_namespace(force)
+        return xp.where(force > 0.5, 0.0, 1.0)
+
+    def explain(self, seen: Seen, memory: GraspMemory) -> str:
+        """Contacts, opening and how far the tool is from the object."""
+        touching = [t for t, c in zip(seen.world.tips, seen.contacts, strict=True) if c]
+        return (
+            f"hand {100 * float(seen.closure):.0f} % closed, "
+            f"{'contact at ' + ', '.join(touching) if touching else 'no contact'}, "
+            f"tool {1000 * float(tool_distance(seen, self.target)):.0f} mm from {self.target}"
+        )
+
+    def _miss(self, seen: Seen, memory: GraspMemory) -> Array:
+        gap = seen.tool[..., :3] - memory.path.table[..., -1, :3]
+        xp = array_namespace(gap)
+        return xp.sqrt(xp.sum(gap * gap, axis=-1))
+
+
+def resting_place(seen: Seen, target: str) -> PlaceModel | None:
+    """The place on which an object seems to stand, or None where it is on none."""
+    pose = seen.object(target)
+    half = seen.model(target).extent[2] / 2
+    best: tuple[float, PlaceModel] | None = None
+    for place in seen.world.places.values():
+        local = poses.transform(poses.inverse(place.pose), pose[:3])
+        inside = all(
+            abs(float(local[i]) - place.centre[i]) <= place.extent[i] / 2 + 0.02 for i in range(2)
+        )
+        gap = abs(float(local[2]) - half)
+        if inside and gap < 0.05 and (best is None or gap < best[0] - 1e-6):
+            best = (gap, place)
+    return best[1] if best else None
+
+
+def grasp_pose(
+    seen: Seen, target: str, approach: Array | None = None, closing: Array | None = None
+) -> Array:
+    """The tool pose ``(7,)`` for a grasp of an object at its estimated pose.
+
+    Of the object's grasp axes those count that lie across the approach and fit into the hand; of the tool
+    orientations that they leave, the one that turns the tool least is taken.
+    """
+    pose, model = seen.object(target), seen.model(target)
+    if approach is None:
+        place = resting_place(seen, target)
+        approach = DOWN if place is None else place.access
+    a = np.asarray(approach, float)
+    best: tuple[float, Array] | None = None
+    for rank, c in enumerate(_closing_axes(seen, pose, model, a, closing)):
+        for sign in (1.0, -1.0):
+            rotation = poses.frame_from_axes(a, sign * c)
+            cost = float(poses.angle_between(seen.tool[3:], rotation)) + 0.3 * rank
+            if best is None or cost < best[0] - 1e-9:
+                best = (cost, rotation)
+    assert best is not None
+    rotation = best[1]
+    reach = _half_extent(pose, model, a)
+    position = pose[:3] - max(0.0, reach - seen.robot.depth) * a
+    return poses.pose(position, rotation)
+
+
+def _closing_axes(
+    seen: Seen, pose: Array, model: ObjectModel, approach: Array, closing: Array | None
+) -> list[Array]:
+    upright = poses.rotate(pose[3:], np.array([0.0, 0.0, 1.0]))
+    if closing is not None:
+        return [poses.rotate(pose[3:], np.asarray(closing, float))]
+    if model.symmetry == 0 and abs(float(upright @ approach)) > 0.7:  # any direction across the axis
+        tool_y = poses.rotate(seen.tool[3:], np.array([0.0, 1.0, 0.0]))
+        across = tool_y - (tool_y @ approach) * approach
+        if float(np.linalg.norm(across)) > 0.3:
+            return [across / np.linalg.norm(across)]
+    if model.symmetry == 0:  # from the side: across the object's axis and the approach
+        across = poses.cross(upright, approach)
+        return [across / np.linalg.norm(across)]
+    axes = []
+    for axis, width in zip(model.grasp_axes, model.grasp_widths, strict=True):
+        c = poses.rotate(pose[3:], np.asarray(axis))
+        if abs(float(c @ approach)) < 0.5 and width < seen.world.opening - 0.006:
+            axes.append(c)
+    if axes:
+        return axes
+    fallback = poses.cross(approach, upright if abs(float(upright @ approach)) < 0.9 else pose[:3])
+    return [fallback / np.linalg.norm(fallback)]
+
+
+def _half_extent(pose: Array, model: ObjectModel, direction: Array) -> float:
+    """Half the size of an object's bounding box along a direction, metres."""
+    local = poses.rotate(pose[3:] * np.array([1.0, -1.0, -1.0, -1.0]), direction)
+    if model.symmetry == 0:
+        radial, axial = float(np.hypot(local[0], local[1])), abs(float(local[2]))
+        return (radial * model.extent[0] + axial * model.extent[2]) / 2
+    return float(np.abs(local) @ np.asarray(model.extent)) / 2
+
+
+def _way_out(seen: Seen, goal: Array) -> list[Array]:
+    """Waypoints from the present tool pose that keep the hand above what stands around."""
+    start = seen.tool.copy()
+    level = max(float(start[2]), float(goal[2]))
+    far = float(np.linalg.norm(start[:2] - goal[:2])) > 0.05
+    if float(start[2]) < level - 0.02 and far and level < 0.35:
+        up = start.copy()
+        up[2] = level
+        return [start, up]
+    return [start]

@@ -1,0 +1,36 @@
+"""When an object counts as held, judged from what a robot can observe."""
+
+from __future__ import annotations
+
+from array_api_compat import array_namespace
+
+from bt_tasksim.context import Seen
+from bt_tasksim.poses import Array
+
+HOLDING = "holding"
+"""Name of the goal that `Grasp` reaches, `Pick`, `Bring` and `Place` maintain, and `Release` ends."""
+
+
+def tool_distance(seen: Seen, target: str) -> Array:
+    """Distance ``(...)`` in metres between the tool origin and the nearest point of the object's box.
+
+    The box is the object's nominal bounding box at its estimated pose.
+    """
+    from bt_tasksim.poses import inverse, transform
+
+    local = transform(inverse(seen.object(target)), seen.tool[..., :3])
+    xp = array_namespace(local)
+    half = xp.asarray([v / 2 for v in seen.model(target).extent], dtype=local.dtype)
+    outside = xp.maximum(xp.abs(local) - half, xp.zeros_like(local))
+    return xp.sqrt(xp.sum(outside * outside, axis=-1))
+
+
+def holding(seen: Seen, target: str, reach: float = 0.03) -> Array:
+    """Boolean ``(...)``: opposing fingertips touch something, and the object is where the tool is.
+
+    Args:
+        seen: What is seen.
+        target: The object.
+        reach: Metres by which the estimate may lie outside the grasp.
+    """
+    return seen.opposed() & (tool_distance(seen, target) < reach)

@@ -1,0 +1,94 @@
+"""Pick: take a held object off its support."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.context import Known, Seen
+from bt_tasksim.motion import Path, plan, sample
+from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, ObjectName
+from bt_tasksim.poses import Array
+from bt_tasksim.world import Command
+from concept_nodes.holding import HOLDING, holding, tool_distance
+
+
+class MoveMemory(NamedTuple):
+    """A path that the tool follows."""
+
+    path: Path
+
+
+class Pick(ConceptModel):
+    """Take a held object off what it rests on (breaks its contact: PC to NC).
+
+    Args:
+        target: The held object.
+        direction: Direction away from the support, robot base frame.
+        distance: How far.
+        speed: Peak speed of the tool.
+    """
+
+    target: ObjectName
+    direction: Direction = (0.0, 0.0, 1.0)
+    distance: Metres = 0.10
+    speed: MetresPerSecond = 0.3
+
+    maintains = (HOLDING,)
+    default_timeout = 8.0
+
+    def initial_state(self, seen: Seen) -> str:
+        """The object must be in the hand."""
+        if not bool(holding(seen, self.target)):
+            return f"{self.target} is not held ({1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool)"
+        return ""
+
+    def begin(self, seen: Seen) -> MoveMemory:
+        """A straight path."""
+        goal = seen.tool.copy()
+        goal[:3] += self.distance * np.asarray(self.direction)
+        return MoveMemory(plan([seen.tool, goal], self.speed))
+
+    def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
+        """Follow the path; the hand keeps its grip."""
+        return Command(tool=sample(memory.path, seen.elapsed))
+
+    def done(self, seen: Seen, memory: MoveMemory) -> Array:
+        """The tool has come to the end of the path."""
+        return arrived(seen, memory.path, self.tolerance)
+
+    def maintained(self, goal: str, seen: Seen, memory: MoveMemory) -> Array:
+        """The object is still in the hand."""
+        return holding(seen, self.target)
+
+    def necessary_cost(self, seen: Seen, memory: MoveMemory) -> Array:
+        """Distance of the tool from the end of the path, metres."""
+        return miss(seen, memory.path)
+
+    def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
+        """1 unless the object hangs in the hand, clear of everything else."""
+        free = ~known.supported(self.target) & (known.hand_force(self.target) > 0.2)
+        xp = array_namespace(known.hidden.objects)
+        return xp.where(xp.asarray(free), 0.0, 1.0)
+
+    def explain(self, seen: Seen, memory: MoveMemory) -> str:
+        """How far the tool still is from its goal, and the object from the tool."""
+        return (
+            f"tool {1000 * float(miss(seen, memory.path)):.0f} mm from its goal, "
+            f"{self.target} {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool"
+        )
+
+
+def miss(seen: Seen, path: Path) -> Array:
+    """Distance ``(...)`` in metres of the tool from the end of a path."""
+    gap = seen.tool[..., :3] - path.table[..., -1, :3]
+    xp = array_namespace(gap)
+    return xp.sqrt(xp.sum(gap * gap, axis=-1))
+
+
+def arrived(seen: Seen, path: Path, tolerance: float) -> Array:
+    """Boolean ``(...)``: the path's time is over and the tool is within ``tolerance`` metres of its end."""
+    return (seen.elapsed >= path.duration) & (miss(seen, path) < tolerance)

@@ -1,0 +1,129 @@
+"""Place: put a held object down until it is felt to stand."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from bt_tasksim import poses
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.context import Known, Seen
+from bt_tasksim.motion import Path, plan, sample
+from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
+from bt_tasksim.poses import Array
+from bt_tasksim.world import Command
+from concept_nodes.bring import destination, standing_pose
+from concept_nodes.holding import HOLDING, holding, tool_distance
+
+FELT = 2
+"""Ticks in a row for which the support must be felt."""
+
+
+class PlaceMemory(NamedTuple):
+    """What a place remembers; batch dimensions ``(...)``.
+
+    Attributes:
+        path: Tool path to the deepest pose that is tried.
+        baseline: Force ``(...)`` against the direction of placing when it began, N.
+        felt: Ticks in a row with the support's force.
+    """
+
+    path: Path
+    baseline: Array
+    felt: Array
+
+
+class Place(ConceptModel):
+    """Put a held object down on a place or on another object (makes contact: NC to PC).
+
+    The object goes over the place's origin and down along ``direction``, slowly, and stops when the wrist
+    feels the support, or ``overshoot`` below where the support should be.
+
+    Args:
+        target: The held object.
+        on: The place, or the object to put it on.
+        direction: Direction in which it is put down, robot base frame.
+        distance: How far it is put down at most; by default to where the support should be.
+        overshoot: How much deeper is tried.
+        press: Force that counts as support.
+        speed: Peak speed of the tool.
+    """
+
+    target: ObjectName
+    on: PlaceName
+    direction: Direction = (0.0, 0.0, -1.0)
+    distance: Metres | None = None
+    overshoot: Metres = 0.006
+    press: Newtons = 3.0
+    speed: MetresPerSecond = 0.12
+
+    maintains = (HOLDING,)
+    default_timeout = 10.0
+
+    def initial_state(self, seen: Seen) -> str:
+        """The object must be in the hand."""
+        if not bool(holding(seen, self.target)):
+            return f"{self.target} is not held ({1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool)"
+        return ""
+
+    def begin(self, seen: Seen) -> PlaceMemory:
+        """A straight path down to the place's origin."""
+        now, model = seen.object(self.target), seen.model(self.target)
+        frame, _ = destination(seen, self.on)
+        goal = standing_pose(frame, now, model, 0.0)
+        d = np.asarray(self.direction)
+        goal[:3] += self.overshoot * d
+        if self.distance is not None:
+            along = float((goal[:3] - now[:3]) @ d)
+            goal[:3] += min(0.0, self.distance + self.overshoot - along) * d
+        tool_goal = poses.multiply(goal, poses.multiply(poses.inverse(now), seen.tool))
+        return PlaceMemory(plan([seen.tool, tool_goal], self.speed), self._force(seen), np.int64(0))
+
+    def command(self, action: Array, seen: Seen, memory: PlaceMemory) -> Command:
+        """Follow the path; the hand keeps its grip."""
+        return Command(tool=sample(memory.path, seen.elapsed))
+
+    def advance(self, seen: Seen, memory: PlaceMemory) -> PlaceMemory:
+        """Count the ticks at which the support is felt."""
+        xp = array_namespace(seen.tool)
+        return memory._replace(felt=xp.where(self._supported(seen, memory), memory.felt + 1, 0))
+
+    def done(self, seen: Seen, memory: PlaceMemory) -> Array:
+        """The support is felt, or the object is where it should stand."""
+        return (memory.felt >= FELT) | (seen.elapsed >= memory.path.duration + 0.2)
+
+    def maintained(self, goal: str, seen: Seen, memory: PlaceMemory) -> Array:
+        """The object is still in the hand."""
+        return holding(seen, self.target)
+
+    def necessary_cost(self, seen: Seen, memory: PlaceMemory) -> Array:
+        """Distance of the object from where it should stand, metres."""
+        frame, _ = destination(seen, self.on)
+        now = seen.object(self.target)
+        gap = now[..., :3] - standing_pose(frame, now, seen.model(self.target), 0.0)[..., :3]
+        xp = array_namespace(gap)
+        return xp.sqrt(xp.sum(gap * gap, axis=-1))
+
+    def sufficient_cost(self, known: Known, memory: PlaceMemory) -> Array:
+        """1 unless the object touches its support."""
+        xp = array_namespace(known.hidden.objects)
+        return xp.where(xp.asarray(known.supported(self.target)), 0.0, 1.0)
+
+    def explain(self, seen: Seen, memory: PlaceMemory) -> str:
+        """What is felt, and how far the object is from where it should stand."""
+        return (
+            f"{float(self._force(seen) - memory.baseline):.1f} N felt, "
+            f"{self.target} {1000 * float(self.necessary_cost(seen, memory)):.0f} mm from its spot"
+        )
+
+    def _force(self, seen: Seen) -> Array:
+        """Force ``(...)`` in N against the direction of placing."""
+        d = -np.asarray(self.direction)
+        f = poses.rotate(seen.tool[..., 3:], seen.wrench[..., :3])
+        xp = array_namespace(f)
+        return xp.sum(f * xp.asarray(d), axis=-1)
+
+    def _supported(self, seen: Seen, memory: PlaceMemory) -> Array:
+        return (self._force(seen) - memory.baseline > self.press) & (seen.elapsed > 0.25)

@@ -1,0 +1,102 @@
+"""Release: open the hand and draw it back."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from bt_tasksim import poses
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.context import Known, Seen
+from bt_tasksim.motion import Path, plan, sample
+from bt_tasksim.parameters import Metres, MetresPerSecond, ObjectName, PlaceName, Seconds
+from bt_tasksim.poses import Array
+from bt_tasksim.world import Command
+from concept_nodes.holding import HOLDING
+
+
+class ReleaseMemory(NamedTuple):
+    """What a release remembers; batch dimensions ``(...)``.
+
+    Attributes:
+        path: Tool path away from the object.
+        start: Closure at the begin.
+        opened: Seconds since the hand was seen open; negative before.
+    """
+
+    path: Path
+    start: Array
+    opened: Array
+
+
+class Release(ConceptModel):
+    """Let an object go (breaks the hand's contacts): the hand opens, then the tool draws back.
+
+    Args:
+        target: The held object.
+        into: Where it falls, when it is let go above a container; for the record.
+        retreat: How far the tool draws back, against its approach.
+        opening: Time in which the hand opens.
+        speed: Peak speed of the tool.
+    """
+
+    target: ObjectName
+    into: PlaceName | None = None
+    retreat: Metres = 0.12
+    opening: Seconds = 0.4
+    speed: MetresPerSecond = 0.3
+
+    ends = (HOLDING,)
+    default_timeout = 8.0
+    default_tolerance = 0.01
+
+    def begin(self, seen: Seen) -> ReleaseMemory:
+        """A straight path back."""
+        back = seen.tool.copy()
+        back[:3] -= self.retreat * poses.rotate(back[3:], np.array([0.0, 0.0, 1.0]))
+        return ReleaseMemory(plan([seen.tool, back], self.speed), seen.closure, np.float64(-1.0))
+
+    def command(self, action: Array, seen: Seen, memory: ReleaseMemory) -> Command:
+        """Open, then draw back."""
+        xp = array_namespace(seen.tool)
+        share = xp.clip(1.0 - seen.elapsed / self.opening, 0.0, 1.0)
+        since = xp.maximum(memory.opened, xp.asarray(0.0))
+        return Command(
+            tool=sample(memory.path, since),
+            hand=xp.asarray(memory.start * share)[..., None],
+        )
+
+    def advance(self, seen: Seen, memory: ReleaseMemory) -> ReleaseMemory:
+        """Notice when the hand is open."""
+        xp = array_namespace(seen.tool)
+        period = seen.world.control_period
+        open_now = (seen.elapsed > self.opening) & (seen.closure < 0.15)
+        opened = xp.where(
+            memory.opened >= 0.0, memory.opened + period, xp.where(open_now, 0.0, memory.opened)
+        )
+        return memory._replace(opened=opened)
+
+    def done(self, seen: Seen, memory: ReleaseMemory) -> Array:
+        """The hand is open, touches nothing, and has drawn back."""
+        gap = seen.tool[..., :3] - memory.path.table[..., -1, :3]
+        xp = array_namespace(gap)
+        close = xp.sqrt(xp.sum(gap * gap, axis=-1)) < self.tolerance
+        free = ~xp.any(xp.asarray(seen.contacts), axis=-1)
+        return (memory.opened >= memory.path.duration) & close & free
+
+    def necessary_cost(self, seen: Seen, memory: ReleaseMemory) -> Array:
+        """Share of the fingertips that still touch something."""
+        xp = array_namespace(seen.tool)
+        return xp.mean(xp.astype(xp.asarray(seen.contacts), seen.tool.dtype), axis=-1)
+
+    def sufficient_cost(self, known: Known, memory: ReleaseMemory) -> Array:
+        """1 while the hand still presses on the object."""
+        xp = array_namespace(known.hidden.objects)
+        return xp.where(known.hand_force(self.target) > 0.05, 1.0, 0.0)
+
+    def explain(self, seen: Seen, memory: ReleaseMemory) -> str:
+        """How far the hand is open and what it touches."""
+        n = int(np.count_nonzero(seen.contacts))
+        return f"hand {100 * (1 - float(seen.closure)):.0f} % open, {n} fingertips in contact"
