@@ -24,6 +24,9 @@ if TYPE_CHECKING:
         subtree,
         timeout,
     )
+    from trees.equality import same_tree
+    from trees.xml_reader import load_tree, tree_from_xml
+    from trees.xml_writer import node_models, save_tree, tree_to_xml
 
 _HOMES = {
     "trees.authoring": (
@@ -41,6 +44,9 @@ _HOMES = {
         "subtree",
         "check_tree",
     ),
+    "trees.xml_reader": ("load_tree", "tree_from_xml"),
+    "trees.xml_writer": ("save_tree", "tree_to_xml", "node_models"),
+    "trees.equality": ("same_tree",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -58,6 +64,12 @@ __all__ = [
     "force_failure",
     "subtree",
     "check_tree",
+    "load_tree",
+    "tree_from_xml",
+    "save_tree",
+    "tree_to_xml",
+    "node_models",
+    "same_tree",
 ]
 
 

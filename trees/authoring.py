@@ -149,10 +149,14 @@ def check_tree(root: Behaviour) -> None:
     Raises:
         InputError: The tree is refused; the sentence names the nodes.
     """
-    _check_shape(root)
-    acting = _acting(root)
-    for node in root.iterate():
-        _check_memory(node, acting)
+    problem = find_problem(root)
+    if problem is not None:
+        raise InputError(problem[1])
+
+
+def find_problem(root: Behaviour) -> tuple[Behaviour, str] | None:
+    """The first node that `check_tree` would refuse, with the sentence that says why; None if all is well."""
+    return _problem_of_shape(root) or _problem_of_memory(root)
 
 
 def _free(owner: str, children: tuple[Behaviour, ...]) -> list[Behaviour]:
@@ -171,29 +175,28 @@ def _free(owner: str, children: tuple[Behaviour, ...]) -> list[Behaviour]:
     return list(children)
 
 
-def _check_shape(root: Behaviour) -> None:
+def _problem_of_shape(root: Behaviour) -> tuple[Behaviour, str] | None:
     seen: set[int] = set()
-    path: dict[int, Behaviour] = {}
+    path: set[int] = set()
     stack: list[tuple[Behaviour, bool]] = [(root, True)]
     while stack:
         node, entering = stack.pop()
         if not entering:
-            del path[id(node)]
+            path.remove(id(node))
             continue
         if id(node) in path:
-            raise InputError(f"node '{node.name}' stands among its own descendants")
+            return node, f"node '{node.name}' stands among its own descendants"
         if id(node) in seen:
-            raise InputError(
-                f"node '{node.name}' stands in two places of the tree; make a second one instead"
-            )
+            return node, f"node '{node.name}' stands in two places of the tree; make a second one instead"
         if len(path) >= DEEPEST:
-            raise InputError(f"the tree has more than {DEEPEST} levels, at node '{node.name}'")
+            return node, f"the tree has more than {DEEPEST} levels, at node '{node.name}'"
         if isinstance(node, Composite) and not node.children:
-            raise InputError(f"{_kind(node)} '{node.name}' has no children")
+            return node, f"{_kind(node)} '{node.name}' has no children"
         seen.add(id(node))
-        path[id(node)] = node
+        path.add(id(node))
         stack.append((node, False))
         stack.extend((child, True) for child in reversed(node.children))
+    return None
 
 
 def _acting(root: Behaviour) -> dict[int, ConceptNode]:
@@ -210,14 +213,17 @@ def _acting(root: Behaviour) -> dict[int, ConceptNode]:
     return acting
 
 
-def _check_memory(node: Behaviour, acting: dict[int, ConceptNode]) -> None:
-    for child in _ticked_again(node):
-        concept = acting.get(id(child))
-        if concept is not None:
-            raise InputError(
-                f"{_kind(node)} '{node.name}' has no memory and would start '{concept.name}' anew at every "
-                f"tick after it has finished: use a node with memory, or put '{child.name}' last"
-            )
+def _problem_of_memory(root: Behaviour) -> tuple[Behaviour, str] | None:
+    acting = _acting(root)
+    for node in root.iterate():
+        for child in _ticked_again(node):
+            concept = acting.get(id(child))
+            if concept is not None:
+                return node, (
+                    f"{_kind(node)} '{node.name}' has no memory and would start '{concept.name}' anew at "
+                    f"every tick after it has finished: use a node with memory, or put '{child.name}' last"
+                )
+    return None
 
 
 def _ticked_again(node: Behaviour) -> Iterator[Behaviour]:
