@@ -1,0 +1,61 @@
+"""Decomposes a demonstration, or a whole log, into tasks and their graph."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import networkx as nx
+import numpy as np
+
+from demos_decomp.graph import build_graph, in_order
+from demos_decomp.log import Demonstration, Log
+from demos_decomp.recognition import recognise
+from demos_decomp.tasks import Decomposition, Task
+
+
+def decompose(demonstration: Demonstration) -> list[Task]:
+    """Tasks of one demonstration, in order of time."""
+    return recognise(demonstration)[0]
+
+
+def decompose_log(log: Log | Sequence[Log], episode: int | str | None = None) -> Decomposition:
+    """Decomposes the demonstrations of one activity and merges them into one graph.
+
+    Args:
+        log: A log, or several whose demonstrations belong to one activity.
+        episode: Number or name of the only demonstration to take; None for all.
+
+    Returns:
+        The decomposition. Where several demonstrations were merged, ``tasks`` are the graph's nodes in an
+        order that agrees with it: their mean start and end (on each demonstration's own clock, from its
+        first sample), mean confidence and merged parameters.
+
+    Raises:
+        InputError: There is no such demonstration.
+    """
+    logs = [log] if isinstance(log, Log) else list(log)
+    demonstrations: dict[str, tuple[Task, ...]] = {}
+    remarks: dict[str, tuple[str, ...]] = {}
+    sources: dict[str, tuple[str, str]] = {}
+    for number, each in enumerate(logs):
+        chosen = each.demonstrations if episode is None else (each.demonstration(episode),)
+        for shown in chosen:
+            name = shown.name if len(logs) == 1 else f"{each.path or number}: {shown.name}"
+            tasks, said = recognise(shown)
+            demonstrations[name], remarks[name] = tuple(tasks), tuple(said)
+            sources[name] = (each.path, shown.name)
+    graph = build_graph(demonstrations, sources)
+    if len(demonstrations) == 1:
+        (tasks_in_time,) = demonstrations.values()
+    else:
+        tasks_in_time = _merged_tasks(graph)
+    return Decomposition(tasks_in_time, graph, demonstrations, remarks)
+
+
+def _merged_tasks(graph: nx.DiGraph[str]) -> tuple[Task, ...]:
+    merged = []
+    for name in in_order(graph):
+        node = graph.nodes[name]
+        start, end = (float(np.mean([piece[key] for piece in node["evidence"]])) for key in ("start", "end"))
+        merged.append(Task(node["concept"], start, end, node["confidence"], node["parameters"]))
+    return tuple(merged)
