@@ -99,7 +99,8 @@ def graph_to_json(graph: nx.DiGraph[str]) -> dict[str, Any]:
         "demonstrations": graph.graph.get("demonstrations", []),
         "nodes": nodes,
         "edges": [
-            {"from": a, "to": b, "demonstrations": n} for a, b, n in graph.edges(data="demonstrations")
+            {"from": a, "to": b, "demonstrations": edge["demonstrations"]}
+            for a, b, edge in graph.edges(data=True)
         ],
         "alternatives": graph.graph.get("alternatives", []),
     }

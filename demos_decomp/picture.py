@@ -147,7 +147,7 @@ def _lanes(graph: nx.DiGraph[str], parts: list[str], y: float, width: float) -> 
 
 
 def _lane_label(name: str) -> str:
-    """A demonstration's name; of one from several logs the file's name, and its own unless it is the first."""
+    """A demonstration's name; where logs were merged the file's name, and its own after the first."""
     path, _, own = name.rpartition(": ")
     label = f"{Path(path).stem} {own}".replace(" 000", "") if path else own
     return label if len(label) <= 13 else f"…{label[-12:]}"
@@ -201,7 +201,11 @@ def _parameter_lines(parameters: Mapping[str, Any], uncertainty: Mapping[str, An
 
 def _number(value: Any, spread: Any, unit: str) -> str:
     """A number or vector with its standard deviation, of a vector the largest component's."""
-    text = f"{value:.3f}" if isinstance(value, float) else f"({', '.join(f'{v:.2f}' for v in value)})"
+    text = (
+        f"{value:.3f}"
+        if isinstance(value, float)
+        else f"({', '.join(f'{round(v, 2) + 0.0:.2f}' for v in value)})"
+    )
     if spread is not None:
         text += f" ± {float(np.max(spread)):.3f}"
     return f"{text} {unit}".rstrip()
@@ -213,9 +217,9 @@ def _arrows(graph: nx.DiGraph[str], boxes: Mapping[str, tuple[float, float, floa
         (xa, ya, height), (xb, yb, _) = boxes[a], boxes[b]
         x1, y1, x2, y2 = xa + CARD / 2, ya + height, xb + CARD / 2, yb - 2
         middle = (y1 + y2) / 2
+        curve = f"M{x1:.1f},{y1:.1f} C{x1:.1f},{middle:.1f} {x2:.1f},{middle:.1f} {x2:.1f},{y2 - 6:.1f}"
         arrows.append(
-            f'<path d="M{x1:.1f},{y1:.1f} C{x1:.1f},{middle:.1f} {x2:.1f},{middle:.1f} {x2:.1f},{y2 - 6:.1f}" '
-            f'fill="none" stroke="{FAINT}" stroke-width="1.5"/>'
+            f'<path d="{curve}" fill="none" stroke="{FAINT}" stroke-width="1.5"/>'
             f'<path d="M{x2:.1f},{y2:.1f} l-5,-9 h10 z" fill="{FAINT}"/>'
         )
     return arrows

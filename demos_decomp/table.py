@@ -69,7 +69,7 @@ def described(concept: str, parameters: Any) -> str:
     if "to" in parameters:
         parts.append(f"to {parameters['to']}")
     if "position" in parameters:
-        parts.append("to ({:.2f}, {:.2f}, {:.2f}) m".format(*np.asarray(parameters["position"])))
+        parts.append("to ({:.2f}, {:.2f}, {:.2f}) m".format(*(np.round(parameters["position"], 2) + 0.0)))
     if "into" in parameters:
         parts.append(f"into {parameters['into']}")
     if "via" in parameters:
