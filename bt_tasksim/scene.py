@@ -257,13 +257,15 @@ class Scene:
             places.add(spot.name)
         for name, spec in specs.items():
             _require_place(f"object '{name}'", spec.on, places)
-        for label, name, known in (
+        for label, wanted, known in (
             ("goal", self.goal.object if self.goal else None, specs),
             ("knock", self.knock, specs),
             ("goal", self.goal.place if self.goal else None, places),
         ):
             if name is not None and name not in known:
-                raise InputError(f"the scene's {label} names '{name}', which is not in it{nearest(name, known)}")
+                raise InputError(
+                    f"the scene's {label} names '{name}', which is not in it{nearest(name, known)}"
+                )
 
     def with_robot(self, robot: str) -> Scene:
         """The same scene with another robot."""
@@ -370,7 +372,9 @@ def _draw_object(
             f"object '{name}' finds no free spot on '{spec.on}' beside the others: "
             f"widen its area, or take fewer or smaller objects"
         )
-    colour = entry.colours[int(rng.integers(len(entry.colours)))]
+    taken = {o.colour for o in others}
+    colours = [c for c in entry.colours if c not in taken] or entry.colours
+    colour = colours[int(rng.integers(len(colours)))]
     return ObjectActor(
         name=name,
         kind=kind,

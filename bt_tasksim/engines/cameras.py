@@ -54,7 +54,9 @@ class CameraSpec:
             reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
             raise InputError(f"{owner}: {reason}") from error
         if not (1 <= width <= 8192 and 1 <= height <= 8192 and 0 < angle < math.pi):
-            raise InputError(f"{owner}: a camera of {width}x{height} pixels and {math.degrees(angle):g} degrees")
+            raise InputError(
+                f"{owner}: a camera of {width}x{height} pixels and {math.degrees(angle):g} degrees"
+            )
         if math.dist((px, py, pz), (tx, ty, tz)) < 1e-6:
             raise InputError(f"{owner}: it looks at the point where it stands")
         return cls((px, py, pz), (tx, ty, tz), (width, height), angle)
@@ -73,8 +75,8 @@ class CameraSpec:
 
 
 CAMERAS: dict[str, CameraSpec] = {
-    "overview": CameraSpec((-0.62, -1.22, 1.02), (0.36, -0.02, 0.24), field_of_view=math.radians(42.0)),
-    "scene": CameraSpec((-0.12, 0.62, 0.95), (0.55, -0.05, 0.16), field_of_view=math.radians(48.0)),
+    "overview": CameraSpec((-0.62, 1.22, 1.02), (0.36, 0.0, 0.24), field_of_view=math.radians(42.0)),
+    "scene": CameraSpec((-0.10, 0.62, 0.95), (0.52, -0.08, 0.17), field_of_view=math.radians(46.0)),
 }
 """Cameras of every scene: one for people, one for perception (RGB-D, fixed beside the robot)."""
 

@@ -15,9 +15,9 @@ AMBIENT = (0.34, 0.35, 0.37)
 
 _LIGHTS = (
     # Direction of the light, colour, whether it casts shadows.
-    ((0.55, 0.35, -1.0), (1.55, 1.48, 1.36), True),
-    ((0.2, -1.0, -0.45), (0.42, 0.45, 0.50), False),
-    ((-1.0, 0.5, -0.6), (0.30, 0.32, 0.36), False),
+    ((0.55, -0.30, -1.0), (1.55, 1.48, 1.36), True),
+    ((0.2, 1.0, -0.45), (0.42, 0.45, 0.50), False),
+    ((-1.0, -0.5, -0.6), (0.30, 0.32, 0.36), False),
 )
 
 
@@ -99,7 +99,10 @@ def plank_shape(size: tuple[float, float, float], coat: Any) -> Any:
 
     half = np.array(size) / 2
     long = int(np.argmax(size))
-    vertices, normals, uvs, faces = [], [], [], []
+    vertices: list[Array] = []
+    normals: list[Array] = []
+    uvs: list[Array] = []
+    faces: list[Array] = []
     for axis in range(3):
         others = [(axis + 1) % 3, (axis + 2) % 3]
         grain = long if long in others else others[0]
@@ -108,7 +111,7 @@ def plank_shape(size: tuple[float, float, float], coat: Any) -> Any:
             corners = np.zeros((4, 3))
             corners[:, axis] = sign
             corners[:, others[0]] = [-1, 1, 1, -1]
-            corners[:, others[1]] = np.array([-1, -1, 1, 1])
+            corners[:, others[1]] = [-1, -1, 1, 1]
             corners *= half
             normal = np.zeros(3)
             normal[axis] = sign
@@ -137,7 +140,7 @@ def _wood(colour: tuple[float, float, float]) -> Any:
 
 
 def wood_grain(colour: tuple[float, float, float], size: int = 256) -> Array:
-    """A tile ``(size, size, 4)`` of wood of a mean sRGB colour, uint8, repeating, the grain along its rows."""
+    """A tile ``(size, size, 4)`` of wood, uint8, that repeats; grain along its rows, ``colour`` its mean sRGB."""
     rng = np.random.default_rng(7)
     frequency = np.fft.fftfreq(size) * size
     fy, fx = np.meshgrid(frequency, frequency, indexing="ij")

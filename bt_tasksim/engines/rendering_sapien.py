@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from bt_tasksim import meshes
 from bt_tasksim.engines import looks
 from bt_tasksim.engines.cameras import CAMERAS, CameraSpec
 from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
@@ -21,10 +22,11 @@ from bt_tasksim.errors import InputError, MachineError, nearest
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription, load_robot
 from bt_tasksim.scene import ActorConfiguration, ObjectActor
-from bt_tasksim.world import WorldState
+from bt_tasksim.world import PlaceModel, WorldState
 
 ALIASES = {"perception": "scene"}
 _FLOOR = -0.75
+_MAT = 0.0005
 _NEAR, _FAR = 0.02, 20.0
 
 
@@ -67,9 +69,10 @@ class SapienRendering:
         self._links: dict[str, Any] = {}
         self._objects: list[Any] = []
         self._fixtures: list[Any] = []
+        self._spots: list[Any] = []
         self._drawn: tuple[Any, ...] = ()
         looks.add_lights(self._scene, shadow_size)
-        self._add_floor()
+        self._add_room()
 
     def reset(self, configuration: ActorConfiguration) -> None:
         """Prepare for an episode: its robot, fixtures and objects.
@@ -92,6 +95,8 @@ class SapienRendering:
             self._drawn = configuration.fixtures
         self._remove(self._objects)
         self._objects = [self._add_object(actor) for actor in configuration.objects]
+        self._remove(self._spots)
+        self._spots = [self._add_spot(place) for place in configuration.places if place.kind == "spot"]
 
     def camera(self, name: str) -> CameraModel:
         """The calibrated camera of a name.
@@ -134,6 +139,7 @@ class SapienRendering:
     def close(self) -> None:
         """Let go of the scene."""
         self._remove(self._objects)
+        self._remove(self._spots)
         self._remove(self._fixtures)
         self._remove(list(self._links.values()))
         self._links, self._cameras, self._robot, self._kinematics, self._drawn = {}, {}, None, None, ()
@@ -206,12 +212,27 @@ class SapienRendering:
         shape = looks.mesh_shape(actor.shape().visual, looks.material(actor.colour))
         return self._add(actor.name, [shape], np.array(actor.pose))
 
-    def _add_floor(self) -> None:
-        coat = self._render.RenderMaterial(
-            base_color=looks.linear((0.80, 0.81, 0.83)), metallic=0, roughness=0.95, specular=0.1
-        )
-        floor = looks.plank_shape((16.0, 16.0, 0.02), coat)
-        self._add("floor", [floor], np.array([0.0, 0.0, _FLOOR - 0.01, 1, 0, 0, 0]))
+    def _add_spot(self, place: PlaceModel) -> Any:
+        """A thin mat that marks where something is to stand."""
+        x, y = place.extent
+        outline = meshes.rounded_rectangle(x / 2, y / 2, min(x, y) / 6)
+        mat = looks.mesh_shape(meshes.prism(outline, 2 * _MAT), looks.material((0.97, 0.96, 0.90)))
+        return self._add(place.name, [mat], np.asarray(place.pose, float))
+
+    def _add_room(self) -> None:
+        # They shine evenly: a light background whichever way a camera looks, and beyond the edge of the
+        # shadow map, where SAPIEN takes everything to be in the shade.
+        floor = self._render.RenderMaterial(base_color=[0, 0, 0, 1], roughness=1, specular=0)
+        floor.emission = [*looks.linear((0.83, 0.845, 0.86))[:3], 1.0]
+        wall = self._render.RenderMaterial(base_color=[0, 0, 0, 1], roughness=1, specular=0)
+        wall.emission = [*looks.linear((0.90, 0.915, 0.93))[:3], 1.0]
+        half, height = 6.0, 8.0
+        parts = [looks.plank_shape((2 * half, 2 * half, 0.02), floor)]
+        for x, y in ((half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
+            part = looks.plank_shape((0.02 if x else 2 * half, 0.02 if y else 2 * half, height), wall)
+            part.local_pose = self._sapien.Pose([x, y, height / 2])
+            parts.append(part)
+        self._add("room", parts, np.array([0.0, 0.0, _FLOOR - 0.01, 1, 0, 0, 0]))
 
     def _add(self, name: str, shapes: list[Any], pose: Array) -> Any:
         body = self._render.RenderBodyComponent()
