@@ -262,9 +262,9 @@ class Scene:
             ("knock", self.knock, specs),
             ("goal", self.goal.place if self.goal else None, places),
         ):
-            if name is not None and name not in known:
+            if wanted is not None and wanted not in known:
                 raise InputError(
-                    f"the scene's {label} names '{name}', which is not in it{nearest(name, known)}"
+                    f"the scene's {label} names '{wanted}', which is not in it{nearest(wanted, known)}"
                 )
 
     def with_robot(self, robot: str) -> Scene:

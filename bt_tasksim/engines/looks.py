@@ -140,7 +140,7 @@ def _wood(colour: tuple[float, float, float]) -> Any:
 
 
 def wood_grain(colour: tuple[float, float, float], size: int = 256) -> Array:
-    """A tile ``(size, size, 4)`` of wood, uint8, that repeats; grain along its rows, ``colour`` its mean sRGB."""
+    """A repeating tile ``(size, size, 4)`` of wood, uint8, sRGB, with its grain along the rows."""
     rng = np.random.default_rng(7)
     frequency = np.fft.fftfreq(size) * size
     fy, fx = np.meshgrid(frequency, frequency, indexing="ij")
