@@ -45,6 +45,7 @@ class Place:
     centre: tuple[float, float]
     height: float
     access: tuple[float, float, float]
+    exit: tuple[float, float, float]
     clearance: float
 
 
@@ -80,6 +81,7 @@ class Fixture:
                 centre=place.centre,
                 height=place.height,
                 access=poses.rotate(frame[3:], np.array(place.access)),
+                exit=poses.rotate(frame[3:], np.array(place.exit)),
                 fixture=self.name,
                 clearance=place.clearance,
             )
@@ -113,6 +115,7 @@ class Fixture:
                 centre=_floats(p.get("centre", (0, 0)), 2),
                 height=float(p.get("height", 10.0)),
                 access=_floats(p.get("access", (0, 0, -1)), 3),
+                exit=_floats(p.get("exit", (0, 0, 1)), 3),
                 clearance=float(p.get("clearance", 0.1)),
             )
             for p in data["places"]

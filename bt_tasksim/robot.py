@@ -25,11 +25,16 @@ from bt_tasksim.resources import asset
 
 @dataclass(frozen=True)
 class Drive:
-    """PD drive gains of a group of joints: N/m or Nm/rad, and the same per second, and the effort limit."""
+    """PD drive gains of a group of joints: N/m or Nm/rad, and the same per second, and the effort limit.
+
+    The armature is the inertia of the geared motor, reflected to the joint: kg or kg m^2. Light fingers need
+    it: without it the solver leaves them millimetres deep in what they press on.
+    """
 
     stiffness: float
     damping: float
     force_limit: float
+    armature: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -116,11 +116,11 @@ class Bring(ConceptModel):
     def _exits(self, seen: Seen, tool_goal: Array) -> tuple[Array, Array]:
         """Displacements that take the tool out of what it starts in, and out of where it ends."""
         place = resting_place(seen, self.target) or _place_below(seen, self.target)
-        out = np.zeros(3) if place is None else -place.clearance * place.access
+        out = np.zeros(3) if place is None else place.clearance * place.exit
         into = np.zeros(3)
         if self.to is not None and self.to in seen.world.places:
             goal = seen.place(self.to)
-            into = -goal.clearance * goal.access
+            into = goal.clearance * goal.exit
             if goal.kind == "bin":
                 into = np.zeros(3)
         return out, into

@@ -171,6 +171,7 @@ class SapienPhysics:
         for i, joint in enumerate(self._joints):
             drive = robot.arm_drive if i < n_arm else robot.hand_drive
             joint.set_friction(0.1 if i < n_arm else 0.0)
+            joint.set_armature([drive.armature])
             joint.set_drive_properties(drive.stiffness, drive.damping, force_limit=drive.force_limit, mode="force")
         self._stiffness = np.array([robot.arm_drive.stiffness] * n_arm + [robot.hand_drive.stiffness] * len(robot.hand_joints))
         self._damping = np.array([robot.arm_drive.damping] * n_arm + [robot.hand_drive.damping] * len(robot.hand_joints))

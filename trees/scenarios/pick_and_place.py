@@ -15,7 +15,10 @@ def scene(robot: str = "panda") -> Scene:
         robot,
         objects={
             "target": ObjectSpec(
-                kinds=("box", "cylinder", "oval", "diamond"), on="table", centre=(0.0, -0.14), area=(0.08, 0.10)
+                kinds=("box", "cylinder", "oval", "diamond"),
+                on="table",
+                centre=(0.0, -0.14),
+                area=(0.08, 0.10),
             )
         },
         spots=[SpotSpec("goal", on="table", centre=(0.0, 0.16), area=(0.08, 0.08), yaw=0.5)],
