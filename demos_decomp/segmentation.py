@@ -16,7 +16,7 @@ from bt_tasksim import poses
 from demos_decomp.evidence import NAMED, Check, spoken_odds
 from demos_decomp.log import Demonstration, Floats
 from demos_decomp.signals import RATE, Motion, Swing, speed, swings
-from demos_decomp.support import bin_under, half_height, resting_on
+from demos_decomp.support import half_height, resting_on
 
 LEAST_SWING = 0.006
 """Smallest change of the hand's opening, metres, that counts as closing or opening."""
@@ -41,7 +41,7 @@ class Hold:
     Attributes:
         target: The object.
         first: Sample at which the hand has closed.
-        last: Sample at which the hand begins to open, or the last sample.
+        last: Sample at which the hand, opening, parts from the object; or the last sample.
         closing: The closing of the hand; None where the demonstration begins with the object in the hand.
         opening: The opening; None where it ends with the object in the hand.
         until: Sample at which the next hold begins, or the last sample.
@@ -89,7 +89,7 @@ def find_holds(shown: Demonstration, motion: Motion) -> tuple[list[Hold], list[s
         Holds in order of time, and remarks about closings of the hand that held nothing.
     """
     span = float(np.ptp(motion.opening))
-    threshold = max(LEAST_SWING, 5 * motion.opening_noise, 0.12 * span)
+    threshold = max(LEAST_SWING, 7 * motion.opening_noise, 0.12 * span)
     found = swings(motion.opening, threshold)
     end = len(motion.time) - 1
     closed: list[tuple[Swing | None, Swing | None]] = []
@@ -102,13 +102,12 @@ def find_holds(shown: Demonstration, motion: Motion) -> tuple[list[Hold], list[s
     for closing, opening in closed:
         first = closing.last if closing else 0
         last = opening.first if opening else end
-        hold = _held(shown, motion, first, last, closing, opening, threshold)
+        hold, why_not = _held(shown, motion, first, last, closing, opening, threshold)
         if hold is not None:
             holds.append(hold)
         elif closing is not None:
-            at = motion.time[first]
-            remarks.append(f"the hand closed at {at:.1f} s, but held no object")
-    holds = _without_regrips(motion, holds)
+            remarks.append(f"the hand closed at {motion.time[first]:.1f} s, but held no object ({why_not})")
+    holds = [_until_parting(motion, hold) for hold in _without_regrips(motion, holds)]
     limits = [later.closing.first if later.closing else later.first for later in holds[1:]] + [end]
     return [replace(hold, until=limit) for hold, limit in zip(holds, limits, strict=False)], remarks
 
@@ -177,11 +176,13 @@ def _held(
     closing: Swing | None,
     opening: Swing | None,
     threshold: float,
-) -> Hold | None:
+) -> tuple[Hold | None, str]:
+    """The hold between two samples, if it is one; and if not, what speaks most clearly against it."""
     if last - first < 3:
-        return None
+        return None, "it opened at once"
     best: Hold | None = None
     score = np.inf
+    against: list[Check] = []
     hand = motion.hand[first : last + 1]
     for name, track in motion.objects.items():
         moved = track[first : last + 1]
@@ -194,7 +195,13 @@ def _held(
         odds = spoken_odds(shown.narration, "grasp", motion.time[first] - 1, motion.time[first])
         checks = [
             Check(f"{name} follows the hand, m", travel, 0.007 + 3 * noise, 0.002 + noise, odds=odds),
-            Check(f"{name} stays in the hand, m", slip, 0.015 + 0.2 * travel, 0.004 + 2 * noise, below=True),
+            Check(
+                f"{name} stays in the hand, m",
+                slip,
+                0.015 + 0.2 * travel + 3 * noise,
+                0.004 + 2 * noise,
+                below=True,
+            ),
             Check(f"hand at {name}, m", distance, NEAR, 0.01, below=True),
         ]
         if closing is not None:
@@ -205,7 +212,19 @@ def _held(
         ratio = slip / max(travel, 1e-9) + distance
         if all(checks) and ratio < score:
             best, score = Hold(name, first, last, closing, opening, last, tuple(checks)), ratio
-    return best
+        against.append(min(checks, key=lambda check: check.probability))
+    return best, str(max(against, key=lambda check: check.probability))
+
+
+def _until_parting(motion: Motion, hold: Hold) -> Hold:
+    """The hold up to where the opening hand parts from the object, not just begins to open."""
+    if hold.opening is None:
+        return hold
+    span = slice(hold.last, min(hold.opening.last, len(motion.time) - 1) + 1)
+    grip = poses.transform(poses.inverse(motion.objects[hold.target][span]), motion.hand[span, :3])
+    apart = np.linalg.norm(grip - grip[0], axis=1) > 0.005 + 3 * motion.noise[hold.target]
+    parted = int(np.argmax(apart)) if apart.any() else len(apart) - 1
+    return replace(hold, last=hold.last + parted)
 
 
 def _without_regrips(motion: Motion, holds: Sequence[Hold]) -> list[Hold]:
@@ -223,7 +242,8 @@ def _without_regrips(motion: Motion, holds: Sequence[Hold]) -> list[Hold]:
             continue
         span = slice(earlier.last, hold.first + 1)
         in_hand = poses.transform(poses.inverse(motion.hand[span]), motion.objects[hold.target][span, :3])
-        stays = float(np.linalg.norm(in_hand - in_hand[0], axis=1).max()) < 0.012
+        drift = float(np.linalg.norm(in_hand - in_hand[0], axis=1).max())
+        stays = drift < 0.012 + 4 * motion.noise[hold.target]
         grip = abs(earlier.closing.change) if earlier.closing else abs(hold.closing.change)
         if stays and earlier.opening.change < 0.4 * grip:
             joined[-1] = replace(earlier, last=hold.last, opening=hold.opening)
@@ -257,23 +277,22 @@ def _landing(shown: Demonstration, motion: Motion, hold: Hold, after: Floats) ->
     if hold.opening is None:
         return None
     track = motion.objects[hold.target]
-    released = min(hold.last + 2, len(track) - 1)
-    drop = float(track[released, 2] - after[2])
-    size = shown.objects[hold.target].size
-    if bin_under(shown, motion, hold.target, released) is not None:
-        # A thing that tips over as it falls ends with its centre lower: compare lowest points.
-        end = motion.at(float(motion.time[min(hold.until, len(track) - 1)]))
-        lowest = track[[released, end], 2] - half_height(track[[released, end]], size)
-        drop = max(drop, float(lowest[0] - lowest[1]))
-    if len(track) - 1 - released < int(
-        0.1 * RATE
-    ):  # the log ends with the release: only what is below can tell
+    noise = motion.noise[hold.target]
+    released = hold.last
+    lowest = track[:, 2] - half_height(track, shown.objects[hold.target].size)
+    end = min(hold.until, released + int(2 * RATE))
+    rests = np.flatnonzero(np.abs(lowest[released : end + 1] - lowest[end]) < 0.004 + 2 * noise)
+    rest = released + int(rests[0]) if rests.size else end
+    # What the hand lowers goes down with the hand, what it lets go falls away from it.
+    lags = (track[rest, :3] - track[released, :3]) - (motion.hand[rest, :3] - motion.hand[released, :3])
+    drop = min(float(lowest[released] - lowest[end]), float(np.linalg.norm(lags)))
+    if len(track) - 1 - released < 0.1 * RATE:  # the log ends here: only what is below can tell
         support = resting_on(shown, motion, hold.target, released)
         drop = abs(support.gap) if support else 2 * DROP
     odds = spoken_odds(shown.narration, "place", motion.time[hold.last] - 0.5, motion.time[hold.last])
     if spoken_odds(shown.narration, "release", motion.time[hold.last], motion.time[hold.last]) == NAMED:
         odds = 1.0
-    spread = 0.004 + 2 * motion.noise[hold.target]
+    spread = 0.004 + 2 * noise
     return Check(f"{hold.target} falls after release, m", drop, DROP, spread, below=True, odds=odds)
 
 
