@@ -222,8 +222,8 @@ def _until_parting(motion: Motion, hold: Hold) -> Hold:
         return hold
     span = slice(hold.last, min(hold.opening.last, len(motion.time) - 1) + 1)
     grip = poses.transform(poses.inverse(motion.objects[hold.target][span]), motion.hand[span, :3])
-    apart = np.linalg.norm(grip - grip[0], axis=1) > 0.005 + 3 * motion.noise[hold.target]
-    parted = int(np.argmax(apart)) if apart.any() else len(apart) - 1
+    apart = np.linalg.norm(grip - grip[0], axis=1) > 0.003 + 3 * motion.noise[hold.target]
+    parted = max(int(np.argmax(apart)) - 2, 0) if apart.any() else len(apart) - 1
     return replace(hold, last=hold.last + parted)
 
 

@@ -8,27 +8,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from bt_tasksim import poses
+from bt_tasksim.fixtures import load_fixture
 from demos_decomp.log import Floats, Surface
 from demos_decomp.synthetic_motion import Hand
 
-NO_TURN = np.array([1.0, 0, 0, 0])
-DOWN, FORWARD = np.array([0.0, 0, -1]), np.array([1.0, 0, 0])
-
-TABLE = Surface(np.array([0.5, 0, 0, *NO_TURN]), np.array([0.9, 1.2]), "table")
-SHELF = {
-    name: Surface(
-        np.array([0.63, 0, top, *NO_TURN]),
-        np.array([0.25, 0.6]),
-        "board",
-        "shelf",
-        np.array([0.055, 0.0]),
-        free,
-    )
-    for name, top, free in (("lower_board", 0.12, 0.31), ("upper_board", 0.45, 10.0))
-}
-BIN = Surface(np.array([0.45, -0.38, 0.01, *NO_TURN]), np.array([0.2, 0.2]), "bin", "trash_bin", height=0.21)
+DOWN = np.array([0.0, 0, -1])
 CUP = np.array([0.07, 0.07, 0.10])
 KINDS = ("box", "cylinder", "oval", "diamond")
+
+
+def places_of(*fixtures: str) -> dict[str, Surface]:
+    """The places of bundled fixtures, by name."""
+    return {
+        place.name: Surface(
+            pose=np.array(place.pose),
+            extent=np.array(place.extent),
+            kind=place.kind,
+            fixture=None if place.fixture == "table" else place.fixture,
+            centre=np.array(place.centre),
+            height=place.height,
+        )
+        for fixture in fixtures
+        for place in load_fixture(fixture).place_models()
+    }
 
 
 @dataclass(frozen=True)
@@ -73,12 +75,15 @@ def pick_and_place(rng: np.random.Generator) -> Performance:
     """A box, cylinder, oval pack or diamond-shaped box goes from the table to a marked spot."""
     kind = str(rng.choice(KINDS))
     width = rng.uniform(0.04, 0.06)
-    depth = width if kind in ("cylinder",) else rng.uniform(0.04, 0.06)
+    depth = width if kind == "cylinder" else rng.uniform(0.04, 0.06)
     size = np.array([depth, width, rng.uniform(0.08, 0.12)])
-    goal = np.array([rng.uniform(0.42, 0.58), rng.uniform(0.08, 0.25), 0.0])
-    places = {"table": TABLE, "goal": Surface(np.array([*goal, *NO_TURN]), np.array([0.12, 0.12]), "spot")}
-    begin = _standing([rng.uniform(0.42, 0.58), rng.uniform(-0.25, -0.05)], 0.0, size, rng.uniform(-1.2, 1.2))
-    end = _standing(goal[:2] + rng.normal(0, 0.006, 2), 0.0, size, rng.normal(0, 0.04))
+    goal = np.array(
+        [rng.uniform(0.42, 0.58), rng.uniform(0.08, 0.25), 0.0, *poses.yaw(rng.uniform(-0.5, 0.5))]
+    )
+    places = {**places_of("table"), "goal": Surface(goal, np.array([0.12, 0.12]), "spot")}
+    start = np.array([rng.uniform(0.42, 0.58), rng.uniform(-0.24, -0.05), 0.0])
+    begin = _standing(start, size, poses.yaw(rng.uniform(-1.2, 1.2)))
+    end = _standing([*(goal[:2] + rng.normal(0, 0.006, 2)), 0.0], size, _turned(heading, rng.normal(0, 0.03)))
     things = {"target": Thing(begin, kind, size)}
     lift, above = rng.uniform(0.08, 0.15), rng.uniform(0.06, 0.12)
     raised = _shifted(begin, [*rng.normal(0, 0.004, 2), lift])
@@ -86,14 +91,16 @@ def pick_and_place(rng: np.random.Generator) -> Performance:
     middle = poses.interpolate(raised, ready, rng.uniform(0.4, 0.6))
     middle[2] = max(lift, above) + rng.uniform(0.0, 0.04) + size[2] / 2
     way = [middle] if rng.random() < 0.6 else []
-    return _perform(rng, things, places, "target", "goal", DOWN, [raised, *way, ready], end)
+    return _perform(rng, things, places, ("target", "goal"), DOWN, [raised, *way, ready], end)
 
 
 def shelf_to_shelf(rng: np.random.Generator) -> Performance:
     """A cup goes from the upper board of a shelf to the lower one, out and in at the front."""
-    begin = _standing([0.63 + rng.normal(0, 0.004), rng.uniform(-0.12, 0.12)], 0.45, CUP, rng.uniform(-3, 3))
-    end = _standing([0.63 + rng.normal(0, 0.006), rng.normal(0, 0.006)], 0.12, CUP, 0.0)
-    end[3:] = begin[3:]
+    places = places_of("table", "shelf")
+    upper, lower = places["upper_board"].pose, places["lower_board"].pose
+    heading = poses.yaw(rng.uniform(-3, 3))
+    begin = _standing(_shifted(upper, [rng.normal(0, 0.004), rng.uniform(-0.12, 0.12), 0]), CUP, heading)
+    end = _standing(_shifted(lower, [*rng.normal(0, 0.006, 2), 0]), CUP, heading)
     lift, above = rng.uniform(0.07, 0.09), rng.uniform(0.04, 0.06)
     out = rng.uniform(0.20, 0.24)
     raised = _shifted(begin, [*rng.normal(0, 0.003, 2), lift])
@@ -102,25 +109,27 @@ def shelf_to_shelf(rng: np.random.Generator) -> Performance:
     below = _shifted(ready, [-out + rng.normal(0, 0.01), rng.normal(0, 0.01), rng.normal(0.01, 0.006)])
     things = {"cup": Thing(begin, "cup", CUP)}
     way = [raised, before, below, ready]
-    places = {"table": TABLE, **SHELF}
-    return _perform(rng, things, places, "cup", "lower_board", FORWARD, way, end, overlap=0.12)
+    approach = next(p.access for p in load_fixture("shelf").place_models() if p.name == "upper_board")
+    return _perform(rng, things, places, ("cup", "lower_board"), approach, way, end, overlap=0.12)
 
 
 def pick_and_throw(rng: np.random.Generator) -> Performance:
     """A cup on the table is lifted high, brought over the trash bin and let go."""
-    begin = _standing([rng.uniform(0.42, 0.58), rng.uniform(-0.18, 0.1)], 0.0, CUP, rng.uniform(-1.2, 1.2))
+    places = places_of("table", "trash_bin")
+    floor = places["trash_bin"].pose[:3]
+    start = np.array([rng.uniform(0.42, 0.58), rng.uniform(-0.18, 0.15), 0.0])
+    begin = _standing(start, CUP, poses.yaw(rng.uniform(-1.2, 1.2)))
     raised = _shifted(begin, [*rng.normal(0, 0.005, 2), rng.uniform(0.28, 0.34)])
     over = raised.copy()
-    over[:2] = BIN.pose[:2] + rng.normal(0, 0.012, 2)
+    over[:2] = floor[:2] + rng.normal(0, 0.012, 2)
     over[2] += rng.normal(0.0, 0.012)
-    rest = _standing(BIN.pose[:2] + rng.normal(0, 0.008, 2), float(BIN.pose[2]), CUP, rng.uniform(-3, 3))
+    heading = poses.yaw(rng.uniform(-3, 3))
+    rest = _standing(_shifted(floor, [*rng.normal(0, 0.008, 2), 0]), CUP, heading)
     if rng.random() < 0.6:  # tips over
-        lying = poses.from_rotation_vector(np.array([np.pi / 2, 0.0, 0.0]))
-        rest[2] = BIN.pose[2] + CUP[0] / 2
-        rest[3:] = poses.quat_multiply(rest[3:], lying)
+        rest[2] = floor[2] + CUP[0] / 2
+        rest[3:] = poses.quat_multiply(heading, poses.from_rotation_vector(np.array([np.pi / 2, 0.0, 0.0])))
     things = {"cup": Thing(begin, "cup", CUP)}
-    places = {"table": TABLE, "trash_bin": BIN}
-    return _perform(rng, things, places, "cup", "trash_bin", DOWN, [raised, over], rest, throws=True)
+    return _perform(rng, things, places, ("cup", "trash_bin"), DOWN, [raised, over], rest, throws=True)
 
 
 SCRIPTS: dict[str, Callable[[np.random.Generator], Performance]] = {
@@ -134,8 +143,7 @@ def _perform(
     rng: np.random.Generator,
     things: dict[str, Thing],
     places: dict[str, Surface],
-    target: str,
-    destination: str,
+    target_and_destination: tuple[str, str],
     approach: Floats,
     way: list[Floats],
     end: Floats,
@@ -143,6 +151,7 @@ def _perform(
     throws: bool = False,
 ) -> Performance:
     """Acts a script: ``way`` are poses ``(7,)`` of the target, the first of them after the pick."""
+    target, destination = target_and_destination
     thing = things[target]
     grip = _grip(rng, thing, approach)
     width = float(thing.size[1])
@@ -192,7 +201,7 @@ def _perform(
 def _grip(rng: np.random.Generator, thing: Thing, approach: Floats) -> Floats:
     """Pose ``(7,)`` of the hand in the target's frame."""
     side = poses.rotate(thing.pose[3:], np.array([0.0, 1, 0]))
-    if approach is FORWARD:  # a cup from the front: the fingers close sideways
+    if approach[0] > 0.5:  # a cup from the front: the fingers close sideways
         side = np.array([0.0, 1, 0])
     side = side if side[1] >= 0 else -side
     hand = np.concatenate([thing.pose[:3], poses.frame_from_axes(approach, side)])
@@ -202,8 +211,13 @@ def _grip(rng: np.random.Generator, thing: Thing, approach: Floats) -> Floats:
     return np.asarray(poses.multiply(poses.inverse(thing.pose), hand))
 
 
-def _standing(at: Floats | list[float], surface: float, size: Floats, heading: float) -> Floats:
-    return np.array([at[0], at[1], surface + size[2] / 2, *poses.yaw(heading)])
+def _standing(at: Floats | list[float], size: Floats, heading: Floats) -> Floats:
+    """Pose ``(7,)`` of a thing that stands on a point ``(3,)`` with a heading (quaternion)."""
+    return np.array([at[0], at[1], at[2] + size[2] / 2, *heading])
+
+
+def _turned(heading: Floats, by: float) -> Floats:
+    return np.asarray(poses.quat_multiply(heading, poses.yaw(by)))
 
 
 def _shifted(pose: Floats, by: Floats | list[float]) -> Floats:
