@@ -77,9 +77,8 @@ def pick_and_place(rng: np.random.Generator) -> Performance:
     width = rng.uniform(0.04, 0.06)
     depth = width if kind == "cylinder" else rng.uniform(0.04, 0.06)
     size = np.array([depth, width, rng.uniform(0.08, 0.12)])
-    goal = np.array(
-        [rng.uniform(0.42, 0.58), rng.uniform(0.08, 0.25), 0.0, *poses.yaw(rng.uniform(-0.5, 0.5))]
-    )
+    heading = poses.yaw(rng.uniform(-0.5, 0.5))
+    goal = np.array([rng.uniform(0.42, 0.58), rng.uniform(0.08, 0.25), 0.0, *heading])
     places = {**places_of("table"), "goal": Surface(goal, np.array([0.12, 0.12]), "spot")}
     start = np.array([rng.uniform(0.42, 0.58), rng.uniform(-0.24, -0.05), 0.0])
     begin = _standing(start, size, poses.yaw(rng.uniform(-1.2, 1.2)))
