@@ -143,7 +143,7 @@ class _Reader:
             raise self._wrong(
                 element, f"a second <BehaviorTree> has the ID '{name}', the first is on line {first}"
             )
-        if name in KINDS or name in self.nodes:
+        if name in KINDS:
             raise self._wrong(
                 element, f"a <BehaviorTree> may not have the ID '{name}', which is a node's name"
             )

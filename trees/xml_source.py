@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from xml.sax import SAXParseException
 from xml.sax.handler import ContentHandler
-from xml.sax.xmlreader import AttributesImpl, Locator
+from xml.sax.xmlreader import AttributesImpl
 
 from defusedxml.common import DefusedXmlException, DTDForbidden
 from defusedxml.expatreader import DefusedExpatParser
@@ -50,8 +50,8 @@ def parse(content: str | bytes, source: str) -> Element:
     size = len(content) if isinstance(content, bytes) else len(content.encode(errors="surrogatepass"))
     if size > LARGEST:
         raise InputError(f"{source}: the file has {size / 1e6:.1f} MB, at most {LARGEST / 1e6:g} MB are read")
-    builder = _Builder(source)
     parser = DefusedExpatParser(forbid_dtd=True, forbid_entities=True, forbid_external=True)
+    builder = _Builder(source, parser)
     parser.setContentHandler(builder)
     try:
         parser.feed(content)
@@ -75,18 +75,15 @@ def parse(content: str | bytes, source: str) -> Element:
 
 
 class _Builder(ContentHandler):
-    def __init__(self, source: str) -> None:
+    def __init__(self, source: str, parser: DefusedExpatParser) -> None:
         super().__init__()
         self.source = source
+        self.parser = parser
         self.root: Element | None = None
         self.path: list[Element] = []
-        self.locator: Locator | None = None
-
-    def setDocumentLocator(self, locator: Locator) -> None:  # noqa: N802
-        self.locator = locator
 
     def startElement(self, name: str, attrs: AttributesImpl) -> None:  # noqa: N802
-        line = (self.locator.getLineNumber() if self.locator is not None else None) or 0
+        line = self.parser.getLineNumber() or 0
         element = Element(name, dict(attrs.items()), line)
         if len(self.path) >= DEEPEST:
             raise InputError(f"{self.source}, line {line}: more than {DEEPEST} levels of elements")

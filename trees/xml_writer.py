@@ -100,6 +100,8 @@ class _Writer:
     """Writes each subtree once, and gives it an ID of its own."""
 
     def __init__(self, root: Behaviour) -> None:
+        from concept_nodes import catalogue
+
         self.root = root
         self.leaves: dict[str, Leaf] = {}
         for node in root.iterate():
@@ -109,7 +111,7 @@ class _Writer:
                     raise InputError(f"two different leaves are called {name}: rename one of the classes")
                 if name in TAKEN:
                     raise InputError(f"leaf {name} has the name of a node of BehaviorTree.CPP: rename it")
-        reserved = {*TAKEN, *self.leaves}
+        reserved = {*TAKEN, *self.leaves, *catalogue()}
         self.taken = {name.casefold() for name in reserved} | {"root", "undefined"}
         self.trees: dict[str, str] = {}
         self.ids: dict[tuple[str, str], str] = {}

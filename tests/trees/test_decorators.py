@@ -1,0 +1,181 @@
+"""Retry, repeat, time-out, parallel and subtree, tick by tick."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+import trees
+from bt_tasksim.context import Context
+from bt_tasksim.errors import InputError
+
+STATUS = {"R": Status.RUNNING, "S": Status.SUCCESS, "F": Status.FAILURE}
+LETTER = {status: letter for letter, status in STATUS.items()}
+
+
+class Scripted(Behaviour):
+    """Answers by a script, over and over, and writes down what happens to it."""
+
+    def __init__(self, script, name="leaf"):
+        super().__init__(name)
+        self.script, self.log, self.asked = script, "", 0
+
+    def update(self):
+        letter = self.script[self.asked % len(self.script)]
+        self.asked += 1
+        self.log += letter
+        self.feedback_message = f"answer {self.asked}"
+        return STATUS[letter]
+
+    def terminate(self, new_status):
+        if new_status == Status.INVALID and self.status == Status.RUNNING:
+            self.log += "x"
+
+
+def ticks(tree, count):
+    out = ""
+    for _ in range(count):
+        tree.tick_once()
+        out += LETTER[tree.status]
+    return out
+
+
+def test_retry_goes_on_in_the_same_tick():
+    leaf = Scripted("RFRS")
+    assert ticks(trees.retry(3, leaf), 3) == "RRS"
+    assert leaf.log == "RFRS"
+
+
+def test_retry_waits_a_tick_after_a_failure_at_once():
+    leaf = Scripted("F")
+    tree = trees.retry(3, leaf)
+    assert ticks(tree, 3) == "RRF"
+    assert leaf.log == "FFF"
+    assert tree.feedback_message == "attempt 3 of 3 failed: answer 3"
+    assert ticks(tree, 3) == "RRF"
+
+
+def test_retry_without_end():
+    assert ticks(trees.retry(-1, Scripted("F")), 50) == "R" * 50
+
+
+def test_repeat_counts_successes():
+    leaf = Scripted("RS")
+    assert ticks(trees.repeat(2, leaf), 3) == "RRS"
+    assert leaf.log == "RSRS"
+    assert ticks(trees.repeat(3, Scripted("SSF")), 3) == "RRF"
+
+
+def test_an_interrupted_retry_ends_its_child_and_counts_anew():
+    leaf = Scripted("RFR")
+    tree = trees.retry(2, leaf)
+    ticks(tree, 2)
+    tree.stop(Status.INVALID)
+    assert leaf.log == "RFRx"
+    assert leaf.status == Status.INVALID
+    tree.tick_once()
+    assert tree.failures == 0
+
+
+def test_parallel_does_not_tick_finished_children_again():
+    first, second = Scripted("S", "first"), Scripted("RRS", "second")
+    assert ticks(trees.parallel("p", first, second), 3) == "RRS"
+    assert (first.log, second.log) == ("S", "RRS")
+
+
+def test_parallel_stops_what_still_runs():
+    leaves = Scripted("RS", "a"), Scripted("R", "b"), Scripted("R", "c")
+    tree = trees.parallel("p", *leaves, success=1)
+    assert ticks(tree, 2) == "RS"
+    assert [leaf.log for leaf in leaves] == ["RS", "Rx", "Rx"]
+    assert all(leaf.status != Status.RUNNING for leaf in leaves)
+
+
+@pytest.mark.parametrize(
+    ("scripts", "success", "failure", "expected"),
+    [
+        (("S", "F", "R"), -1, 1, "F"),
+        (("S", "F", "R"), 1, 1, "S"),
+        (("S", "F", "R"), 2, 2, "R"),
+        (("F", "F", "R"), 2, -1, "F"),
+        (("F", "S", "S"), -2, 2, "S"),
+        (("F", "R", "R"), -2, -1, "R"),
+        (("F", "F", "F"), 1, -1, "F"),
+    ],
+)
+def test_counts_of_a_parallel(scripts, success, failure, expected):
+    tree = trees.parallel("p", *(Scripted(s) for s in scripts), success=success, failure=failure)
+    assert ticks(tree, 1) == expected
+
+
+def test_a_failed_parallel_says_why():
+    tree = trees.parallel("p", Scripted("R", "a"), Scripted("F", "b"))
+    tree.tick_once()
+    assert tree.feedback_message == "1 of 2 failed, last 'b': answer 1"
+
+
+def clocked(tree):
+    context = Context.__new__(Context)
+    context._observation = SimpleNamespace(time=0.0)
+    for node in tree.iterate():
+        node.setup(context=context)
+    return context
+
+
+def test_timeout_counts_episode_time():
+    leaf = Scripted("R")
+    tree = trees.timeout(0.15, leaf)
+    context = clocked(tree)
+    out = ""
+    for tick in range(5):
+        context._observation.time = 7.0 + sum([0.05] * tick)
+        out += ticks(tree, 1)
+    assert out == "RRRFR"
+    assert leaf.log == "RRRxR"
+
+
+def test_timeout_names_what_was_not_done():
+    tree = trees.timeout(0.1, Scripted("R"))
+    context = clocked(tree)
+    tree.tick_once()
+    context._observation.time = 0.1
+    tree.tick_once()
+    assert tree.status == Status.FAILURE
+    assert tree.feedback_message == "not done within 0.1 s: answer 1"
+
+
+def test_timeout_lets_a_result_through():
+    tree = trees.timeout(10, Scripted("RS"))
+    clocked(tree)
+    assert ticks(tree, 4) == "RSRS"
+
+
+def test_timeout_needs_a_context():
+    tree = trees.timeout(1, Scripted("R"))
+    with pytest.raises(InputError, match="counts episode time and needs a context"):
+        tree.setup()
+    with pytest.raises(RuntimeError, match="before it was set up"):
+        tree.tick_once()
+
+
+def test_a_subtree_passes_everything_through():
+    tree = trees.subtree("inner", Scripted("RSF"))
+    assert ticks(tree, 3) == "RSF"
+    assert tree.feedback_message == "answer 3"
+    tree = trees.subtree("inner", Scripted("R"))
+    tree.tick_once()
+    tree.stop(Status.INVALID)
+    assert tree.decorated.log == "Rx"
+
+
+def test_a_tick_can_be_suspended_before_a_leaf_updates():
+    leaf = Scripted("RFS")
+    tree = trees.retry(2, leaf)
+    for _ in range(2):
+        walk = tree.tick()
+        assert next(walk) is leaf
+        list(walk)
+    assert tree.status == Status.SUCCESS
