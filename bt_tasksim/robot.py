@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -74,6 +74,8 @@ class RobotDescription:
         hand_open: Positions ``(n_hand,)`` at closure 0.
         hand_closed: Positions ``(n_hand,)`` at closure 1, mimics obeyed.
         hand_drive: Gains.
+        hand_drive_scale: Factors ``(n_hand,)`` on the gains and limits of each hand joint: a thumb that
+            stands against four fingers needs more than one of them.
         hand_speed: Fastest change of closure, 1/s.
         synergies: Names of further hand motions.
         synergy_directions: ``(n_synergies, n_hand)`` joint displacements at synergy value 1.
@@ -89,8 +91,8 @@ class RobotDescription:
         pad_links: Names of these links.
         task_mask: Weights ``(6,)`` of the tool pose's components in the inverse kinematics, tool frame
             (x, y, z, rotations about x, y, z): 0 leaves one free, for arms of fewer than six joints.
-        envelope: Boxes ``(pose (7,), full size (3,))`` in the tool frame that hold the hand and the end of the
-            arm, for keeping clear of obstacles.
+        envelope: Boxes ``(pose (7,), full size (3,))`` in the tool frame that hold the hand and the end of
+            the arm, for keeping clear of obstacles.
         cameras: By name: pose, size and field of view; see the rendering engine.
         source: Path of the data file.
     """
@@ -109,6 +111,7 @@ class RobotDescription:
     hand_open: Array
     hand_closed: Array
     hand_drive: Drive
+    hand_drive_scale: Array
     hand_speed: float
     synergies: tuple[str, ...]
     synergy_directions: Array
@@ -130,6 +133,15 @@ class RobotDescription:
     def joints(self) -> tuple[str, ...]:
         """All joints in the order of every joint array: arm, then hand."""
         return self.arm_joints + self.hand_joints
+
+    def drive_array(self, what: str) -> Array:
+        """A field of `Drive` for every joint ``(n_joints,)``, in the order of `joints`.
+
+        Args:
+            what: ``stiffness``, ``damping``, ``force_limit`` or ``armature``.
+        """
+        arm = np.full(len(self.arm_joints), getattr(self.arm_drive, what))
+        return np.concatenate([arm, getattr(self.hand_drive, what) * self.hand_drive_scale])
 
     def hand_position(self, hand: Array) -> Array:
         """Hand joint positions ``(..., n_hand)`` for a hand command ``(..., 1 + n_synergies)``."""
@@ -170,73 +182,191 @@ def load_robot(name: str) -> RobotDescription:
 def _load(path: Path) -> RobotDescription:
     try:
         data = yaml.safe_load(path.read_text())
-        return _description(data, path)
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"robot file '{path}': {type(error).__name__}: {error}") from error
+        if not isinstance(data, dict):
+            raise InputError("it should be a mapping of names to values")
+        _check_keys(data, "", _KEYS, _OPTIONAL)
+        description = _description(data, path)
+        _check(description)
+        return description
+    except yaml.YAMLError as error:
+        raise InputError(f"robot file '{path}' is not YAML: {' '.join(str(error).split())}") from error
+    except KeyError as error:
+        raise InputError(f"robot file '{path}' lacks {error}") from error
+    except (TypeError, ValueError, AttributeError, IndexError, OSError) as error:
+        raise InputError(f"robot file '{path}': {error}") from error
+
+
+_KEYS: Mapping[str, Any] = {
+    "name": None,
+    "urdf": None,
+    "base_link": None,
+    "arm": dict.fromkeys(("joints", "lower", "upper", "velocity", "acceleration", "rest", "drive")),
+    "hand": dict.fromkeys(("joints", "open", "closed", "drive", "speed")),
+    "tool": {"link": None, "pose": None},
+    "wrist_link": None,
+    "tips": None,
+    "opposition": None,
+    "opening": None,
+    "depth": None,
+    "pads": {"links": None, "surface": {f.name: None for f in fields(Pads)}},
+    "envelope": None,
+}
+_OPTIONAL: Mapping[str, Any] = {
+    "task_mask": None,
+    "cameras": None,
+    "hand": {"synergies": None, "drive_scale": None},
+}
+
+
+def _check_keys(
+    data: Any, where: str, needed: Mapping[str, Any], optional: Mapping[str, Any] | None = None
+) -> None:
+    """Says which key is missing, or unknown and what it may have been meant to be."""
+    if not isinstance(data, dict):
+        raise InputError(f"'{where.rstrip('.')}' should be a mapping, found {data!r}")
+    optional = optional or {}
+    known = {*needed, *optional}
+    for key in data:
+        if key not in known:
+            raise InputError(f"unknown key '{where}{key}'{nearest(str(key), known)}")
+    for key, inner in needed.items():
+        if key not in data:
+            raise InputError(f"'{where}{key}' is missing")
+        if inner is not None:
+            _check_keys(data[key], f"{where}{key}.", inner, optional.get(key))
 
 
 def _description(data: Mapping[str, Any], path: Path) -> RobotDescription:
     arm, hand, tool = data["arm"], data["hand"], data["tool"]
-    n_arm, n_hand = len(arm["joints"]), len(hand["joints"])
-    synergies = hand.get("synergies", {})
-    description = RobotDescription(
+    arm_joints, hand_joints = _names(arm["joints"], "arm.joints"), _names(hand["joints"], "hand.joints")
+    n_arm, n_hand = len(arm_joints), len(hand_joints)
+    synergies = hand.get("synergies") or {}
+    return RobotDescription(
         name=str(data["name"]),
         urdf=_urdf_path(str(data["urdf"]), path),
         base_link=str(data["base_link"]),
-        arm_joints=tuple(arm["joints"]),
+        arm_joints=arm_joints,
         arm_lower=_vector(arm["lower"], n_arm, "arm.lower"),
         arm_upper=_vector(arm["upper"], n_arm, "arm.upper"),
         arm_velocity=_vector(arm["velocity"], n_arm, "arm.velocity"),
         arm_acceleration=_vector(arm["acceleration"], n_arm, "arm.acceleration"),
         rest=_vector(arm["rest"], n_arm, "arm.rest"),
-        arm_drive=Drive(**{k: float(v) for k, v in arm["drive"].items()}),
-        hand_joints=tuple(hand["joints"]),
+        arm_drive=_drive(arm["drive"], "arm.drive"),
+        hand_joints=hand_joints,
         hand_open=_vector(hand["open"], n_hand, "hand.open"),
         hand_closed=_vector(hand["closed"], n_hand, "hand.closed"),
-        hand_drive=Drive(**{k: float(v) for k, v in hand["drive"].items()}),
-        hand_speed=float(hand["speed"]),
+        hand_drive=_drive(hand["drive"], "hand.drive"),
+        hand_drive_scale=_scale(hand.get("drive_scale") or {}, hand_joints),
+        hand_speed=_number(hand["speed"], "hand.speed"),
         synergies=tuple(synergies),
         synergy_directions=np.array(
             [_vector(v, n_hand, f"hand.synergies.{k}") for k, v in synergies.items()]
         ).reshape(len(synergies), n_hand),
         tool_link=str(tool["link"]),
-        tool_pose=_vector(tool["pose"], 7, "tool.pose"),
+        tool_pose=_pose(tool["pose"], "tool.pose"),
         wrist_link=str(data["wrist_link"]),
-        tips=tuple(
-            Tip(str(t["name"]), tuple(t["links"]), tuple(_vector(t["point"], 3, "tips.point").tolist()))
-            for t in data["tips"]
-        ),
+        tips=tuple(_tip(t) for t in data["tips"]),
         opposition=tuple(tuple(int(i) for i in group) for group in data["opposition"]),
-        opening=float(data["opening"]),
-        depth=float(data["depth"]),
-        pads=Pads(**{k: float(v) for k, v in data["pads"]["surface"].items()}),
-        pad_links=tuple(data["pads"]["links"]),
+        opening=_number(data["opening"], "opening"),
+        depth=_number(data["depth"], "depth"),
+        pads=Pads(**{k: _number(v, f"pads.surface.{k}") for k, v in data["pads"]["surface"].items()}),
+        pad_links=_names(data["pads"]["links"], "pads.links"),
         task_mask=_vector(data.get("task_mask", [1.0] * 6), 6, "task_mask"),
-        envelope=tuple(
-            (
-                np.array([*_vector(b["position"], 3, "envelope.position"), 1.0, 0.0, 0.0, 0.0]),
-                tuple(_vector(b["size"], 3, "envelope.size").tolist()),
-            )
-            for b in data["envelope"]
-        ),
-        cameras=data.get("cameras", {}),
+        envelope=tuple(_box(b) for b in data["envelope"]),
+        cameras=data.get("cameras") or {},
         source=path,
     )
-    if not np.all(description.arm_lower < description.arm_upper):
-        raise InputError(f"robot file '{path}': arm.lower is not below arm.upper for every joint")
-    for group in description.opposition:
+
+
+def _check(robot: RobotDescription) -> None:
+    """What is well formed and wrong nevertheless."""
+    if len(set(robot.joints)) < len(robot.joints):
+        raise InputError("a joint is named twice in arm.joints and hand.joints")
+    if not np.all(robot.arm_lower < robot.arm_upper):
+        raise InputError("arm.lower is not below arm.upper for every joint")
+    if not np.all((robot.arm_lower <= robot.rest) & (robot.rest <= robot.arm_upper)):
+        raise InputError("arm.rest is not within arm.lower and arm.upper")
+    if not (np.all(robot.arm_velocity > 0.0) and np.all(robot.arm_acceleration > 0.0)):
+        raise InputError("arm.velocity and arm.acceleration should be positive")
+    if np.array_equal(robot.hand_open, robot.hand_closed):
+        raise InputError("hand.open and hand.closed are the same")
+    if min(robot.hand_speed, robot.opening) <= 0.0:
+        raise InputError("hand.speed and opening should be positive")
+    if np.any(robot.task_mask < 0.0) or not np.any(robot.task_mask > 0.0):
+        raise InputError("task_mask should hold no negative weight and one positive at least")
+    if np.count_nonzero(robot.task_mask) > len(robot.arm_joints):
+        raise InputError(
+            f"an arm of {len(robot.arm_joints)} joints cannot follow {np.count_nonzero(robot.task_mask)} "
+            f"components of a pose: set some of task_mask to 0"
+        )
+    if len(robot.opposition) < 2 or not all(robot.opposition):
+        raise InputError("opposition should name two groups of tips at least, none of them empty")
+    for group in robot.opposition:
         for i in group:
-            if not 0 <= i < len(description.tips):
-                raise InputError(f"robot file '{path}': opposition names tip {i} of {len(description.tips)}")
-    return description
+            if not 0 <= i < len(robot.tips):
+                raise InputError(f"opposition names tip {i} of {len(robot.tips)}")
+
+
+def _drive(values: Any, what: str) -> Drive:
+    known = [f.name for f in fields(Drive)]
+    _check_keys(values, f"{what}.", dict.fromkeys(known[:3]), dict.fromkeys(known[3:]))
+    return Drive(**{k: _number(v, f"{what}.{k}") for k, v in values.items()})
+
+
+def _scale(values: Mapping[str, Any], joints: tuple[str, ...]) -> Array:
+    out = np.ones(len(joints))
+    for name, value in values.items():
+        if name not in joints:
+            raise InputError(f"hand.drive_scale names '{name}'{nearest(str(name), joints)}")
+        out[joints.index(name)] = _number(value, f"hand.drive_scale.{name}")
+    out.setflags(write=False)
+    return out
+
+
+def _tip(values: Any) -> Tip:
+    _check_keys(values, "tips.", dict.fromkeys(("name", "links", "point")))
+    x, y, z = _vector(values["point"], 3, "tips.point").tolist()
+    return Tip(str(values["name"]), _names(values["links"], "tips.links"), (x, y, z))
+
+
+def _box(values: Any) -> tuple[Array, tuple[float, float, float]]:
+    _check_keys(values, "envelope.", dict.fromkeys(("position", "size")), {"rotation": None})
+    position = _vector(values["position"], 3, "envelope.position")
+    rotation = values.get("rotation", [1.0, 0.0, 0.0, 0.0])
+    x, y, z = _vector(values["size"], 3, "envelope.size").tolist()
+    return _pose([*position, *rotation], "envelope.rotation"), (x, y, z)
+
+
+def _names(values: Any, what: str) -> tuple[str, ...]:
+    if not isinstance(values, list) or not values or not all(isinstance(v, str) for v in values):
+        raise InputError(f"{what} should be a list of names, found {values!r}")
+    return tuple(values)
+
+
+def _number(value: Any, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise InputError(f"{what} should be a number, found {value!r}")
+    return float(value)
+
+
+def _pose(values: Any, what: str) -> Array:
+    """A pose ``(7,)`` with its quaternion normalised, for files that give a few digits."""
+    array = np.array(_vector(values, 7, what))
+    length = float(np.linalg.norm(array[3:]))
+    if abs(length - 1.0) > 1e-3:
+        raise InputError(f"{what} should end with a unit quaternion (w x y z), found {values!r}")
+    array[3:] /= length
+    array.setflags(write=False)
+    return array
 
 
 def _vector(values: Any, n: int, what: str) -> Array:
-    array = np.asarray(values, float)
+    try:
+        array = np.array(values, float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
     if array.shape != (n,) or not np.all(np.isfinite(array)):
-        raise ValueError(f"{what} should be {n} finite numbers, found {values!r}")
+        raise InputError(f"{what} should be {n} finite numbers, found {values!r}")
     array.setflags(write=False)
     return array
 
@@ -247,12 +377,12 @@ def _urdf_path(text: str, source: Path) -> Path:
         spec = importlib.util.find_spec(package)
         if spec is None or not spec.submodule_search_locations:
             raise InputError(
-                f"robot file '{source}': its URDF is in the package '{package}', which is not installed: "
+                f"its URDF is in the package '{package}', which is not installed: "
                 f"install it, or copy the file and set 'urdf' to a path of your own"
             )
         path = Path(next(iter(spec.submodule_search_locations))) / "assets" / inner
     else:
         path = (source.parent / text).resolve()
     if not path.is_file():
-        raise InputError(f"robot file '{source}': no URDF at '{path}'")
+        raise InputError(f"no URDF at '{path}'")
     return path

@@ -38,8 +38,8 @@ _PULL = 0.05
 """Share of the way to the preferred posture that one tracking step asks of the null space."""
 _PULL_LIMIT = 0.01
 """Largest such step of any joint, rad."""
-_SWING, _SWING_PER_METRE = 0.5, 10.0
-"""A tracked arm may change its posture by so much at once (rad; rad per metre that the tool goes)."""
+_SWING, _SWING_PER_METRE, _SWING_PER_RADIAN = 0.5, 10.0, 2.0
+"""A tracked arm may change its posture at once by so much: rad, and more for the way that the tool goes."""
 _RESTARTS = 24
 _LOCAL, _BASE = pin.ReferenceFrame.LOCAL, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _XYZQUAT = np.array([0, 1, 2, 4, 5, 6, 3])
@@ -170,8 +170,9 @@ class PinocchioKinematics:
         missed = None if error <= _TOLERANCE else self._missed(q, pose)
         if missed is None:
             return q
-        far = self._error(last, pose)
-        swing = _SWING + _SWING_PER_METRE * float(np.linalg.norm(far[:3])) + 2.0 * float(np.linalg.norm(far[3:]))
+        way = self._error(last, pose)
+        metres, radians = float(np.linalg.norm(way[:3])), float(np.linalg.norm(way[3:]))
+        swing = _SWING + _SWING_PER_METRE * metres + _SWING_PER_RADIAN * radians
         other = self._search(pose, [self._rest], last, best=q)
         if float(np.abs(other - last).max()) > swing:
             raise _unreachable(self.robot.name, pose, *missed, "without swinging into another posture")
