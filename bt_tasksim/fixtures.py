@@ -95,11 +95,11 @@ class Fixture:
         Raises:
             KeyError, TypeError, ValueError: The data lacks something or has something of a wrong kind.
         """
-        pose = tuple(float(v) for v in data.get("pose", (0, 0, 0, 1, 0, 0, 0)))
+        pose = _pose(data.get("pose", (0, 0, 0, 1, 0, 0, 0)))
         boxes = tuple(
             Box(
-                pose=tuple(float(v) for v in (b["pose"] if "pose" in b else (*b["position"], 1, 0, 0, 0))),
-                size=_floats(b["size"], 3),
+                pose=_pose(b["pose"] if "pose" in b else (*b["position"], 1, 0, 0, 0)),
+                size=_size(b["size"]),
                 colour=_floats(b.get("colour", (0.6, 0.5, 0.4)), 3),
                 friction=float(b.get("friction", 0.6)),
                 look=_look(b.get("look", "matte")),
@@ -121,6 +121,20 @@ class Fixture:
             for p in data["places"]
         )
         return cls(str(data["name"]), pose, boxes, places)
+
+
+def _pose(values: Any) -> tuple[float, ...]:
+    out: tuple[float, ...] = _floats(values, 7)
+    if abs(np.linalg.norm(out[3:]) - 1) > 1e-3:
+        raise ValueError(f"a pose is x y z and a unit quaternion w x y z, found {values!r}")
+    return out
+
+
+def _size(values: Any) -> Any:
+    out = _floats(values, 3)
+    if min(out) <= 0:
+        raise ValueError(f"a size is three positive numbers, found {values!r}")
+    return out
 
 
 def _look(name: Any) -> str:

@@ -209,7 +209,14 @@ class ActorConfiguration:
             data["objects"] = tuple(ObjectActor(**o) for o in data["objects"])
             data["fixtures"] = tuple(Fixture.from_data(f) for f in data["fixtures"])
             data["places"] = tuple(
-                PlaceModel(**{**p, "pose": np.array(p["pose"]), "access": np.array(p["access"]), "exit": np.array(p["exit"])})
+                PlaceModel(
+                    **{
+                        **p,
+                        "pose": np.array(p["pose"]),
+                        "access": np.array(p["access"]),
+                        "exit": np.array(p["exit"]),
+                    }
+                )
                 for p in data["places"]
             )
             data["goal"] = Goal(**data["goal"]) if data["goal"] else None

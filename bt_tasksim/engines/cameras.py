@@ -33,7 +33,7 @@ class CameraSpec:
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any], owner: str) -> CameraSpec:
-        """A camera from plain data, as in a robot's file; ``field_of_view`` is in degrees there.
+        """A camera from plain data, as in a robot's file.
 
         Args:
             data: ``position``, ``look_at`` and, if wanted, ``size`` and ``field_of_view``.
@@ -49,7 +49,7 @@ class CameraSpec:
             px, py, pz = (float(v) for v in data["position"])
             tx, ty, tz = (float(v) for v in data["look_at"])
             width, height = (int(v) for v in data.get("size", (640, 480)))
-            angle = math.radians(float(data.get("field_of_view", 45.0)))
+            angle = float(data.get("field_of_view", math.radians(45.0)))
         except (KeyError, TypeError, ValueError) as error:
             reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
             raise InputError(f"{owner}: {reason}") from error
