@@ -1,0 +1,169 @@
+"""Scenes and meshes of one's own: what is read, and what is refused with which sentence."""
+
+import numpy as np
+import pytest
+
+from bt_tasksim.collision import check_configuration
+from bt_tasksim.errors import InputError
+from bt_tasksim.mesh_file import mesh_shape
+from bt_tasksim.meshes import TriangleMesh, circle, cup, prism, rounded_rectangle
+from bt_tasksim.resources import asset
+from bt_tasksim.scene_file import load_scene
+
+
+def save(path, *bodies, drop=0):
+    with path.open("w") as file:
+        start = 1
+        for mesh in bodies:
+            file.writelines(f"v {x} {y} {z}\n" for x, y, z in mesh.vertices)
+            file.writelines(f"f {a} {b} {c}\n" for a, b, c in (mesh.faces + start)[drop:])
+            start += len(mesh.vertices)
+
+
+def block(x, y, z, at=(0, 0, 0)):
+    corners = np.array([[x, y], [-x, y], [-x, -y], [x, -y]]) / 2
+    mesh = prism(corners, z)
+    return TriangleMesh(mesh.vertices + np.array(at), mesh.faces)
+
+
+def write(folder, text):
+    file = folder / "scene.yaml"
+    file.write_text(text)
+    return file
+
+
+def test_the_bundled_example():
+    scene = load_scene(asset("scenes", "bottle_on_table.yaml"))
+    assert scene.name == "bottle_on_table" and scene.goal.place == "mat"
+    world = scene.sample(0)
+    bottle = world.objects[0]
+    assert bottle.size == pytest.approx((0.056, 0.042, 0.146))
+    assert bottle.mass == 0.2 and bottle.friction == 0.6
+    assert bottle.pose[2] == pytest.approx(0.073)
+    check_configuration(world)
+
+
+def test_everything_that_may_be_said(tmp_path):
+    save(tmp_path / "part.obj", block(0.05, 0.04, 0.1))
+    file = write(
+        tmp_path,
+        """
+        robot: panda
+        fixtures: [shelf]
+        objects:
+          cup: on upper_board
+          part: {mesh: part.obj, on: table, at: [0.05, 0.1], area: [0, 0], heading: 0, mass: [0.1, 0.2]}
+          pack: {kind: [box, oval], on: lower_board, size: [[0.06, 0.04, 0.08], [0.07, 0.05, 0.1]]}
+        spots:
+          - {name: mat, on: lower_board, at: [0, -0.1], area: [0.01, 0.02], extent: [0.1, 0.1], heading: 0.2}
+        goal: {object: part, place: mat, relation: stands, position_tolerance: 0.02}
+        knock: part
+        """,
+    )
+    scene = load_scene(file)
+    assert scene.name == "scene" and scene.knock == "part"
+    assert scene.goal.position_tolerance == 0.02
+    world = scene.sample(4)
+    part = next(o for o in world.objects if o.name == "part")
+    assert part.pose[:3] == pytest.approx((0.55, 0.1, 0.05))
+    assert part.size == pytest.approx((0.05, 0.04, 0.1))
+    assert 0.1 <= part.mass <= 0.2
+
+
+@pytest.mark.parametrize(
+    ("objects", "words"),
+    [
+        ("{cup: {on: tabel}}", "did you mean 'table'"),
+        ("{cup: {kind: cupp, on: table}}", "did you mean 'cup'"),
+        ("{cup: {on: table, masss: 1}}", "unknown entry 'masss'; did you mean 'mass'"),
+        ("{cup: {kind: cup}}", "'on' is missing"),
+        ("{cup: 5}", "should be entries"),
+        ("{cup: {on: table, mass: heavy}}", "mass should be a number"),
+        ("{cup: {on: table, mass: 200}}", "between 0.001 and 20 kg"),
+        ("{cup: {on: table, mass: [0.2, 0.1]}}", "the lower one first"),
+        ("{cup: {on: table, mass: 15}}", "denser than any metal"),
+        ("{cup: {on: table, friction: -0.1}}", "friction should be between"),
+        ("{cup: {on: table, friction: .nan}}", "friction should be a number"),
+        ("{box: {on: table, size: [60, 40, 80]}}", "looks like millimetres"),
+        ("{box: {on: table, size: [0.06, 0.04]}}", "size should be 3 numbers"),
+        ("{box: {on: table, size: [0.06, 0, 0.08]}}", "should be positive"),
+        ("{box: {on: table, mesh: a.obj, kind: box}}", "belong to the kind 'mesh'"),
+        ("{part: {kind: mesh, on: table}}", "'mesh' is missing"),
+        ("{part: {mesh: nothing.obj, on: table}}", "no mesh file"),
+        ("{part: {mesh: text.obj, on: table}}", "no solid in it|cannot be read"),
+        ("{part: {mesh: open.obj, on: table}}", "not watertight: 3 of its edges"),
+        ("{part: {mesh: large.obj, on: table}}", "looks like millimetres: set scale: 0.001"),
+        ("{part: {mesh: large.obj, scale: 0.00001, on: table}}", "should be between 0.005 m and 1 m"),
+        ("{part: {mesh: large.obj, scale: -1, on: table}}", "scale should be above 0"),
+        ("{part: {mesh: large.obj, scale: 1, size: [1, 1, 1], on: table}}", "not both"),
+        ("{box: {on: table, at: [0.7, 0]}}", "mm beyond the edge of 'table' along x"),
+        ("{box: {on: lower_board, at: [0.16, 0]}}", "overlap by [0-9.]+ mm at the start"),
+    ],
+)
+def test_bad_objects(tmp_path, objects, words):
+    (tmp_path / "text.obj").write_text("hello\n")
+    save(tmp_path / "open.obj", block(0.05, 0.04, 0.1), drop=1)
+    save(tmp_path / "large.obj", block(50, 40, 100))
+    file = write(tmp_path, f"fixtures: [shelf]\nobjects: {objects}\n")
+    with pytest.raises(InputError, match=words) as caught:
+        load_scene(file)
+    assert str(file) in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "should be entries"),
+        ("[1, 2]", "should be entries"),
+        ("objects: {cup: [", "line"),
+        ("robbot: panda", "did you mean 'robot'"),
+        ("robot: pandaa", "did you mean 'panda'"),
+        ("fixtures: shelf", "fixtures should be a list"),
+        ("fixtures: [shelv]", "did you mean 'shelf'"),
+        ("spots: [{name: a}]", "'on' is missing"),
+        ("spots: [{name: a, on: table, extent: [0, 1]}]", "extent should be above 0"),
+        ("{objects: {cup: on table}, goal: {object: cup}}", "'place' is missing"),
+        ("{objects: {cup: on table}, goal: {object: cup, place: table, relation: stand}}", "'stands'"),
+        ("{objects: {cup: on table}, knock: cap}", "did you mean 'cup'"),
+    ],
+)
+def test_bad_files(tmp_path, text, words):
+    with pytest.raises(InputError, match=words):
+        load_scene(write(tmp_path, text))
+
+
+def test_missing_and_binary_files(tmp_path):
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        load_scene(tmp_path / "none.yaml")
+    file = tmp_path / "scene.yaml"
+    file.write_bytes(b"\xff\xfe\x00\x80")
+    with pytest.raises(InputError, match=r"not text|special characters"):
+        load_scene(file)
+
+
+def test_a_hollow_mesh_says_that_it_is_filled(tmp_path):
+    save(tmp_path / "cup.obj", cup(0.035, 0.1, 0.004, 0.005, segments=24))
+    with pytest.warns(UserWarning, match="has hollows, which its convex hull fills"):
+        geometry = mesh_shape(str(tmp_path / "cup.obj"), (0.07, 0.07, 0.1))
+    assert len(geometry.collision) == 1
+
+
+def test_separate_bodies_keep_hollows(tmp_path):
+    walls = [block(0.06, 0.01, 0.05, (0, y, 0)) for y in (-0.03, 0.03)]
+    save(tmp_path / "two.obj", *walls)
+    geometry = mesh_shape(str(tmp_path / "two.obj"), (0.06, 0.07, 0.05))
+    assert len(geometry.collision) == 2
+    assert geometry.volume == pytest.approx(2 * 0.06 * 0.01 * 0.05)
+
+
+def test_fine_meshes_get_few_corners(tmp_path):
+    save(tmp_path / "can.obj", prism(circle(200) * 0.03, 0.1))
+    corners = mesh_shape(str(tmp_path / "can.obj"), (0.06, 0.06, 0.1)).collision[0].corners()
+    assert len(corners) <= 64
+    assert np.ptp(corners, axis=0) == pytest.approx([0.06, 0.06, 0.1], rel=0.01)
+
+
+def test_inside_out_meshes_are_turned(tmp_path):
+    mesh = prism(rounded_rectangle(0.03, 0.02, 0.005), 0.1)
+    save(tmp_path / "out.obj", TriangleMesh(mesh.vertices, mesh.faces[:, ::-1].copy()))
+    assert mesh_shape(str(tmp_path / "out.obj"), (0.06, 0.04, 0.1)).volume > 0
