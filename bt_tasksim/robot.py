@@ -81,6 +81,8 @@ class RobotDescription:
         synergy_directions: ``(n_synergies, n_hand)`` joint displacements at synergy value 1.
         tool_link: Link that carries the tool frame.
         tool_pose: Pose ``(7,)`` of the tool frame in that link: z approach, y closing axis.
+        closing: Direction ``(3,)`` of the tool's closing axis in which the arm is farthest from its limits
+            when the tool is straight ahead on the base's x axis, robot base frame.
         wrist_link: Link whose incoming joint carries the wrist's force sensor.
         tips: The fingertips.
         opposition: Groups of indices of tips that face each other: an object is held when one of each group
@@ -117,6 +119,7 @@ class RobotDescription:
     synergy_directions: Array
     tool_link: str
     tool_pose: Array
+    closing: Array
     wrist_link: str
     tips: tuple[Tip, ...]
     opposition: tuple[tuple[int, ...], ...]
@@ -202,7 +205,7 @@ _KEYS: Mapping[str, Any] = {
     "base_link": None,
     "arm": dict.fromkeys(("joints", "lower", "upper", "velocity", "acceleration", "rest", "drive")),
     "hand": dict.fromkeys(("joints", "open", "closed", "drive", "speed")),
-    "tool": {"link": None, "pose": None},
+    "tool": {"link": None, "pose": None, "closing": None},
     "wrist_link": None,
     "tips": None,
     "opposition": None,
@@ -264,6 +267,7 @@ def _description(data: Mapping[str, Any], path: Path) -> RobotDescription:
         ).reshape(len(synergies), n_hand),
         tool_link=str(tool["link"]),
         tool_pose=_pose(tool["pose"], "tool.pose"),
+        closing=_vector(tool["closing"], 3, "tool.closing"),
         wrist_link=str(data["wrist_link"]),
         tips=tuple(_tip(t) for t in data["tips"]),
         opposition=tuple(tuple(int(i) for i in group) for group in data["opposition"]),

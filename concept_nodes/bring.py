@@ -14,7 +14,7 @@ from bt_tasksim.parameters import Metres, MetresPerSecond, ObjectName, PlaceName
 from bt_tasksim.planning import Carried, clear_path
 from bt_tasksim.poses import Array
 from bt_tasksim.world import Command, ObjectModel
-from concept_nodes.grasp import resting_place
+from concept_nodes.grasp import neutral_rotation, resting_place
 from concept_nodes.holding import HOLDING, holding, tool_distance
 from concept_nodes.pick import MoveMemory, arrived, miss
 
@@ -110,8 +110,11 @@ class Bring(ConceptModel):
             return poses.pose(position, now[3:]), position
         assert self.to is not None
         frame, rim = destination(seen, self.to)
-        goal = standing_pose(frame, now, model, rim + self.hover)
-        return goal, frame[:3]
+        grip = poses.quat_multiply(poses.quat_conjugate(now[3:]), seen.tool[3:])
+        approach = poses.rotate(seen.tool[3:], np.array([0.0, 0.0, 1.0]))
+        neutral = neutral_rotation(seen, approach, frame[:3])
+        easiest = poses.quat_multiply(neutral, poses.quat_conjugate(grip))
+        return standing_pose(frame, now, model, rim + self.hover, easiest), frame[:3]
 
     def _exits(self, seen: Seen, tool_goal: Array) -> tuple[Array, Array]:
         """Displacements that take the tool out of what it starts in, and out of where it ends."""
@@ -137,15 +140,19 @@ def destination(seen: Seen, name: str) -> tuple[Array, float]:
     return top, 0.0
 
 
-def standing_pose(frame: Array, now: Array, model: ObjectModel, height: float) -> Array:
-    """Pose of an object that stands upright ``height`` above a frame, turned as little as its symmetry allows.
+def standing_pose(
+    frame: Array, now: Array, model: ObjectModel, height: float, towards: Array | None = None
+) -> Array:
+    """Pose of an object that stands upright ``height`` above a frame, turned as its symmetry allows.
 
     Args:
         frame: Pose ``(7,)`` of the place.
         now: Present pose ``(7,)`` of the object.
         model: The object.
         height: Free height below it, metres.
+        towards: Rotation ``(4,)`` of the object that is preferred; by default the present one.
     """
+    towards = now[3:] if towards is None else towards
     position = poses.transform(frame, np.array([0.0, 0.0, height + _half_height(now, model)]))
     turns: list[Array] = []
     if model.cubic:
@@ -162,7 +169,7 @@ def standing_pose(frame: Array, now: Array, model: ObjectModel, height: float) -
             poses.quat_multiply(frame[3:], poses.yaw(2 * np.pi * k / model.symmetry))
             for k in range(model.symmetry)
         ]
-    best = min(turns, key=lambda q: round(float(poses.angle_between(now[3:], q)), 9))
+    best = min(turns, key=lambda q: round(float(poses.angle_between(towards, q)), 9))
     return poses.pose(position, best)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -163,18 +164,19 @@ def grasp_pose(
     """The tool pose ``(7,)`` for a grasp of an object at its estimated pose.
 
     Of the object's grasp axes those count that lie across the approach and fit into the hand; of the tool
-    orientations that they leave, the one that turns the tool least is taken.
+    orientations that they leave, the one nearest to the hand's neutral one there is taken.
     """
     pose, model = seen.object(target), seen.model(target)
     if approach is None:
         place = resting_place(seen, target)
         approach = DOWN if place is None else place.access
     a = np.asarray(approach, float)
+    neutral = neutral_rotation(seen, a, pose[:3])
     best: tuple[float, Array] | None = None
-    for rank, c in enumerate(_closing_axes(seen, pose, model, a, closing)):
+    for rank, c in enumerate(_closing_axes(seen, pose, model, a, neutral, closing)):
         for sign in (1.0, -1.0):
             rotation = poses.frame_from_axes(a, sign * c)
-            cost = float(poses.angle_between(seen.tool[3:], rotation)) + 0.3 * rank
+            cost = float(poses.angle_between(neutral, rotation)) + 0.3 * rank
             if best is None or cost < best[0] - 1e-9:
                 best = (cost, rotation)
     assert best is not None
@@ -184,14 +186,28 @@ def grasp_pose(
     return poses.pose(position, rotation)
 
 
+def neutral_rotation(seen: Seen, approach: Array, position: Array) -> Array:
+    """The tool orientation ``(4,)`` in which the arm is farthest from its joints' limits.
+
+    It is the one that the closing axis of the rest posture has when the arm's base turns to ``position``.
+
+    Args:
+        seen: What is seen.
+        approach: Unit vector ``(3,)`` along which the tool comes, robot base frame.
+        position: Where the tool is going to be, ``(3,)`` metres.
+    """
+    closing = poses.rotate(poses.yaw(math.atan2(position[1], position[0])), seen.robot.closing)
+    return poses.frame_from_axes(approach, closing)
+
+
 def _closing_axes(
-    seen: Seen, pose: Array, model: ObjectModel, approach: Array, closing: Array | None
+    seen: Seen, pose: Array, model: ObjectModel, approach: Array, neutral: Array, closing: Array | None
 ) -> list[Array]:
     upright = poses.rotate(pose[3:], np.array([0.0, 0.0, 1.0]))
     if closing is not None:
         return [poses.rotate(pose[3:], np.asarray(closing, float))]
     if model.symmetry == 0 and abs(float(upright @ approach)) > 0.7:  # any direction across the axis
-        tool_y = poses.rotate(seen.tool[3:], np.array([0.0, 1.0, 0.0]))
+        tool_y = poses.rotate(neutral, np.array([0.0, 1.0, 0.0]))
         across = tool_y - (tool_y @ approach) * approach
         if float(np.linalg.norm(across)) > 0.3:
             return [across / np.linalg.norm(across)]

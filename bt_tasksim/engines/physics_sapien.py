@@ -175,14 +175,16 @@ class SapienPhysics:
         self._joints = [joints[name] for name in robot.joints]
         self._index = np.array([order.index(name) for name in robot.joints])
         n_arm = len(robot.arm_joints)
+        self._stiffness = robot.drive_array("stiffness")
+        self._damping = robot.drive_array("damping")
+        self._limit = robot.drive_array("force_limit")
         for i, joint in enumerate(self._joints):
             drive = robot.arm_drive if i < n_arm else robot.hand_drive
             joint.set_friction(0.1 if i < n_arm else 0.0)
             joint.set_armature([drive.armature])
-            joint.set_drive_properties(drive.stiffness, drive.damping, force_limit=drive.force_limit, mode="force")
-        self._stiffness = np.array([robot.arm_drive.stiffness] * n_arm + [robot.hand_drive.stiffness] * len(robot.hand_joints))
-        self._damping = np.array([robot.arm_drive.damping] * n_arm + [robot.hand_drive.damping] * len(robot.hand_joints))
-        self._limit = np.array([robot.arm_drive.force_limit] * n_arm + [robot.hand_drive.force_limit] * len(robot.hand_joints))
+            joint.set_drive_properties(
+                self._stiffness[i], self._damping[i], force_limit=self._limit[i], mode="force"
+            )
         start = np.array(configuration.joint_position or np.concatenate([robot.rest, robot.hand_open]))
         q = np.zeros(len(order), np.float32)
         q[self._index] = start
