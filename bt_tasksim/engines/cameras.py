@@ -75,8 +75,8 @@ class CameraSpec:
 
 
 CAMERAS: dict[str, CameraSpec] = {
-    "overview": CameraSpec((-0.62, 1.22, 1.02), (0.36, 0.0, 0.24), field_of_view=math.radians(42.0)),
-    "scene": CameraSpec((-0.10, 0.62, 0.95), (0.52, -0.08, 0.17), field_of_view=math.radians(46.0)),
+    "overview": CameraSpec((-0.66, 1.30, 1.16), (0.38, 0.0, 0.30), field_of_view=math.radians(43.0)),
+    "scene": CameraSpec((-0.22, 0.74, 1.16), (0.53, -0.06, 0.29), field_of_view=math.radians(48.0)),
 }
 """Cameras of every scene: one for people, one for perception (RGB-D, fixed beside the robot)."""
 

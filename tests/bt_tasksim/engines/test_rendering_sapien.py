@@ -108,6 +108,9 @@ def test_the_perception_camera_sees_every_place(engine, place):
         engine.reset(world)
         image = engine.render(state_of(world, folded), "perception")
         expected = silhouette(image.camera, world.objects[0])
+        rows, columns = np.nonzero(expected)
+        assert np.min(rows) > 20 and np.max(rows) < 460
+        assert np.min(columns) > 20 and np.max(columns) < 620
         assert np.sum(red_pixels(image) & expected) > 0.85 * np.sum(expected)
 
 
