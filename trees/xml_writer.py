@@ -12,6 +12,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept import ConceptModel, Condition
 from bt_tasksim.errors import InputError
+from bt_tasksim.files import write_text
 from bt_tasksim.parameters import Parameter
 from trees.authoring import check_tree
 from trees.decorators import SubTree
@@ -57,9 +58,7 @@ def save_tree(root: Behaviour, path: str | Path) -> None:
         InputError: The tree has a node outside the subset, or the folder does not exist.
         MachineError: The file cannot be written.
     """
-    from demos_decomp.log_file import write_whole
-
-    write_whole(path, tree_to_xml(root))
+    write_text(path, tree_to_xml(root))
 
 
 def tree_to_xml(root: Behaviour) -> str:
