@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from demos_decomp.log import Utterance
 
@@ -59,6 +59,10 @@ class Check:
         margin = -margin if self.below else margin
         holds, fails = _student(margin), _student(-margin)
         return holds * self.odds / max(holds * self.odds + fails, 1e-300)
+
+    def opposite(self) -> Check:
+        """The claim that this claim is wrong."""
+        return replace(self, below=not self.below, odds=1 / self.odds)
 
     def __bool__(self) -> bool:
         return bool(self.probability > 0.5)

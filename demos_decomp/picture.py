@@ -26,7 +26,7 @@ INK, FAINT, LINE = "#1d232b", "#5b6672", "#cfd6dd"
 
 CARD, GAP_X, GAP_Y, ROW = 330, 36, 34, 17
 MARGIN, LANE, MOST_LANES = 24, 22, 12
-_LETTER = {11: 6.3, 12: 6.9, 13: 7.6, 15: 9.0, 18: 10.6}
+_LETTER = {11: 6.7, 12: 7.3, 13: 7.9, 15: 9.1, 18: 10.9}
 """Pixels that a letter takes at most, on average over a line, by font size."""
 
 

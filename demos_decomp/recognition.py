@@ -24,6 +24,9 @@ SIDEWAYS = 0.015
 CLEARANCE = 0.03
 """Metres that a pick goes where it passes into bring without a bend."""
 
+LONGEST_GAP = 0.6
+"""Seconds without data in which a whole task could pass unseen."""
+
 PICK, PLACE, BRING = (
     tasks_between(before, after)[0]
     for before, after in (
@@ -81,9 +84,13 @@ def _release(shown: Demonstration, motion: Motion, hold: Hold, flights: list[Fli
     spread = 0.002 + motion.opening_noise
     said = spoken_odds(shown.narration, "release", motion.time[since], motion.time[end])
     checks = [Check("hand opens, m", hold.opening.change, 0.006, spread, odds=said)]
+    landed = flights[-1].landed if flights else None
+    falls = landed is not None and not landed
+    if landed is not None and falls:
+        checks.append(landed.opposite())
     stays = np.linalg.norm(motion.objects[name][hold.until, :3] - motion.objects[name][hold.last, :3])
     leaves = np.linalg.norm(motion.hand[hold.until, :3] - motion.hand[hold.last, :3])
-    if leaves > 0.03 and not (flights and flights[-1].landed is not None and not flights[-1].landed):
+    if leaves > 0.03 and not falls:
         checks.append(
             Check(f"{name} stays as the hand leaves, m", float(stays), float(leaves), 0.01, below=True)
         )
@@ -217,5 +224,7 @@ def _task(
     path: Floats | None = None,
 ) -> Task:
     start, end = float(motion.time[first]), float(motion.time[max(first, last)])
+    gap = motion.gap(first, max(first, last))
+    checks = [*checks, Check("longest gap in the data, s", gap, LONGEST_GAP, 0.1, below=True)]
     reasons = tuple(str(check) for check in checks)
     return Task(concept, start, end, confidence(checks), parameters, reasons, path)

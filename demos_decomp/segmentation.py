@@ -16,7 +16,7 @@ from bt_tasksim import poses
 from demos_decomp.evidence import NAMED, Check, spoken_odds
 from demos_decomp.log import Demonstration, Floats
 from demos_decomp.signals import RATE, Motion, Swing, speed, swings
-from demos_decomp.support import half_height, resting_on
+from demos_decomp.support import bin_under, half_height, resting_on
 
 LEAST_SWING = 0.006
 """Smallest change of the hand's opening, metres, that counts as closing or opening."""
@@ -26,6 +26,9 @@ LIFT = 0.008
 
 DROP = 0.025
 """Fall in metres after which an object was let go in the air and not placed."""
+
+PLACED = 3.0
+"""Odds that a person places a thing and does not drop it, where there is no bin to drop it into."""
 
 NEAR = 0.06
 """Largest distance in metres between the tool's origin and the box around what it holds."""
@@ -292,6 +295,8 @@ def _landing(shown: Demonstration, motion: Motion, hold: Hold, after: Floats) ->
     odds = spoken_odds(shown.narration, "place", motion.time[hold.last] - 0.5, motion.time[hold.last])
     if spoken_odds(shown.narration, "release", motion.time[hold.last], motion.time[hold.last]) == NAMED:
         odds = 1.0
+    if bin_under(shown, motion, hold.target, released) is None:
+        odds = max(odds, PLACED)
     spread = 0.004 + 2 * noise
     return Check(f"{hold.target} falls after release, m", drop, DROP, spread, below=True, odds=odds)
 

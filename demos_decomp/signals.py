@@ -29,6 +29,7 @@ class Motion:
         objects: ``(N, 7)`` poses by name.
         noise: Standard deviation in metres of each smoothed object's position, one axis, by name.
         opening_noise: The same of the smoothed opening.
+        sampled: ``(T,)`` times of the recorded samples, seconds.
     """
 
     time: Floats
@@ -37,6 +38,13 @@ class Motion:
     objects: dict[str, Floats]
     noise: dict[str, float]
     opening_noise: float
+    sampled: Floats
+
+    def gap(self, first: int, last: int) -> float:
+        """Longest time in seconds without a sample, of those that touch a span of indices."""
+        start, end = np.searchsorted(self.sampled, [self.time[first], self.time[last]])
+        steps = np.diff(self.sampled[max(start - 1, 0) : end + 1])
+        return float(steps.max()) if len(steps) else 0.0
 
     def at(self, seconds: float) -> int:
         """Index of the sample nearest to a time."""
@@ -64,6 +72,7 @@ def evenly_sampled(demonstration: Demonstration) -> Motion:
         objects={name: _smooth_poses(_resample(time, track, grid)) for name, track in tracks.items()},
         noise={name: left_noise(track[:, :3], rate) for name, track in tracks.items()},
         opening_noise=left_noise(demonstration.hand_opening[:, None], rate),
+        sampled=time,
     )
 
 

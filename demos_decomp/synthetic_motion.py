@@ -100,7 +100,8 @@ class Hand:
         distance = float(np.linalg.norm(pose[:3] - self.pose[:3]))
         turn = float(poses.angle_between(self.pose[3:], pose[3:]))
         duration = self.pace * hurry * (0.45 + 1.6 * distance + 0.2 * turn)
-        start = self.clock - overlap * duration if self.strokes else self.clock
+        moves = any(stroke.pose is not None for stroke in self.strokes)
+        start = self.clock - (overlap * duration if moves else 0.0)
         self.strokes.append(Stroke(start, duration, pose=pose))
         self.pose, self.clock = pose, start + duration
         return self.clock

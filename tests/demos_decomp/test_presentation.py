@@ -1,0 +1,100 @@
+"""The text table and the picture of the graph."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from defusedxml import ElementTree
+
+from bt_tasksim.errors import InputError
+from demos_decomp.decompose import decompose_log
+from demos_decomp.graph import build_graph
+from demos_decomp.log import Log
+from demos_decomp.picture import picture, write_picture
+from demos_decomp.synthetic import make
+from demos_decomp.table import described, nearest_way, text_table
+from demos_decomp.tasks import Task
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def found():
+    return decompose_log(
+        Log("synthetic", tuple(make("shelf_to_shelf", i, name=f"{i:03d}")[0] for i in range(3)))
+    )
+
+
+def texts_inside(svg):
+    """All texts, after a check that each lies inside the picture, as wide as a wide font would set it."""
+    root = ElementTree.fromstring(svg)
+    width, height = float(root.get("width")), float(root.get("height"))
+    found = []
+    for text in root.iter(f"{SVG}text"):
+        size, x, y = float(text.get("font-size")), float(text.get("x")), float(text.get("y"))
+        long = 0.6 * size * len(text.text or "")
+        left = {"start": x, "middle": x - long / 2, "end": x - long}[text.get("text-anchor")]
+        assert left >= -1, text.text
+        assert left + long <= width + 1, text.text
+        assert size <= y <= height, text.text
+        found.append(text.text)
+    return found
+
+
+def test_one_line_a_task(found):
+    lines = text_table(found.tasks).splitlines()
+    assert len(lines) == 5
+    assert len({len(line) for line in lines}) == 1
+    assert "grasp    cup  from the front" in lines[0]
+    assert "up 0.0" in lines[1]
+    assert "off upper_board" in lines[1]
+    assert "to lower_board" in lines[2]
+    assert "onto lower_board" in lines[3]
+    assert text_table([]) == ""
+
+
+def test_directions_in_words():
+    assert nearest_way([0.1, 0, 0.9]) == "up"
+    assert nearest_way([-1, 0.1, 0]) == "back"
+    assert described("grasp", {"approach": [0, 0, -1]}) == "from above"
+    assert (
+        described("bring", {"position": [0.1, -0.001, 0.3], "via": []}) == "to (0.10, 0.00, 0.30) m, straight"
+    )
+    assert described("bring", {"to": "tray", "via": [[0, 0, 0]]}) == "to tray, 1 via-point"
+    assert described("release", {"into": "bin"}) == "into bin"
+
+
+def test_a_picture_shows_every_task_and_clips_no_label(found):
+    texts = texts_inside(picture(found.graph, "shelf"))
+    for name in found.graph:
+        assert name in texts
+    assert "to: lower_board" in texts
+    assert any("seen in 3 of 3" in text for text in texts)
+    assert any("±" in text for text in texts)
+
+
+def test_long_names_markup_and_many_demonstrations_are_drawn():
+    name = "a <very> & long name " * 8
+    task = Task("wipe", 0.0, 4000.0, 0.5, {"target": name, "on": name, "press": np.float64(3)})
+    graph = build_graph({f"{name} {i}": [task, dataclasses.replace(task, concept="dry")] for i in range(30)})
+    texts = texts_inside(picture(graph, name * 4))
+    assert "and 18 more" in texts
+
+
+def test_unordered_tasks_stand_side_by_side():
+    cup, plate = (Task("grasp", 0.0, 1.0, 1.0, {"target": name}) for name in ("cup", "plate"))
+    graph = build_graph({"a": [cup, plate], "b": [plate, cup]})
+    assert {"grasp cup", "grasp plate"} <= set(texts_inside(picture(graph)))
+
+
+def test_an_empty_graph_says_so():
+    assert "No task was recognised." in texts_inside(picture(build_graph({"a": []})))
+
+
+def test_written_whole(found, tmp_path):
+    write_picture(found.graph, tmp_path / "a.svg", "title")
+    ElementTree.parse(tmp_path / "a.svg")
+    with pytest.raises(InputError, match="does not exist"):
+        write_picture(found.graph, tmp_path / "none" / "a.svg")
