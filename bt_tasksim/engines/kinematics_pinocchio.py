@@ -34,9 +34,9 @@ _LENGTH = 0.3
 _DAMPING = 1e-7
 _TRACK, _HARDER, _SETTLE = 6, 200, 60
 """Iterations of a tracking step, of a solve that tries hard, and of settling into the preferred posture."""
-_PULL = 0.05
+_PULL = 0.1
 """Share of the way to the preferred posture that one tracking step asks of the null space."""
-_PULL_LIMIT = 0.01
+_PULL_LIMIT = 0.03
 """Largest such step of any joint, rad."""
 _SWING, _SWING_PER_METRE, _SWING_PER_RADIAN = 0.5, 10.0, 2.0
 """A tracked arm may change its posture at once by so much: rad, and more for the way that the tool goes."""
@@ -374,7 +374,12 @@ def _se3(pose: Array) -> Any:
 
 def _full_model(robot: RobotDescription) -> tuple[Any, Array]:
     """The whole robot with its root at the base link, and where each of ``robot.joints`` is in its ``q``."""
-    model = pin.buildModelFromUrdf(str(robot.urdf))
+    try:
+        model = pin.buildModelFromUrdf(str(robot.urdf))
+    except (ValueError, RuntimeError) as error:
+        raise InputError(
+            f"robot file '{robot.source}': the URDF '{robot.urdf}' is unreadable: {error}"
+        ) from error
     base = model.frames[_body(model, robot.base_link, robot)]
     if base.parentJoint != 0:
         raise InputError(f"robot file '{robot.source}': base_link '{robot.base_link}' moves with a joint")
