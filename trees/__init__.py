@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         timeout,
     )
     from trees.equality import same_tree
-    from trees.xml_reader import load_tree, tree_from_xml
+    from trees.xml_reader import load_tree, scene_of_tree, tree_from_xml
     from trees.xml_writer import node_models, save_tree, tree_to_xml
 
 _HOMES = {
@@ -44,7 +44,7 @@ _HOMES = {
         "subtree",
         "check_tree",
     ),
-    "trees.xml_reader": ("load_tree", "tree_from_xml"),
+    "trees.xml_reader": ("load_tree", "tree_from_xml", "scene_of_tree"),
     "trees.xml_writer": ("save_tree", "tree_to_xml", "node_models"),
     "trees.equality": ("same_tree",),
 }
@@ -66,6 +66,7 @@ __all__ = [
     "check_tree",
     "load_tree",
     "tree_from_xml",
+    "scene_of_tree",
     "save_tree",
     "tree_to_xml",
     "node_models",

@@ -78,6 +78,23 @@ def tree_from_xml(text: str | bytes, nodes: Nodes | None = None, *, source: str 
     return _Reader(parse(text, source), {**catalogue(), **(nodes or {})}, source).tree()
 
 
+def scene_of_tree(path: str | Path) -> str | None:
+    """Name or file of the scene that a tree file names for itself (``<root scene="...">``), or None.
+
+    Args:
+        path: The file.
+
+    Raises:
+        InputError: The file is missing or malformed.
+    """
+    try:
+        with open(path, "rb") as file:
+            content = file.read(LARGEST + 1)
+    except OSError as error:
+        raise InputError(f"cannot read the tree file '{path}': {error.strerror or error}") from error
+    return parse(content, str(path)).attributes.get("scene")
+
+
 @dataclass(frozen=True)
 class _Scope:
     """The subtree that is being put in place: its ID, its parameters, and the IDs of those around it."""
@@ -117,7 +134,7 @@ class _Reader:
             )
         if version != "4":
             raise self._wrong(root, f'BTCPP_format should be "4", found "{version}"')
-        self._only(root, ("BTCPP_format", "main_tree_to_execute"))
+        self._only(root, ("BTCPP_format", "main_tree_to_execute", "scene"))
         models = 0
         for child in root.children:
             match child.tag:

@@ -47,31 +47,34 @@ TAKEN = {*KINDS, *OUTSIDE, *CATEGORIES}
 FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def save_tree(root: Behaviour, path: str | Path) -> None:
+def save_tree(root: Behaviour, path: str | Path, *, scene: str | None = None) -> None:
     """Write a tree to a file; it is written whole or not at all.
 
     Args:
         root: The tree's root.
         path: The file.
+        scene: Name or file of the scene that it is meant for.
 
     Raises:
         InputError: The tree has a node outside the subset, or the folder does not exist.
         MachineError: The file cannot be written.
     """
-    write_text(path, tree_to_xml(root))
+    write_text(path, tree_to_xml(root, scene=scene))
 
 
-def tree_to_xml(root: Behaviour) -> str:
+def tree_to_xml(root: Behaviour, *, scene: str | None = None) -> str:
     """A tree as XML of BehaviorTree.CPP v4, with the models of its leaves.
 
     Args:
         root: The tree's root.
+        scene: Name or file of the scene that it is meant for; an attribute of ``<root>`` that
+            BehaviorTree.CPP passes over.
 
     Raises:
         InputError: The tree is no good (`check_tree`), or has a node outside the subset.
     """
     check_tree(root)
-    return _Writer(root).document()
+    return _Writer(root).document(scene)
 
 
 def node_models(leaves: Mapping[str, Leaf]) -> str:
@@ -115,12 +118,13 @@ class _Writer:
         self.trees: dict[str, str] = {}
         self.ids: dict[tuple[str, str], str] = {}
 
-    def document(self) -> str:
+    def document(self, scene: str | None = None) -> str:
         main = self._identify(self.root.name)
         body = self._body(self.root)
+        named = "" if scene is None else f" scene={_quote(scene, 'scene')}"
         parts = [
             '<?xml version="1.0" encoding="UTF-8"?>',
-            f'<root BTCPP_format="4" main_tree_to_execute={_quote(main, main)}>',
+            f'<root BTCPP_format="4" main_tree_to_execute={_quote(main, main)}{named}>',
             _tree(main, body),
             *(_tree(name, text) for name, text in self.trees.items()),
         ]

@@ -1,0 +1,51 @@
+"""bt-tasksim: one behaviour tree, authored or taken from a demonstration, trained, simulated and run on a robot.
+
+Names are imported when they are first used: ``import bt_tasksim`` loads no simulator and no learning library.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bt_tasksim.concept import ConceptModel, Condition
+    from bt_tasksim.engines.registry import EngineOptions
+    from bt_tasksim.errors import BtTasksimError, InputError, MachineError
+    from bt_tasksim.runner import Result, Runner, run
+    from bt_tasksim.scene import Goal, ObjectSpec, Scene, SpotSpec
+
+_HOMES = {
+    "bt_tasksim.concept": ("ConceptModel", "Condition"),
+    "bt_tasksim.engines.registry": ("EngineOptions",),
+    "bt_tasksim.errors": ("BtTasksimError", "InputError", "MachineError"),
+    "bt_tasksim.runner": ("Result", "Runner", "run"),
+    "bt_tasksim.scene": ("Goal", "ObjectSpec", "Scene", "SpotSpec"),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "BtTasksimError",
+    "ConceptModel",
+    "Condition",
+    "EngineOptions",
+    "Goal",
+    "InputError",
+    "MachineError",
+    "ObjectSpec",
+    "Result",
+    "Runner",
+    "Scene",
+    "SpotSpec",
+    "run",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'bt_tasksim' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,340 @@
+"""The command ``bt-tasksim``.
+
+Bad input ends with one sentence and exit code 2, a failing machine with 1, an interrupt with 130. Everything
+heavy is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from bt_tasksim.errors import BtTasksimError, InputError
+
+DEMO_LOG = ("demonstrations", "shelf_to_shelf", "00.h5")
+DEMO_SEED = 7
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Args:
+        arguments: Words of the command line; by default those of the process.
+
+    Returns:
+        The exit code.
+    """
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    try:
+        return int(options.command(options) or 0)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    except InputError as error:
+        print(f"bt-tasksim: {error}", file=sys.stderr)
+        return 2
+    except BtTasksimError as error:
+        print(f"bt-tasksim: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 1
+    except OSError as error:
+        where = f" '{error.filename}'" if error.filename else ""
+        print(f"bt-tasksim: {error.strerror or error}{where}", file=sys.stderr)
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="bt-tasksim",
+        description="Behaviour trees of robot tasks: authored or taken from demonstrations, simulated, judged.",
+    )
+    parser.set_defaults(command=lambda options: parser.print_help())
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
+
+    def add(name: str, run: Callable[[argparse.Namespace], Any], text: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=text, description=text)
+        command.set_defaults(command=run)
+        return command
+
+    demo = add("demo", _demo, "A shipped demonstration becomes a tree, and the tree runs with rendering.")
+    demo.add_argument("--out", type=Path, default=Path("runs/demo"), help="folder for the results")
+
+    decompose = add("decompose", _decompose, "Turn a demonstration log into tasks, a graph and a tree.")
+    decompose.add_argument("log", metavar="LOG", help="an HDF5 log, a ManiSkill trajectory, or a run's log")
+    decompose.add_argument("--episode", metavar="K", help="one demonstration of the log, by number or name")
+    decompose.add_argument("--json", type=Path, metavar="F", help="write tasks and graph as JSON")
+    decompose.add_argument("--xml", type=Path, metavar="F", help="write the tree")
+    decompose.add_argument("--picture", type=Path, metavar="F.svg", help="write the graph as a picture")
+
+    show = add("show", _show, "Print a tree; or write its picture.")
+    _tree_arguments(show, seed=False)
+    show.add_argument("--picture", type=Path, metavar="F.svg", help="write a picture")
+    show.add_argument("--xml", type=Path, metavar="F", help="write the tree as XML")
+
+    run = add("run", _run, "Run a tree once.")
+    _tree_arguments(run)
+    _engine_arguments(run)
+    run.add_argument("--out", type=Path, metavar="DIR", help="folder for result, log, pictures and report")
+    run.add_argument("--video", action="store_true", help="draw the run: run.mp4, and in the report")
+
+    replay = add("replay", _replay, "Run a logged run again and compare, state by state.")
+    replay.add_argument("run", metavar="RUN", type=Path, help="a run's folder or its run.h5")
+
+    evaluate = add("evaluate", _evaluate, "Run a tree on many seeded draws and count.")
+    _tree_arguments(evaluate)
+    _engine_arguments(evaluate)
+    evaluate.add_argument("--episodes", type=_count, default=100, metavar="N", help="default 100")
+    evaluate.add_argument("--workers", type=_count, default=1, metavar="W", help="worker processes, default 1")
+    evaluate.add_argument("--json", type=Path, metavar="F", help="write everything as JSON")
+
+    bench = add("bench", _bench, "Measure speed, as ratios to peers in one run.")
+    bench.add_argument("--json", type=Path, metavar="F", help="write the numbers as JSON")
+    bench.add_argument("--quick", action="store_true", help="fewer repetitions")
+    return parser
+
+
+def _tree_arguments(parser: argparse.ArgumentParser, seed: bool = True) -> None:
+    parser.add_argument("tree", metavar="TREE", help="a scenario, a .py file with build(), or an .xml file")
+    parser.add_argument("--scene", metavar="S", help="a scenario's scene, or a .yaml file; default: the tree's own")
+    parser.add_argument("--robot", metavar="R", help="panda, xarm7_ability, ... or a .yaml file")
+    if seed:
+        parser.add_argument("--seed", type=_seed, default=0, metavar="S", help="(first) seed, default 0")
+
+
+def _engine_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--engines", default="sapien", metavar="E", help="default sapien")
+    parser.add_argument("--perception", default="state", metavar="P", help="state (default) or camera")
+    parser.add_argument(
+        "--noise", default="fine", metavar="N", help="error of the estimate: fine (default), none, original, hard"
+    )
+
+
+def _count(text: str) -> int:
+    value = _whole(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"should be a positive whole number, found '{text}'")
+    return value
+
+
+def _seed(text: str) -> int:
+    value = _whole(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"should be zero or a positive whole number, found '{text}'")
+    return value
+
+
+def _whole(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"should be a whole number, found '{text}'") from None
+
+
+def _options(options: argparse.Namespace, rendering: bool = False) -> Any:
+    from bt_tasksim.engines.registry import EngineOptions
+
+    return EngineOptions(
+        engines=options.engines, perception=options.perception, noise=options.noise, rendering=rendering
+    )
+
+
+# ---- commands ---------------------------------------------------------------------------------------------
+
+
+def _demo(options: argparse.Namespace) -> int:
+    from bt_tasksim.engines.registry import EngineOptions
+    from bt_tasksim.report.tree_picture import tree_text
+    from bt_tasksim.resources import asset
+    from demos_decomp import decompose_log, open_log, text_table
+    from trees.from_graph import tree_from_graph
+
+    log = asset(*DEMO_LOG)
+    print(f"1. a demonstration (synthetic): {'/'.join(DEMO_LOG)}")
+    found = decompose_log(open_log(log), None)
+    print(text_table(found.tasks))
+    tree = tree_from_graph(found.graph, "shelf to shelf")
+    print("\n2. the tree it became")
+    print(tree_text(tree))
+    print("\n3. the tree runs on the Panda in SAPIEN")
+    from trees.load import load_source
+
+    scene = load_source("shelf_to_shelf").scene
+    rendering = _can_render()
+    result, paths = _run_tree(tree, scene, DEMO_SEED, EngineOptions(rendering=rendering), options.out, "shelf_to_shelf")
+    print(f"{_summary(result)}; results: {_shown(paths)}")
+    return 0 if result.success else 1
+
+
+def _decompose(options: argparse.Namespace) -> int:
+    from bt_tasksim.files import write_text
+    from demos_decomp import decompose_log, graph_to_json, open_log, text_table, write_picture
+    from trees.from_graph import tree_from_graph
+    from trees.xml_writer import save_tree
+
+    log = open_log(options.log)
+    with _progress("decomposing", None):
+        found = decompose_log(log, options.episode)
+    print(text_table(found.tasks))
+    wrote = []
+    if options.json:
+        content = {"tasks": [t.to_json() for t in found.tasks], "graph": graph_to_json(found.graph)}
+        write_text(options.json, json.dumps(content, indent=2) + "\n")
+        wrote.append(options.json)
+    if options.xml:
+        tree = tree_from_graph(found.graph, Path(options.log).stem)
+        save_tree(tree, options.xml, scene=_scene_of_log(log))
+        wrote.append(options.xml)
+    if options.picture:
+        write_picture(found.graph, options.picture)
+        wrote.append(options.picture)
+    if wrote:
+        print("wrote " + ", ".join(str(p) for p in wrote))
+    return 0
+
+
+def _scene_of_log(log: Any) -> str | None:
+    """The scenario whose name the demonstrations carry as their task, if there is one."""
+    from trees.load import scenarios
+
+    tasks = {d.task for d in log.demonstrations}
+    name = next(iter(tasks)) if len(tasks) == 1 else ""
+    return name if name in scenarios() else None
+
+
+def _show(options: argparse.Namespace) -> int:
+    from bt_tasksim.files import write_text
+    from bt_tasksim.report.tree_picture import tree_svg, tree_text
+    from trees.load import load_source
+    from trees.xml_writer import save_tree
+
+    source = load_source(options.tree, options.robot, options.scene)
+    tree = source.build()
+    print(tree_text(tree))
+    if options.picture:
+        write_text(options.picture, tree_svg(tree))
+        print(f"wrote {options.picture}")
+    if options.xml:
+        save_tree(tree, options.xml, scene=source.scene.name if options.scene is None else options.scene)
+        print(f"wrote {options.xml}")
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    from trees.load import load_source
+
+    source = load_source(options.tree, options.robot, options.scene)
+    engines = _options(options, rendering=options.video)
+    folder = options.out or Path("runs") / f"{source.name}-{options.seed}"
+    result, paths = _run_tree(source.build(), source.scene, options.seed, engines, folder, source.name)
+    print(f"{_summary(result)}; results: {_shown(paths)}")
+    return 0 if result.success else 1
+
+
+def _run_tree(tree: Any, scene: Any, seed: int, engines: Any, folder: Path, name: str) -> tuple[Any, Any]:
+    from bt_tasksim.report.write import write_run
+    from bt_tasksim.runner import Runner
+
+    runner = Runner(tree, scene, engines)
+    with _progress("running", None):
+        return write_run(folder, runner, seed, scenario=name)
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from bt_tasksim.replay import replay
+
+    with _progress("replaying", None):
+        found = replay(options.run)
+    print(found.why)
+    return 0 if found.identical else 1
+
+
+def _evaluate(options: argparse.Namespace) -> int:
+    from bt_tasksim.files import write_text
+    from bt_tasksim.training.evaluation import Job, evaluate
+
+    job = Job(options.tree, options.scene, options.robot, _options(options))
+    seeds = range(options.seed, options.seed + options.episodes)
+    with _progress("episodes", options.episodes) as advance:
+        found = evaluate(job, seeds, options.workers, lambda outcome: advance(outcome.success))
+    content = found.to_json()
+    if options.json:
+        write_text(options.json, json.dumps(content, indent=2) + "\n")
+    low, high = content["confidence_interval"]
+    print(
+        f"{found.scenario} on {found.robot} ({found.engines}, {found.perception}): "
+        f"{found.successes} of {content['episodes']} ({100 * content['success_rate']:.1f} %, "
+        f"95 % interval {100 * low:.1f} to {100 * high:.1f}), "
+        f"{content['control_steps'] / max(found.seconds, 1e-9):.0f} control steps/s"
+    )
+    for reason, count in content["failures"].items():
+        worst = next(o for o in found.outcomes if o.reason == reason)
+        print(f"  {count:4d} x {reason}, such as seed {worst.seed}: {worst.why}")
+    if options.json:
+        print(f"wrote {options.json}")
+    return 0
+
+
+def _bench(options: argparse.Namespace) -> int:
+    try:
+        from benchmarks.speed import main as measure
+    except ImportError as error:
+        raise InputError(f"the benchmarks stand beside the packages in a checkout: {error}") from None
+    return int(measure(quick=options.quick, json_path=options.json))
+
+
+# ---- what commands share ----------------------------------------------------------------------------------
+
+
+def _summary(result: Any) -> str:
+    word = "SUCCESS" if result.success else f"FAILURE ({result.reason})"
+    return f"{word}: {result.why} ({result.sim_time:.1f} s simulated, {result.wall_time:.1f} s)"
+
+
+def _shown(paths: Any) -> str:
+    folder = Path(paths.folder)
+    return str(folder / "report.html")
+
+
+def _can_render() -> bool:
+    from bt_tasksim.engines.rendering_sapien import device_missing
+
+    why = device_missing()
+    if why:
+        print(f"(without rendering: {why})", file=sys.stderr)
+    return not why
+
+
+@contextmanager
+def _progress(what: str, total: int | None) -> Iterator[Callable[[bool], None]]:
+    """A progress bar on a terminal, shown from the second second on; nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda success: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns: list[Any] = [TextColumn("{task.description}"), BarColumn()]
+    if total is not None:
+        columns += [MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn()]
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=total, rate="")
+        counts = [0, 0]
+
+        def advance(success: bool) -> None:
+            counts[0] += success
+            counts[1] += 1
+            bar.update(task, advance=1, rate=f"{100 * counts[0] / counts[1]:.0f} % success")
+
+        yield advance
+
+
+if __name__ == "__main__":
+    sys.exit(main())

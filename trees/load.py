@@ -1,0 +1,203 @@
+"""Trees by name: a scenario, a Python file with ``build()``, or an XML file; each with its scene."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept import ConceptModel, Condition
+from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.scene import Scene
+from trees.authoring import check_tree
+
+
+@dataclass(frozen=True)
+class TreeSource:
+    """Where a tree comes from.
+
+    Attributes:
+        name: The scenario's name or the file's.
+        build: Builds a fresh tree.
+        scene: The scene it runs in.
+    """
+
+    name: str
+    build: Callable[[], Behaviour]
+    scene: Scene
+
+
+def scenarios() -> list[str]:
+    """Names of the ready-made scenarios."""
+    import trees.scenarios
+
+    return sorted(m.name for m in pkgutil.iter_modules(trees.scenarios.__path__))
+
+
+def load_source(tree: str, robot: str | None = None, scene: str | None = None) -> TreeSource:
+    """The tree and scene that a name stands for.
+
+    Args:
+        tree: Name of a scenario, or path of a ``.py`` or ``.xml`` file.
+        robot: Name or file of the robot; by default the scene's own.
+        scene: Name of a scenario whose scene is taken, or path of a scene file; by default the tree's own.
+
+    Raises:
+        InputError: There is no such tree or scene, or the file is no good.
+    """
+    path = Path(tree)
+    if path.suffix == ".py":
+        module = _module(path)
+        build = _function(module, "build", path)
+        own = getattr(module, "scene", None)
+        source = TreeSource(
+            path.stem, build, _scene(scene, robot) if scene or own is None else _made(own, robot, path)
+        )
+    elif path.suffix == ".xml":
+        source = _from_xml(path, robot, scene)
+    else:
+        if tree not in scenarios():
+            hint = nearest(tree, scenarios())
+            raise InputError(f"no scenario '{tree}'{hint} (or give a .py or .xml file)")
+        module = importlib.import_module(f"trees.scenarios.{tree}")
+        source = TreeSource(tree, module.build, _scene(scene or tree, robot))
+    root = source.build()
+    if not isinstance(root, Behaviour):
+        raise InputError(f"'{tree}': build() should return a py_trees behaviour, found {type(root).__name__}")
+    check_tree(root)
+    check_names(root, source.scene)
+    return source
+
+
+def check_names(root: Behaviour, scene: Scene) -> None:
+    """Check that every object and place that the tree names is in the scene.
+
+    Raises:
+        InputError: One is not; says which leaf names it and what there is.
+    """
+    from bt_tasksim.fixtures import load_fixture
+
+    objects = set(scene.objects)
+    places = {p.name for f in scene.fixtures for p in load_fixture(f).places} | {s.name for s in scene.spots}
+    for leaf in root.iterate():
+        if not isinstance(leaf, ConceptModel | Condition):
+            continue
+        for key, parameter in leaf.parameters().items():
+            value = leaf.values[key]
+            if value is None:
+                continue
+            if parameter.quantity.kind == "object" and value not in objects:
+                raise InputError(
+                    f"leaf '{leaf.name}': no object '{value}' in the scene '{scene.name}'"
+                    f"{nearest(value, objects)}"
+                )
+            if parameter.quantity.kind == "place" and value not in places | objects:
+                raise InputError(
+                    f"leaf '{leaf.name}': no place '{value}' in the scene '{scene.name}'"
+                    f"{nearest(value, places | objects)}"
+                )
+
+
+def names_in(root: Behaviour) -> tuple[set[str], set[str]]:
+    """Objects and places that a tree names."""
+    objects: set[str] = set()
+    places: set[str] = set()
+    for leaf in root.iterate():
+        if isinstance(leaf, ConceptModel | Condition):
+            for key, parameter in leaf.parameters().items():
+                if leaf.values[key] is not None and parameter.quantity.kind == "object":
+                    objects.add(leaf.values[key])
+                if leaf.values[key] is not None and parameter.quantity.kind == "place":
+                    places.add(leaf.values[key])
+    return objects, places
+
+
+def _from_xml(path: Path, robot: str | None, scene: str | None) -> TreeSource:
+    from trees.xml_reader import load_tree, scene_of_tree
+
+    root = load_tree(path)
+    named = scene or scene_of_tree(path)
+    if named is None:
+        fitting = [name for name in scenarios() if _fits(root, _scene(name, robot))]
+        if not fitting:
+            objects, places = names_in(root)
+            raise InputError(
+                f"'{path}' does not say in which scene it runs, and no ready-made one has "
+                f"{', '.join(sorted(objects | places))}: name one with --scene"
+            )
+        named = fitting[0]
+    elif named.endswith((".yaml", ".yml")) and scene is None:
+        named = str(path.parent / named)
+    return TreeSource(path.stem, lambda: load_tree(path), _scene(named, robot))
+
+
+def _fits(root: Behaviour, scene: Scene) -> bool:
+    try:
+        check_names(root, scene)
+    except InputError:
+        return False
+    return True
+
+
+def _scene(name: str | None, robot: str | None) -> Scene:
+    if name is None:
+        raise InputError("the tree's file has no scene() and none was named: add one, or use --scene")
+    if name.endswith((".yaml", ".yml")):
+        from bt_tasksim.scene_file import load_scene
+
+        scene = load_scene(name)
+        return scene if robot is None else scene.with_robot(robot)
+    if name not in scenarios():
+        raise InputError(f"no scene '{name}'{nearest(name, scenarios())} (or give a .yaml file)")
+    module = importlib.import_module(f"trees.scenarios.{name}")
+    made: Scene = module.scene() if robot is None else module.scene(robot)
+    return made
+
+
+def _made(build: Any, robot: str | None, path: Path) -> Scene:
+    made = build() if robot is None else build(robot)
+    if not isinstance(made, Scene):
+        raise InputError(f"'{path}': scene() should return a Scene, found {type(made).__name__}")
+    return made
+
+
+def _module(path: Path) -> Any:
+    if not path.is_file():
+        raise InputError(f"there is no tree file '{path}'")
+    spec = importlib.util.spec_from_file_location(f"_tree_{path.stem}", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except InputError:
+        raise
+    except Exception as error:
+        line = _line_in(error, path)
+        raise InputError(f"'{path}'{line}: {type(error).__name__}: {error}") from error
+    return module
+
+
+def _line_in(error: BaseException, path: Path) -> str:
+    if isinstance(error, SyntaxError):
+        return f", line {error.lineno}"
+    trace, line = error.__traceback__, ""
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(path):
+            line = f", line {trace.tb_lineno}"
+        trace = trace.tb_next
+    return line
+
+
+def _function(module: Any, name: str, path: Path) -> Any:
+    function = getattr(module, name, None)
+    if not callable(function):
+        raise InputError(f"'{path}' has no function {name}(): define one that returns the tree's root")
+    return function
