@@ -8,7 +8,7 @@ found.graph                 # networkx.DiGraph, see demos_decomp.graph
 
 from demos_decomp.decompose import decompose, decompose_log
 from demos_decomp.graph import build_graph, graph_to_json, in_order
-from demos_decomp.log import Demonstration, Log, Surface, Track, Utterance, Video
+from demos_decomp.log import Demonstration, Log, Surface, Track, Utterance, Video, surface_of
 from demos_decomp.log_file import read_log, write_log
 from demos_decomp.picture import picture, write_picture
 from demos_decomp.readers import open_log, register
@@ -28,6 +28,7 @@ __all__ = [
     "Demonstration",
     "Track",
     "Surface",
+    "surface_of",
     "Utterance",
     "Video",
     "build_graph",

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.world import PlaceModel
 
 Floats = NDArray[np.float64]
 
@@ -57,6 +58,18 @@ class Surface:
     fixture: str | None = None
     centre: Floats = field(default_factory=lambda: np.zeros(2))
     height: float = 0.0
+
+
+def surface_of(place: PlaceModel) -> Surface:
+    """A place of a scene, as a log holds it."""
+    return Surface(
+        pose=np.array(place.pose, dtype=np.float64),
+        extent=np.array(place.extent, dtype=np.float64),
+        kind=place.kind,
+        fixture=place.fixture or None,
+        centre=np.array(place.centre, dtype=np.float64),
+        height=place.height,
+    )
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bt_tasksim import poses
 from bt_tasksim.fixtures import load_fixture
-from demos_decomp.log import Floats, Surface
+from demos_decomp.log import Floats, Surface, surface_of
 from demos_decomp.synthetic_motion import Hand
 
 DOWN = np.array([0.0, 0, -1])
@@ -20,14 +20,7 @@ KINDS = ("box", "cylinder", "oval", "diamond")
 def places_of(*fixtures: str) -> dict[str, Surface]:
     """The places of bundled fixtures, by name."""
     return {
-        place.name: Surface(
-            pose=np.array(place.pose),
-            extent=np.array(place.extent),
-            kind=place.kind,
-            fixture=None if place.fixture == "table" else place.fixture,
-            centre=np.array(place.centre),
-            height=place.height,
-        )
+        place.name: surface_of(place)
         for fixture in fixtures
         for place in load_fixture(fixture).place_models()
     }
