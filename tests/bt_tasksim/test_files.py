@@ -1,0 +1,146 @@
+"""Files appear whole or not at all."""
+
+import errno
+import os
+import resource
+import signal
+
+import pytest
+
+from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.files import check_folder, whole_file, whole_folder, write_bytes, write_text
+
+
+def names(folder):
+    return sorted(p.name for p in folder.iterdir())
+
+
+@pytest.fixture
+def small_disk():
+    """Files can hold no more than 4096 bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+def test_text_and_bytes(tmp_path):
+    write_text(tmp_path / "a.txt", "7 °")
+    write_bytes(tmp_path / "b", b"\x00\x01")
+    assert (tmp_path / "a.txt").read_bytes() == "7 °".encode()
+    assert (tmp_path / "b").read_bytes() == b"\x00\x01"
+    write_text(tmp_path / "a.txt", "new")
+    assert (tmp_path / "a.txt").read_text() == "new"
+    assert names(tmp_path) == ["a.txt", "b"]
+
+
+def test_permissions_are_the_users_own(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_text(tmp_path / "a", "x")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a").stat().st_mode & 0o777 == 0o640
+
+
+def test_the_unfinished_file_keeps_the_suffix_and_the_folder(tmp_path):
+    with whole_file(tmp_path / "run.mp4") as path:
+        assert path.suffix == ".mp4" and path.parent == tmp_path and not path.exists()
+        path.write_bytes(b"x")
+    assert names(tmp_path) == ["run.mp4"]
+
+
+@pytest.mark.parametrize(
+    "error", [KeyboardInterrupt, ValueError, OSError(errno.ENOSPC, "No space left on device")]
+)
+def test_after_any_failure_the_old_file_is_there(tmp_path, error):
+    (tmp_path / "a").write_text("old")
+    expected = MachineError if isinstance(error, OSError) else error
+    with pytest.raises(expected), whole_file(tmp_path / "a") as path:
+        path.write_text("half")
+        raise error
+    assert names(tmp_path) == ["a"] and (tmp_path / "a").read_text() == "old"
+
+
+def test_full_disk(tmp_path, small_disk):
+    (tmp_path / "a").write_text("old")
+    with pytest.raises(MachineError, match=r"cannot write '.*a': File too large; nothing was written"):
+        write_bytes(tmp_path / "a", bytes(100_000))
+    assert names(tmp_path) == ["a"] and (tmp_path / "a").read_text() == "old"
+
+
+def test_full_disk_in_a_folder(tmp_path, small_disk):
+    with pytest.raises(MachineError, match="File too large"), whole_folder(tmp_path / "run") as folder:
+        (folder / "good").write_text("x")
+        (folder / "large").write_bytes(bytes(100_000))
+    assert names(tmp_path) == []
+
+
+def test_no_folder_to_write_in(tmp_path):
+    with pytest.raises(InputError, match="does not exist"):
+        write_text(tmp_path / "no" / "a", "x")
+    with pytest.raises(InputError, match="is a folder"):
+        write_text(tmp_path, "x")
+
+
+def test_a_block_that_writes_nothing(tmp_path):
+    with pytest.raises(MachineError), whole_file(tmp_path / "a"):
+        pass
+    assert names(tmp_path) == []
+
+
+def test_folder(tmp_path):
+    with whole_folder(tmp_path / "run") as folder:
+        (folder / "a").write_text("1")
+        assert not (tmp_path / "run").exists()
+    assert names(tmp_path) == ["run"] and names(tmp_path / "run") == ["a"]
+
+
+def test_folder_replaces_only_what_it_may(tmp_path):
+    with whole_folder(tmp_path / "run", {"a", "b"}) as folder:
+        (folder / "a").write_text("1")
+    with whole_folder(tmp_path / "run", {"a", "b"}) as folder:
+        (folder / "b").write_text("2")
+    assert names(tmp_path / "run") == ["b"]
+    (tmp_path / "run" / "thesis.tex").write_text("mine")
+    with pytest.raises(InputError, match=r"it holds other things, such as 'thesis.tex'"):
+        check_folder(tmp_path / "run", {"a", "b"})
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match="there is a file of this name"):
+        check_folder(tmp_path / "file")
+
+
+def test_something_that_came_meanwhile_is_kept(tmp_path):
+    with pytest.raises(InputError), whole_folder(tmp_path / "run", {"a"}) as folder:
+        (folder / "a").write_text("new")
+        (tmp_path / "run").mkdir()
+        (tmp_path / "run" / "thesis.tex").write_text("mine")
+    assert names(tmp_path) == ["run"] and names(tmp_path / "run") == ["thesis.tex"]
+
+
+def test_interrupted_folder_leaves_the_old_one(tmp_path):
+    with whole_folder(tmp_path / "run", {"a"}) as folder:
+        (folder / "a").write_text("old")
+    with pytest.raises(KeyboardInterrupt), whole_folder(tmp_path / "run", {"a"}) as folder:
+        (folder / "a").write_text("new")
+        raise KeyboardInterrupt
+    assert names(tmp_path) == ["run"] and (tmp_path / "run" / "a").read_text() == "old"
+
+
+def test_rename_that_fails_half_way_brings_the_old_folder_back(tmp_path, monkeypatch):
+    with whole_folder(tmp_path / "run", {"a"}) as folder:
+        (folder / "a").write_text("old")
+    rename, calls = os.rename, []
+
+    def failing(source, target):
+        calls.append(source)
+        if len(calls) == 2:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        rename(source, target)
+
+    monkeypatch.setattr(os, "rename", failing)
+    with pytest.raises(MachineError, match="No space left"), whole_folder(tmp_path / "run", {"a"}) as folder:
+        (folder / "a").write_text("new")
+    assert names(tmp_path) == ["run"] and (tmp_path / "run" / "a").read_text() == "old"
