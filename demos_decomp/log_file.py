@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +11,7 @@ import h5py
 import numpy as np
 
 from bt_tasksim.errors import InputError, MachineError, nearest
+from bt_tasksim.files import write_bytes
 from demos_decomp.log import MOST_SAMPLES, Demonstration, Log, Surface, Track, Utterance, Video, checked_log
 
 FORMAT = "bt-tasksim log"
@@ -64,42 +63,7 @@ def write_log(path: str | Path, log: Log) -> None:
         file.attrs["description"] = log.description
         for demonstration in log.demonstrations:
             _write_demonstration(file.create_group(f"demonstrations/{demonstration.name}"), demonstration)
-    write_whole(path, buffer.getvalue())
-
-
-def write_whole(path: str | Path, content: bytes | str) -> None:
-    """Writes a file so that it is complete or, after any failure, as it was before.
-
-    Args:
-        path: Where to; an existing file is replaced.
-        content: Bytes, or text to be written as UTF-8.
-
-    Raises:
-        InputError: The folder does not exist.
-        MachineError: The disk is full or not writable.
-    """
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"cannot write '{path}': the folder '{path.parent}' does not exist; make it first")
-    data = content.encode() if isinstance(content, str) else content
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
-        temporary = None
-    except OSError as error:
-        raise MachineError(
-            f"cannot write '{path}': {error.strerror or error}; nothing was written"
-        ) from error
-    finally:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                os.unlink(temporary)
+    write_bytes(path, buffer.getvalue())
 
 
 @contextlib.contextmanager
@@ -125,12 +89,6 @@ def opened(path: Path) -> Any:
             raise
         reason = " ".join(str(error).split())
         raise InputError(f"'{path}' is cut off or damaged ({reason}); record or copy it again") from error
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _check_conventions(file: Any, path: Path) -> None:

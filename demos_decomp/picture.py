@@ -10,8 +10,8 @@ from typing import Any
 import networkx as nx
 import numpy as np
 
+from bt_tasksim.files import write_text
 from demos_decomp.graph import in_order
-from demos_decomp.log_file import write_whole
 from demos_decomp.tasks import plain
 
 COLOURS = {
@@ -84,7 +84,7 @@ def write_picture(graph: nx.DiGraph[str], path: str | Path, title: str = "") -> 
         InputError: The folder does not exist.
         MachineError: The disk is full or not writable.
     """
-    write_whole(path, picture(graph, title))
+    write_text(path, picture(graph, title))
 
 
 def _layers(graph: nx.DiGraph[str]) -> list[list[str]]:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bt_tasksim.errors import InputError, MachineError
 from demos_decomp.log import Log, Utterance, Video
-from demos_decomp.log_file import read_log, write_log, write_whole
+from demos_decomp.log_file import read_log, write_log
 from demos_decomp.readers import open_log, readers, register
 from demos_decomp.synthetic import make
 
@@ -212,7 +212,7 @@ def test_nothing_is_written_of_a_faulty_log_or_into_no_folder(tmp_path, log):
     with pytest.raises(InputError):
         write_log(tmp_path / "a.h5", Log("human", ()))
     with pytest.raises(InputError, match=r"folder .* does not exist"):
-        write_whole(tmp_path / "no" / "a.txt", "a")
+        write_log(tmp_path / "no" / "a.h5", log)
     assert os.listdir(tmp_path) == []
 
 
