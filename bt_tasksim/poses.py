@@ -22,8 +22,8 @@ Array = Any
 _EPS = 1e-12
 
 
-def _single(*arrays: Array) -> bool:
-    return all(type(a) is np.ndarray and a.ndim == 1 for a in arrays)
+def _single(a: Array) -> bool:
+    return type(a) is np.ndarray and a.ndim == 1
 
 
 def _mul(a: list[float], b: list[float]) -> list[float]:
@@ -50,7 +50,7 @@ def _rot(q: list[float], v: list[float]) -> list[float]:
 
 def quat_multiply(a: Array, b: Array) -> Array:
     """Hamilton product ``a * b`` of quaternions ``(..., 4)``."""
-    if _single(a, b):
+    if _single(a) and _single(b):
         return np.array(_mul(a.tolist(), b.tolist()))
     xp = array_namespace(a, b)
     aw, ax, ay, az = (a[..., i] for i in range(4))
@@ -74,7 +74,7 @@ def quat_conjugate(q: Array) -> Array:
 
 def rotate(q: Array, v: Array) -> Array:
     """Vectors ``v (..., 3)`` rotated by unit quaternions ``q (..., 4)``; batch dimensions broadcast."""
-    if _single(q, v):
+    if _single(q) and _single(v):
         return np.array(_rot(q.tolist(), v.tolist()))
     xp = array_namespace(q, v)
     w, x, y, z = (q[..., i] for i in range(4))
@@ -88,7 +88,7 @@ def rotate(q: Array, v: Array) -> Array:
 
 def multiply(a: Array, b: Array) -> Array:
     """Composition ``a * b`` of poses ``(..., 7)``: the frame ``b``, given in ``a``, in ``a``'s parent."""
-    if _single(a, b):
+    if _single(a) and _single(b):
         al, bl = a.tolist(), b.tolist()
         r = _rot(al[3:], bl[:3])
         return np.array([al[0] + r[0], al[1] + r[1], al[2] + r[2], *_mul(al[3:], bl[3:])])
@@ -111,6 +111,10 @@ def inverse(pose: Array) -> Array:
 
 def transform(pose: Array, point: Array) -> Array:
     """Points ``(..., 3)`` given in the frame ``pose (..., 7)``, in its parent."""
+    if _single(pose) and _single(point):
+        p = pose.tolist()
+        r = _rot(p[3:], point.tolist())
+        return np.array([p[0] + r[0], p[1] + r[1], p[2] + r[2]])
     return pose[..., :3] + rotate(pose[..., 3:], point)
 
 
@@ -166,7 +170,7 @@ def interpolate(a: Array, b: Array, fraction: Array) -> Array:
         b: Poses ``(..., 7)`` at fraction 1.
         fraction: ``(...)``, usually in [0, 1].
     """
-    if _single(a, b) and np.ndim(fraction) == 0:
+    if _single(a) and _single(b) and np.ndim(fraction) == 0:
         f = float(fraction)
         al, bl = a.tolist(), b.tolist()
         qa = al[3:]
@@ -202,6 +206,9 @@ def frame_from_axes(z: Array, y: Array) -> Array:
 
 def cross(a: Array, b: Array) -> Array:
     """Cross product of vectors ``(..., 3)``."""
+    if _single(a) and _single(b):
+        (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+        return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
     xp = array_namespace(a, b)
     return xp.stack(
         [

@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +69,8 @@ class RobotDescription:
         arm_velocity: Velocity limits ``(n_arm,)`` rad/s.
         arm_acceleration: Acceleration limits ``(n_arm,)`` rad/s^2.
         rest: Rest posture ``(n_arm,)``, which the inverse kinematics prefers.
+        posture: Weights ``(n_arm,)`` of the pull towards the rest posture, by joint; those of a redundant arm
+            that would rather swing its elbow out than bend keep it in its plane.
         arm_drive: Gains.
         hand_joints: Names of all hand joints, mimics included.
         hand_open: Positions ``(n_hand,)`` at closure 0.
@@ -108,6 +110,7 @@ class RobotDescription:
     arm_velocity: Array
     arm_acceleration: Array
     rest: Array
+    posture: Array
     arm_drive: Drive
     hand_joints: tuple[str, ...]
     hand_open: Array
@@ -157,10 +160,17 @@ class RobotDescription:
 
     def closure(self, hand_position: Array) -> Array:
         """Closure ``(...)`` in [0, 1] of hand joint positions ``(..., n_hand)``: the least-squares fit."""
-        span = self.hand_closed - self.hand_open
+        weights = self._closure_weights
+        if type(hand_position) is np.ndarray and hand_position.ndim == 1:
+            return np.float64(min(max(float((hand_position - self.hand_open) @ weights), 0.0), 1.0))
         xp = array_namespace(hand_position)
-        weights = xp.asarray(span / float(span @ span))
-        return xp.clip(xp.sum((hand_position - xp.asarray(self.hand_open)) * weights, axis=-1), 0.0, 1.0)
+        fit = xp.sum((hand_position - xp.asarray(self.hand_open)) * xp.asarray(weights), axis=-1)
+        return xp.clip(fit, 0.0, 1.0)
+
+    @cached_property
+    def _closure_weights(self) -> Array:
+        span = self.hand_closed - self.hand_open
+        return span / float(span @ span)
 
 
 def load_robot(name: str) -> RobotDescription:
@@ -217,6 +227,7 @@ _KEYS: Mapping[str, Any] = {
 _OPTIONAL: Mapping[str, Any] = {
     "task_mask": None,
     "cameras": None,
+    "arm": {"posture": None},
     "hand": {"synergies": None, "drive_scale": None},
 }
 
@@ -254,6 +265,7 @@ def _description(data: Mapping[str, Any], path: Path) -> RobotDescription:
         arm_velocity=_vector(arm["velocity"], n_arm, "arm.velocity"),
         arm_acceleration=_vector(arm["acceleration"], n_arm, "arm.acceleration"),
         rest=_vector(arm["rest"], n_arm, "arm.rest"),
+        posture=_vector(arm.get("posture", [1.0] * n_arm), n_arm, "arm.posture"),
         arm_drive=_drive(arm["drive"], "arm.drive"),
         hand_joints=hand_joints,
         hand_open=_vector(hand["open"], n_hand, "hand.open"),

@@ -76,7 +76,8 @@ class CameraSpec:
 
 CAMERAS: dict[str, CameraSpec] = {
     "overview": CameraSpec((-0.66, 1.30, 1.16), (0.38, 0.0, 0.30), field_of_view=math.radians(43.0)),
-    "scene": CameraSpec((-0.22, 0.74, 1.16), (0.53, -0.06, 0.29), field_of_view=math.radians(48.0)),
+    # To the left of the workspace, so that the arm in its rest posture hides nothing of table and shelf.
+    "scene": CameraSpec((0.05, 0.95, 1.25), (0.53, -0.05, 0.27), field_of_view=math.radians(46.0)),
 }
 """Cameras of every scene: one for people, one for perception (RGB-D, fixed beside the robot)."""
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import eigenpy
 import numpy as np
 import pinocchio as pin
 
@@ -159,7 +160,7 @@ class PinocchioKinematics:
         """Joints ``(n_arm,)`` for the tool pose, continuous with the last solution where that is possible."""
         pose = _se3(tool)
         last = self._goal[: self._n]
-        pull = _PULL * (self._rest - last)
+        pull = _PULL * self.robot.posture * (self._rest - last)
         largest = float(np.abs(pull).max())
         if largest > _PULL_LIMIT:
             pull *= _PULL_LIMIT / largest
@@ -271,8 +272,8 @@ class PinocchioKinematics:
         """Damped least squares with a null-space step: ``z + J^T (J J^T + damping)^-1 (e - J z)``."""
         A = J @ J.T + damping * self._eye
         if pull is None:
-            return J.T @ np.linalg.solve(A, e)
-        return pull + J.T @ np.linalg.solve(A, e - J @ pull)
+            return J.T @ eigenpy.LLT(A).solve(e)
+        return pull + J.T @ eigenpy.LLT(A).solve(e - J @ pull)
 
     def _saturate(self, q: Array, J: Array, e: Array, damping: float, pull: Array | None) -> Array:
         """The step's result within the limits: joints that pass one are set on it, the worst first."""

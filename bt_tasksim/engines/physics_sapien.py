@@ -25,9 +25,12 @@ FALLING = (0.2, 3.0)
 """Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are `FINE` times shorter: a tilted object that
 lands spins so fast that it would be millimetres deep within one step of a hundredth of a second."""
 FINE = 5
-TOUCH_FORCE = 0.05
-"""N from which a contact counts as a touch."""
+TOUCH_DISTANCE = 0.002
+"""Metres of separation beyond which a contact of PhysX carries no force and counts for nothing."""
+SUPPORT_DISTANCE = 5e-4
+"""Metres of separation within which two bodies touch."""
 
+_ROBOT = ("arm", "hand")
 _ARM_BIT = 1 << 8  # shapes that share a bit of group 2 do not collide with each other
 _HAND_BIT = 1 << 9
 
@@ -58,6 +61,7 @@ class SapienPhysics:
         self._physx = physx
         self.robot = robot
         self._scene: Any = None
+        self._builder: Any = None
 
     # ---- building ---------------------------------------------------------------------------------------
 
@@ -141,15 +145,19 @@ class SapienPhysics:
         self._scene.add_entity(entity)
         self._keep.append(entity)
 
+    def _articulation_builder(self) -> Any:
+        """The robot's builder; reading the URDF takes milliseconds, so it is read once an engine."""
+        if self._builder is None:
+            loader = self._scene.create_urdf_loader()
+            loader.fix_root_link = True
+            self._builder = loader.parse(str(self.robot.urdf))[0][0]
+            for link in self._builder.link_builders:
+                link.visual_records.clear()
+        return self._builder
+
     def _build_robot(self, configuration: ActorConfiguration) -> None:
         robot = self.robot
-        loader = self._scene.create_urdf_loader()
-        loader.fix_root_link = True
-        builder = loader.parse(str(robot.urdf))[0][0]
-        for link in builder.link_builders:
-            link.visual_records.clear()
-        builder.disable_self_collisions = False
-        articulation = builder.build()
+        articulation = self._articulation_builder().set_scene(self._scene).build()
         self._articulation = articulation
         links = {link.name: link for link in articulation.get_links()}
         self._links = links
@@ -238,11 +246,12 @@ class SapienPhysics:
         # The drives' own law; SAPIEN reports no effort of drives.
         effort = self._stiffness * (self._target - q) + self._damping * (self._velocity_target - v)
         np.clip(effort, -self._limit, self._limit, out=effort)
-        tool = _array(self._tool_link.entity_pose)
-        if not self._tool_identity:
-            tool = poses.multiply(tool, self.robot.tool_pose)
+        tool = self._tool()
         tips = np.array(
-            [poses.transform(_array(link.entity_pose), point) for link, point in zip(self._tip_links, self._tip_points, strict=True)]
+            [
+                poses.transform(_array(link.entity_pose), point)
+                for link, point in zip(self._tip_links, self._tip_points, strict=True)
+            ]
         )
         objects = np.array([_array(body.entity_pose) for body in self._objects]).reshape(-1, 7)
         velocities = np.array(
@@ -272,12 +281,17 @@ class SapienPhysics:
         SAPIEN reports the force that the wrist's parent exerts on it in the link's frame; at rest the
         world's force on the hand is its opposite. Moments are moved to the tool origin: t' = t + r x f.
         """
-        incoming = -self._articulation.get_link_incoming_joint_forces()[self._wrist].astype(np.float64)
-        wrist = _array(self._wrist_link.entity_pose)
-        q_inv = tool[3:] * _CONJUGATE
-        force = poses.rotate(wrist[3:], incoming[:3])
-        torque = poses.rotate(wrist[3:], incoming[3:]) + poses.cross(wrist[:3] - tool[:3], force)
-        return np.concatenate([poses.rotate(q_inv, force), poses.rotate(q_inv, torque)])
+        incoming = (-self._articulation.get_link_incoming_joint_forces()[self._wrist].astype(np.float64))
+        in_wrist = poses.inverse(_array(self._wrist_link.entity_pose))
+        local = poses.multiply(in_wrist, tool)  # the tool in the wrist's frame
+        back = local[3:] * _CONJUGATE
+        force = incoming[:3]
+        torque = incoming[3:] - np.array(poses.cross(local[:3], force))
+        return np.concatenate([poses.rotate(back, force), poses.rotate(back, torque)])
+
+    def _tool(self) -> Array:
+        tool = _array(self._tool_link.entity_pose)
+        return tool if self._tool_identity else poses.multiply(tool, self.robot.tool_pose)
 
     def _read_contacts(self) -> None:
         n = len(self._objects)
@@ -294,42 +308,41 @@ class SapienPhysics:
             if kind_a == "base" or kind_b == "base":
                 continue
             points = contact.points
-            separation = min(point.separation for point in points)
+            separation = min([point.separation for point in points])
+            if separation > TOUCH_DISTANCE:
+                continue
             if -separation > deepest:
                 deepest = -separation
                 self.deepest_pair = (a.entity.name, b.entity.name, -separation, self._time)
-            if separation > 0.002:
-                if kind_a != "object" and kind_b != "object":
-                    continue
+            if kind_b in _ROBOT:
+                a, b, kind_a, kind_b, i, j, sign = b, a, kind_b, kind_a, j, i, -rate
+            else:
+                sign = rate
+            if kind_a not in _ROBOT:  # what stands on what needs no forces
+                if separation < SUPPORT_DISTANCE:
+                    if kind_a == "object":
+                        support.add((i, j))
+                    if kind_b == "object":
+                        support.add((j, i))
+                continue
             x = y = z = 0.0
             for point in points:
                 px, py, pz = point.impulse.tolist()
                 x, y, z = x + px, y + py, z + pz
-            x, y, z = x * rate, y * rate, z * rate
-            size = math.sqrt(x * x + y * y + z * z)
-            if kind_b in ("hand", "arm"):  # the impulse acts on the first body
-                a, b, kind_a, kind_b, i, j, x, y, z = b, a, kind_b, kind_a, j, i, -x, -y, -z
+            x, y, z = x * sign, y * sign, z * sign  # the impulse acts on the first body
             if kind_a == "hand" and i >= 0:
                 tip_force[i] += (x, y, z)
-                if kind_b == "hand" and j >= 0:
-                    tip_force[j] -= (x, y, z)
-            if kind_b == "object" and kind_a in ("hand", "arm"):
-                hand_force[j] += size
+            if kind_b == "hand" and j >= 0:
+                tip_force[j] -= (x, y, z)
+            if kind_b == "object":
+                hand_force[j] += math.sqrt(x * x + y * y + z * z)
                 distance[j] = min(distance[j], max(separation, 0.0))
-            elif size > TOUCH_FORCE or separation < 5e-4:
-                if kind_a == "object":
-                    support.add((i, j))
-                if kind_b == "object":
-                    support.add((j, i))
         self._tip_force = tip_force
         self._hand_force, self._hand_distance, self._support = hand_force, distance, support
         self._penetration = deepest
 
     def hidden(self) -> Hidden:
         """See `PhysicsEngine.hidden`."""
-        tool = _array(self._tool_link.entity_pose)
-        if not self._tool_identity:
-            tool = poses.multiply(tool, self.robot.tool_pose)
         support = np.zeros((len(self._objects), self._n_bodies), bool)
         for i, j in self._support:
             support[i, j] = True
@@ -343,7 +356,7 @@ class SapienPhysics:
             hand_distance=np.array(self._hand_distance),
             support=support,
             penetration=np.float64(self._penetration),
-            tool_pose=tool,
+            tool_pose=self._tool(),
         )
 
     # ---- disturbance ------------------------------------------------------------------------------------
