@@ -71,21 +71,23 @@ def whole_folder(path: str | Path, names: Collection[str] = ()) -> Iterator[Path
     """A folder to fill inside the ``with`` block, which becomes ``path`` at its end.
 
     Args:
-        path: Where to. An existing folder is replaced if it holds nothing but ``names``.
+        path: Where to; folders above it are made. An existing folder is replaced if it holds nothing but
+            ``names``.
         names: Names of files that may be lost.
 
     Yields:
         An empty folder beside it.
 
     Raises:
-        InputError: The folder above does not exist, or the path holds something else.
+        InputError: A folder above is a file, or the path holds something else.
         MachineError: The disk is full or not writable.
     """
     path = Path(os.path.abspath(path))
     check_folder(path, names)
     unfinished, before = _beside(path), _beside(path)
+    made = [folder for folder in path.parents if not folder.exists()]
     try:
-        unfinished.mkdir()
+        unfinished.mkdir(parents=True)
         yield unfinished
         check_folder(path, names)
         for file in unfinished.rglob("*"):
@@ -96,6 +98,10 @@ def whole_folder(path: str | Path, names: Collection[str] = ()) -> Iterator[Path
         os.rename(unfinished, path)
     except (ConnectionError, TimeoutError):
         raise
+    except MachineError as error:
+        if str(unfinished) not in str(error):
+            raise
+        raise MachineError(str(error).replace(str(unfinished), str(path))) from error
     except OSError as error:
         raise _cannot_write(path, error) from error
     finally:
@@ -103,16 +109,21 @@ def whole_folder(path: str | Path, names: Collection[str] = ()) -> Iterator[Path
             os.rename(before, path)
         for rest in (unfinished, before):
             shutil.rmtree(rest, ignore_errors=True)
+        for folder in made:
+            with contextlib.suppress(OSError):  # it is needed if it is not empty
+                folder.rmdir()
 
 
 def check_folder(path: str | Path, names: Collection[str] = ()) -> None:
     """Check that `whole_folder` may write here, before there is anything to write.
 
     Raises:
-        InputError: The folder above does not exist, or the path is a file or holds more than ``names``.
+        InputError: The path or a folder above it is a file, or it holds more than ``names``.
     """
     path = Path(os.path.abspath(path))
-    _check_parent(path)
+    above = next(folder for folder in path.parents if folder.exists())
+    if not above.is_dir():
+        raise InputError(f"cannot write a folder '{path}': '{above}' is a file; choose another name")
     if path.is_symlink() or (path.exists() and not path.is_dir()):
         raise InputError(f"cannot write a folder '{path}': there is a file of this name; choose another name")
     others = sorted(p.name for p in path.iterdir() if p.name not in names) if path.is_dir() else []

@@ -265,6 +265,7 @@ def about(result: Result, runner: Runner, scenario: str) -> dict[str, Any]:
         "engines": options.engines,
         "perception": options.label,
         "options": dataclasses.asdict(options),
+        "longest": runner.longest,
         "policies": result.policies,
         "control_steps": result.control_steps,
         "control_frequency": result.configuration.control_frequency,

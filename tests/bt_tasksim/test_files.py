@@ -98,6 +98,18 @@ def test_folder(tmp_path):
     assert names(tmp_path) == ["run"] and names(tmp_path / "run") == ["a"]
 
 
+def test_folders_above_are_made_and_unmade(tmp_path):
+    with whole_folder(tmp_path / "runs" / "today" / "run") as folder:
+        (folder / "a").write_text("1")
+    assert names(tmp_path / "runs" / "today" / "run") == ["a"]
+    with pytest.raises(KeyboardInterrupt), whole_folder(tmp_path / "others" / "today" / "run") as folder:
+        (folder / "a").write_text("1")
+        raise KeyboardInterrupt
+    assert names(tmp_path) == ["runs"]
+    with pytest.raises(InputError, match="is a file"):
+        check_folder(tmp_path / "runs" / "today" / "run" / "a" / "b")
+
+
 def test_folder_replaces_only_what_it_may(tmp_path):
     with whole_folder(tmp_path / "run", {"a", "b"}) as folder:
         (folder / "a").write_text("1")

@@ -1,0 +1,136 @@
+"""A run's folder: everything that is left of a run, written whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.files import whole_folder, write_text
+from bt_tasksim.report.report import NO_VIDEO, write_report
+from bt_tasksim.report.run_log import RunRecorder, about
+from bt_tasksim.report.tree_picture import tree_svg
+from bt_tasksim.report.video import VideoRecorder
+from bt_tasksim.runner import Result, Runner, Step
+from bt_tasksim.scene import Scene
+from demos_decomp.log import Video
+
+RESULT, LOG, TREE, VIDEO, REPORT = "result.json", "run.h5", "tree.svg", "run.mp4", "report.html"
+FILES = (RESULT, LOG, TREE, VIDEO, REPORT)
+"""Names of the files in a run's folder, which a later run may replace."""
+
+
+@dataclass(frozen=True)
+class RunFiles:
+    """What was written.
+
+    Attributes:
+        folder: The run's folder.
+        paths: The files in it, by name.
+        remarks: A sentence for each file that could not be made.
+    """
+
+    folder: Path
+    paths: dict[str, Path]
+    remarks: tuple[str, ...] = ()
+
+
+def write_run(
+    folder: str | Path,
+    runner: Runner,
+    seed: int = 0,
+    *,
+    scenario: str = "",
+    stream: str = "evaluation",
+    every: int = 2,
+    no_video: str = NO_VIDEO,
+    watch: Callable[[Step], None] | None = None,
+) -> tuple[Result, RunFiles]:
+    """Run a tree once and keep everything of it in a folder; film it if the runner's options say rendering.
+
+    Args:
+        folder: Where to; an existing folder is replaced if it holds nothing but a run's files.
+        runner: The runner.
+        seed: Seed of the draw.
+        scenario: What is run: a scenario's name or the tree's file.
+        stream: Stream of draws.
+        every: Draw every so many ticks.
+        no_video: One sentence for the report where the run is not filmed: why.
+        watch: Called after every tick, to show progress.
+
+    Returns:
+        What became of the run, and what was written.
+
+    Raises:
+        InputError: The folder is no good, or the scene.
+        MachineError: An engine failed, or the disk is full or not writable.
+    """
+    with whole_folder(folder, FILES) as inside:
+        recorder, film = RunRecorder(runner, scenario), None
+        if runner.options.rendering:
+            try:
+                film = VideoRecorder(inside / VIDEO, every=every)
+            except MachineError as error:
+                no_video = f"No video: {error}."
+        callbacks = [c for c in (recorder, film, watch) if c is not None]
+
+        def record(step: Step) -> None:
+            for callback in callbacks:
+                callback(step)
+
+        with contextlib.nullcontext() if film is None else film:
+            result = runner.run(seed, stream, record)
+        remarks = _fill(inside, result, recorder, film, no_video)
+    paths = {name: Path(folder) / name for name in FILES if (Path(folder) / name).exists()}
+    return result, RunFiles(Path(folder), paths, remarks)
+
+
+def filming_runner(tree: Behaviour, scene: Scene, options: EngineOptions | None = None) -> tuple[Runner, str]:
+    """A runner that can draw; where this machine cannot, one that does not.
+
+    Args:
+        tree: The tree's root.
+        scene: The scene.
+        options: Which engines.
+
+    Returns:
+        The runner, and one sentence that says why it cannot draw; empty where it can.
+
+    Raises:
+        InputError: Tree, scene or options are no good.
+        MachineError: Another engine cannot start.
+    """
+    options = options or EngineOptions()
+    try:
+        return Runner(tree, scene, dataclasses.replace(options, rendering=True)), ""
+    except MachineError as error:
+        if options.perception == "camera":
+            raise
+        without = Runner(tree, scene, dataclasses.replace(options, rendering=False))
+        return without, f"No video: {error}."
+
+
+def _fill(
+    inside: Path, result: Result, recorder: RunRecorder, film: VideoRecorder | None, no_video: str
+) -> tuple[str, ...]:
+    """Write all files but the video; returns remarks on those that cannot be."""
+    tree = recorder.runner.tree
+    remarks = [no_video] if film is None and no_video != NO_VIDEO else []
+    video = None if film is None else Video(VIDEO, film.fps or 20.0)
+    run = recorder.demonstration(result, video)
+    text = json.dumps(about(result, recorder.runner, recorder.scenario), indent=2, allow_nan=False)
+    write_text(inside / RESULT, text + "\n")
+    write_text(inside / TREE, tree_svg(tree, recorder.last_statuses()))
+    write_report(inside / REPORT, run, tree, None if film is None else inside / VIDEO, no_video)
+    try:
+        recorder.write(inside / LOG, result, video)
+    except InputError as error:
+        remarks.append(f"No {LOG}: {str(error).replace(str(inside / LOG), LOG)}.")
+    return tuple(remarks)
