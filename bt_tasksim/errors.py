@@ -37,6 +37,10 @@ class UnreachableError(InputError):
         self.angle = angle
 
 
+class NoWayError(BtTasksimError):
+    """There is no collision-free way."""
+
+
 class CommandConflictError(InputError):
     """Two leaves of a tree wrote the same part of the command in one tick."""
 

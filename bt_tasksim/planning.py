@@ -9,25 +9,22 @@ minimum cost paths", 1968, by networkx). Everything is deterministic.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import networkx as nx
 import numpy as np
 
 from bt_tasksim import poses
-from bt_tasksim.errors import BtTasksimError
+from bt_tasksim.errors import NoWayError
 from bt_tasksim.poses import Array
 from bt_tasksim.world import Obstacle
 
 MARGIN = 0.012
 """Metres of free space kept around everything."""
-_STEP = 0.03
+_STEP = 0.02
 _CELL = 0.05
-
-
-class NoWayError(BtTasksimError):
-    """There is no collision-free way."""
 
 
 @dataclass(frozen=True)
@@ -98,9 +95,7 @@ class _Checker:
 
         self._coal = coal
         boxes = [*carried.hand, (carried.grip, carried.extent)]
-        self._moving = [
-            (poses.pose(p[:3], p[3:]), coal.Box(*(float(s) for s in size))) for p, size in boxes
-        ]
+        self._moving = [(poses.pose(p[:3], p[3:]), coal.Box(*(float(s) for s in size))) for p, size in boxes]
         self._fixed = [
             (
                 coal.Box(*(float(s) + 2 * MARGIN for s in o.size)),
@@ -150,7 +145,7 @@ def _lattice(start: Array, goal: Array, checker: _Checker) -> list[Array]:
         return poses.pose(p, poses.interpolate(start, goal, f)[3:])
 
     free = {c for c in itertools.product(*(range(n) for n in counts)) if checker.free(pose_at(c))}
-    graph = nx.Graph()
+    graph: nx.Graph[Any] = nx.Graph()
     moves = [m for m in itertools.product((-1, 0, 1), repeat=3) if m > (0, 0, 0)]
     for cell in sorted(free):
         for move in moves:
@@ -164,14 +159,35 @@ def _lattice(start: Array, goal: Array, checker: _Checker) -> list[Array]:
             if checker.clear(end, pose_at(cell)):
                 graph.add_edge(key, cell, weight=float(np.linalg.norm(pose_at(cell)[:3] - end[:3])) / _CELL)
     try:
-        cells = nx.shortest_path(graph, "start", "goal", weight="weight")
+        way = _clear_cells(graph, start, goal, pose_at, checker)
     except (nx.NetworkXNoPath, nx.NodeNotFound) as error:
+        ends = (np.round(p[:3], 3).tolist() for p in (start, goal))
         raise NoWayError(
-            f"no way for the hand from {np.round(start[:3], 3).tolist()} to {np.round(goal[:3], 3).tolist()} m "
-            f"that keeps {1000 * MARGIN:.0f} mm clear of the fixtures: give via-points, or move the fixtures apart"
+            f"no way for the hand from {' to '.join(map(str, ends))} m that keeps {1000 * MARGIN:.0f} mm "
+            f"clear of the fixtures: give via-points, or move the fixtures apart"
         ) from error
-    way = [start, *(pose_at(c) for c in cells[1:-1]), goal]
     return _shortcut(way, checker)
+
+
+def _clear_cells(
+    graph: nx.Graph[Any],
+    start: Array,
+    goal: Array,
+    pose_at: Callable[[tuple[int, ...]], Array],
+    checker: _Checker,
+) -> list[Array]:
+    """The shortest way through free cells whose joining lines are clear too; these are checked on demand."""
+    clear: set[tuple[Any, Any]] = set()
+    while True:
+        cells = nx.shortest_path(graph, "start", "goal", weight="weight")
+        way = [start, *(pose_at(c) for c in cells[1:-1]), goal]
+        pairs = zip(itertools.pairwise(cells), itertools.pairwise(way), strict=True)
+        fresh = [(edge, line) for edge, line in pairs if edge not in clear]
+        blocked = [edge for edge, line in fresh if not checker.clear(*line)]
+        if not blocked:
+            return way
+        clear.update(edge for edge, _ in fresh if edge not in blocked)
+        graph.remove_edges_from(blocked)
 
 
 def _shortcut(way: list[Array], checker: _Checker) -> list[Array]:

@@ -1,0 +1,184 @@
+"""Success by hand-made physics states: each reason, and that each is the only thing wrong."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from bt_tasksim import poses
+from bt_tasksim.judge import at_rest, judge
+from bt_tasksim.robot import load_robot
+from bt_tasksim.scene import Goal, ObjectSpec, Scene, SpotSpec
+from bt_tasksim.world import Hidden
+
+TABLE = Scene(
+    objects={
+        "target": ObjectSpec(("box",), on="table", centre=(0.0, -0.14), area=(0.05, 0.05)),
+        "other": ObjectSpec(("cylinder",), on="table", centre=(0.15, 0.0), area=(0.01, 0.01)),
+    },
+    spots=[SpotSpec("goal", on="table", centre=(0.0, 0.2), area=(0.02, 0.02), yaw=0.5)],
+    goal=Goal("target", "goal"),
+)
+BIN = Scene(
+    fixtures=["trash_bin"],
+    objects={"cup": ObjectSpec(("cup",), on="table", centre=(0.0, 0.05))},
+    goal=Goal("cup", "trash_bin", relation="inside"),
+)
+
+
+def turned(axis, degrees):
+    v = np.zeros(3)
+    v[axis] = math.radians(degrees)
+    return poses.from_rotation_vector(v)
+
+
+def world(scene, kind=None, seed=3):
+    if kind is not None:
+        target = dataclasses.replace(scene.objects["target"], kinds=(kind,))
+        scene = dataclasses.replace(scene, objects={**scene.objects, "target": target})
+    configuration = scene.sample(seed)
+    robot = load_robot("panda")
+    return configuration, configuration.world_model([t.name for t in robot.tips], robot.opening)
+
+
+def done(configuration, model, shift=(0.0, 0.0, 0.0), turn=(1.0, 0.0, 0.0, 0.0)):
+    """The state in which the goal is reached, but for a shift and a turn in the place's frame."""
+    goal = configuration.goal
+    k, place = model.object_index(goal.object), model.place(goal.place)
+    objects = np.array([a.pose for a in configuration.objects])
+    height = model.object(goal.object).extent[2] / 2
+    objects[k] = poses.multiply(place.pose, poses.pose(np.array([0, 0, height]) + shift, turn))
+    n = len(objects)
+    return Hidden(
+        time=np.float64(5.0),
+        objects=objects,
+        velocities=np.zeros((n, 6)),
+        hand_force=np.zeros(n),
+        hand_distance=np.full(n, np.inf),
+        support=np.zeros((n, n + len(configuration.fixtures)), bool),
+        penetration=np.float64(0.0005),
+        tool_pose=poses.pose([0.4, 0, 0.5]),
+    )
+
+
+@pytest.fixture
+def table():
+    return world(TABLE)
+
+
+def verdict(where, **changes):
+    hidden = done(*where)
+    return judge(*where, dataclasses.replace(hidden, **changes))
+
+
+def test_in_place(table):
+    found = judge(*table, done(*table))
+    assert found.success and found.reason == ""
+    assert found.why == "target stands on goal, 0 mm and 0.0 degrees off"
+    assert found.position_error < 1e-9 and found.angle_error < 1e-7
+    assert found.penetration == 0.0005
+
+
+@pytest.mark.parametrize(("millimetres", "success"), [(29.0, True), (31.0, False)])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_three_centimetres(table, axis, millimetres, success):
+    shift = np.zeros(3)
+    shift[axis] = millimetres / 1000
+    found = judge(*table, done(*table, shift))
+    assert found.success is success and found.reason == ("" if success else "not in place")
+    assert found.position_error == pytest.approx(millimetres / 1000)
+    if not success:
+        assert found.why == "target is not on goal, 31 mm and 0.0 degrees off"
+
+
+@pytest.mark.parametrize(("degrees", "success"), [(9.0, True), (11.0, False)])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_ten_degrees(table, axis, degrees, success):
+    found = judge(*table, done(*table, turn=turned(axis, degrees)))
+    assert found.success is success and found.reason == ("" if success else "tilted or turned")
+    assert math.degrees(found.angle_error) == pytest.approx(degrees)
+    assert f"{degrees:.1f} degrees off" in found.why
+
+
+# What looks the same counts as the same: kind, axis, degrees, angle that is left.
+SYMMETRIES = [
+    ("box", 2, 180, 0), ("box", 2, 90, 90), ("box", 0, 180, 180),
+    ("oval", 2, 180, 0), ("oval", 2, 90, 90), ("diamond", 2, 180, 0), ("diamond", 2, 45, 45),
+    ("cylinder", 2, 77, 0), ("cylinder", 1, 30, 30), ("cup", 2, 123, 0), ("cup", 0, 180, 180),
+    ("cube", 0, 90, 0), ("cube", 1, 180, 0), ("cube", 2, 45, 45), ("cube", 0, 102, 12),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "axis", "degrees", "left"), SYMMETRIES)
+def test_turned_by_its_symmetry(kind, axis, degrees, left):
+    where = world(TABLE, kind)
+    found = judge(*where, done(*where, turn=turned(axis, degrees)))
+    assert math.degrees(found.angle_error) == pytest.approx(left, abs=1e-4)
+    assert found.success is (left < 10)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "success"),
+    [((0.009, 0, 0, 0, 0, 0), True), ((0.011, 0, 0, 0, 0, 0), False),
+     ((0, 0, 0, 0.09, 0, 0), True), ((0, 0, 0, 0, 0, 0.11), False)],
+)  # fmt: skip
+def test_at_rest(table, velocity, success):
+    velocities = np.zeros((2, 6))
+    velocities[0] = velocity
+    found = verdict(table, velocities=velocities)
+    assert found.success is success and found.reason == ("" if success else "not at rest")
+    assert success or "mm/s" in found.why
+
+
+def test_episodes_wait_until_every_object_rests(table):
+    hidden = done(*table)
+    assert at_rest(hidden)
+    moving = np.zeros((2, 6))
+    moving[1, 2] = 0.02
+    assert not at_rest(dataclasses.replace(hidden, velocities=moving))
+
+
+@pytest.mark.parametrize(
+    ("distance", "success"), [(np.inf, True), (0.004, True), (5e-5, False), (0.0, False)]
+)
+def test_hand_clear(table, distance, success):
+    found = verdict(table, hand_distance=np.array([distance, np.inf]))
+    assert found.success is success and found.reason == ("" if success else "hand not clear")
+
+
+@pytest.mark.parametrize(
+    ("shift", "tilt", "success"), [(0.04, 0, True), (0.06, 0, False), (0, 10, True), (0, 20, False)]
+)
+def test_nothing_else_knocked_over(table, shift, tilt, success):
+    objects = done(*table).objects.copy()
+    objects[1] = poses.multiply(objects[1], poses.pose([shift, 0, 0], turned(1, tilt)))
+    found = verdict(table, objects=objects)
+    assert found.success is success and found.reason == ("" if success else "knocked something over")
+    assert success or f"other was shifted by {1000 * shift:.0f} mm and tilted by {tilt} degrees" in found.why
+
+
+@pytest.mark.parametrize(("depth", "success"), [(0.0019, True), (0.0021, False)])
+def test_two_millimetres_of_penetration(table, depth, success):
+    found = verdict(table, penetration=np.float64(depth))
+    assert found.success is success and found.reason == ("" if success else "penetration")
+    assert success or found.why == "two bodies overlapped by 2.1 mm"
+
+
+@pytest.mark.parametrize(
+    ("shift", "inside"),
+    [((0, 0, 0), True), ((0.05, 0.05, 0), True), ((0.05, 0, 0.1), True),
+     ((0.3, 0, 0), False), ((0, 0, 0.4), False), ((0, 0, -0.2), False)],
+)  # fmt: skip
+def test_in_the_bin(shift, inside):
+    where = world(BIN)
+    found = judge(*where, done(*where, shift, turned(0, 80)))  # lying down is as good
+    assert found.success is inside and found.reason == ("" if inside else "not in the bin")
+    assert ("is in trash_bin" if inside else "is not in trash_bin") in found.why
+
+
+def test_a_scene_without_a_goal():
+    where = world(dataclasses.replace(TABLE, goal=None))
+    hidden = done(*world(TABLE))
+    found = judge(*where, hidden)
+    assert found.success and "no goal is set" in found.why and math.isnan(found.position_error)
