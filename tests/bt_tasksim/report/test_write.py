@@ -1,0 +1,122 @@
+"""A run's folder is whole or not there."""
+
+import json
+import resource
+import signal
+
+import pytest
+
+from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.report import write
+from bt_tasksim.report.report import NO_VIDEO
+from bt_tasksim.report.write import filming_runner, write_run
+from bt_tasksim.runner import Runner
+from bt_tasksim.scene import Scene
+from concept_nodes import TimePassed
+from trees import retry
+from trees.scenarios import pick_and_place
+
+
+@pytest.fixture(scope="module")
+def runner():
+    return Runner(pick_and_place.build(), pick_and_place.scene())
+
+
+def names(folder):
+    return sorted(p.name for p in folder.iterdir())
+
+
+def test_without_a_video(runner, tmp_path):
+    result, files = write_run(tmp_path / "runs" / "one", runner, 3, scenario="pick_and_place")
+    assert result.success and files.remarks == ()
+    assert names(files.folder) == ["report.html", "result.json", "run.h5", "tree.svg"]
+    assert set(files.paths) == set(names(files.folder))
+    content = json.loads(files.paths["result.json"].read_text())
+    wanted = (
+        "status success reason why seed scenario robot engines perception policies control_steps sim_time"
+    )
+    assert set(wanted.split()) | {"verdict", "versions"} <= set(content)
+    assert content["seed"] == 3 and content["success"] is True
+    assert files.paths["tree.svg"].read_text().count('data-status="SUCCESS"') == 6
+    assert json.dumps(NO_VIDEO) in files.paths["report.html"].read_text()
+
+
+def test_a_second_run_replaces_the_first(runner, tmp_path):
+    write_run(tmp_path / "one", runner, 3)
+    _, files = write_run(tmp_path / "one", runner, 4)
+    assert json.loads(files.paths["result.json"].read_text())["seed"] == 4
+    assert names(tmp_path) == ["one"]
+
+
+def test_a_folder_with_other_things_is_refused_before_the_run(runner, tmp_path, monkeypatch):
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one" / "thesis.tex").write_text("mine")
+    monkeypatch.setattr(runner, "run", None)
+    with pytest.raises(InputError, match=r"thesis\.tex"):
+        write_run(tmp_path / "one", runner, 3)
+
+
+def test_interrupted(runner, tmp_path):
+    def watch(step):
+        if step.observation.time > 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_run(tmp_path / "runs" / "one", runner, 3, watch=watch)
+    assert names(tmp_path) == []
+
+
+def test_full_disk(runner, tmp_path):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (8192, before[1]))
+        with pytest.raises(MachineError) as caught:
+            write_run(tmp_path / "one", runner, 3)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert (
+        str(caught.value) == f"cannot write '{tmp_path}/one/report.html': File too large; nothing was written"
+    )
+    assert names(tmp_path) == []
+
+
+def test_a_run_that_the_log_cannot_hold_is_written_without(tmp_path):
+    runner = Runner(retry(30, TimePassed(0.5)), Scene())
+    _, files = write_run(tmp_path / "one", runner, 0)
+    assert "run.h5" not in files.paths and "report.html" in files.paths
+    (remark,) = files.remarks
+    assert remark.startswith("No run.h5: ") and "no objects" in remark and str(tmp_path) not in remark
+
+
+def test_no_rendering_device(tmp_path, monkeypatch):
+    made = []
+
+    def build(tree, scene, options):
+        made.append(options.rendering)
+        if options.rendering:
+            raise MachineError("SAPIEN finds no Vulkan device")
+        return Runner(tree, scene, options)
+
+    monkeypatch.setattr(write, "Runner", build)
+    runner, why = filming_runner(pick_and_place.build(), pick_and_place.scene(), EngineOptions())
+    assert made == [True, False] and why == "No video: SAPIEN finds no Vulkan device."
+    _, files = write_run(tmp_path / "one", runner, 3, no_video=why)
+    assert files.remarks == (why,)
+    assert why in files.paths["report.html"].read_text()
+
+
+def test_filmed(tmp_path):
+    try:
+        runner, why = filming_runner(pick_and_place.build(), pick_and_place.scene())
+        if why:
+            pytest.skip(why)
+        runner.longest = 0.5
+        _, files = write_run(tmp_path / "one", runner, 3, every=5)
+    except MachineError as error:
+        pytest.skip(f"no pictures on this machine: {error}")
+    assert names(files.folder) == sorted(write.FILES) and files.remarks == ()
+    assert files.paths["run.mp4"].stat().st_size > 5000
+    assert files.paths["report.html"].stat().st_size > files.paths["run.mp4"].stat().st_size
