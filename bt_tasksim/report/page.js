@@ -196,8 +196,9 @@ function panels() {
     });
     const all = panel.curves.flatMap((curve) => curve.values).filter((v) => v !== null);
     let low = Math.min(...all), high = Math.max(...all);
-    if (low > 0 && low < 0.5 * high) low = 0;
-    if (high < 0 && high > 0.5 * low) high = 0;
+    const flat = high - low < 0.2 * Math.max(Math.abs(low), Math.abs(high));
+    if (low > 0 && (flat || low < 0.5 * high)) low = 0;
+    if (high < 0 && (flat || high > 0.5 * low)) high = 0;
     const least = 1e-3 * Math.max(Math.abs(low), Math.abs(high), 1);
     if (high - low < least) { const middle = (low + high) / 2; low = middle - least; high = middle + least; }
     const step = niceStep(high - low, 4);

@@ -148,14 +148,17 @@ class RunRecorder:
         runner, configuration = self.runner, result.configuration
         world = configuration.world_model([tip.name for tip in runner.robot.tips], runner.robot.opening)
         extra = {name: _stacked(rows) for name, rows in self._rows.items()}
+        said = list(self._said)
+        if result.status == Status.INVALID and self._times:  # stopped from outside the tree
+            said.append((self._times[-1], 0, f"stopped: {result.reason}: {result.why}"))
         true = "state/objects" in extra
         poses = extra["state/objects" if true else "observations/objects"]
         extra |= {
             "tree/status": np.array(self._status, np.int8).reshape(len(self), len(self.nodes)),
             "tree/necessary_cost": np.array(self._costs, np.float64).reshape(len(self), len(self.nodes)),
-            "messages/time": np.array([time for time, _, _ in self._said], np.float64),
-            "messages/node": np.array([node for _, node, _ in self._said], np.int32),
-            "messages/text": _texts([text for _, _, text in self._said]),
+            "messages/time": np.array([time for time, _, _ in said], np.float64),
+            "messages/node": np.array([node for _, node, _ in said], np.int32),
+            "messages/text": _texts([text for _, _, text in said]),
             "run/nodes": _text(json.dumps(describe_nodes(self.nodes))),
             "run/configuration": _text(configuration.to_json()),
             "run/tree": _text(self._tree),

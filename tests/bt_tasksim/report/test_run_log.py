@@ -136,6 +136,14 @@ def test_failures_and_retries_are_seen():
     assert any(text.startswith("attempt 1 of 2 failed") for text in texts)
 
 
+def test_a_run_that_was_stopped_says_why():
+    runner = Runner(pick_and_place.build(), pick_and_place.scene(), longest=0.5)
+    recorder = RunRecorder(runner)
+    run = recorder.demonstration(runner.run(3, record=recorder))
+    assert read_texts(run.extra["messages/text"]) == ["stopped: time over: not done within 0.5 s"]
+    assert run.extra["messages/node"].tolist() == [0]
+
+
 def test_nodes_in_the_order_of_the_tree():
     tree = sequence("a", sequence("b", Grasp("x"), Pick("x")), Release("x"))
     nodes = nodes_of(tree)
