@@ -11,14 +11,15 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, dataclass_transform
 
 import numpy as np
+from array_api_compat import array_namespace
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.context import Context, Known, Seen
-from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.errors import InputError, NoWayError, nearest
 from bt_tasksim.parameters import Parameter, bind_arguments, declared_parameters
-from bt_tasksim.poses import Array
 from bt_tasksim.policy import Policy, resolve_policy
+from bt_tasksim.poses import Array
 from bt_tasksim.world import Command
 
 LOST_TICKS = 3
@@ -100,7 +101,10 @@ class ConceptNode(ContextLeaf, abc.ABC):
             why = model.initial_state(seen)
             if why:
                 return self._fail(f"cannot start: {why}")
-            self.memory = model.begin(seen)
+            try:
+                self.memory = model.begin(seen)
+            except NoWayError as error:
+                return self._fail(f"cannot start: {error}")
             self._active = True
         else:
             seen = context.seen(context.time - self._started)
@@ -112,7 +116,9 @@ class ConceptNode(ContextLeaf, abc.ABC):
                 self._lost += 1
                 if self._lost >= LOST_TICKS:
                     context.end(goal, model.actor)
-                    return self._fail(f"lost: {model.actor} is no longer {goal}; {model.explain(seen, memory)}")
+                    return self._fail(
+                        f"lost: {model.actor} is no longer {goal}; {model.explain(seen, memory)}"
+                    )
                 break
         else:
             self._lost = 0
@@ -126,16 +132,20 @@ class ConceptNode(ContextLeaf, abc.ABC):
             return Status.SUCCESS
         if seen.elapsed > model.timeout:
             return self._fail(f"not done within {model.timeout:g} s: {model.explain(seen, memory)}")
-        context.write(model.command(action.motion, seen, memory), self.name)
+        context.write(model.command(action.motion, seen, memory), self)
         context.look = context.look or model.looks(seen, memory)
         self.memory = model.advance(seen, memory)
         self.feedback_message = ""
         return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
-        """py_trees calls this when the leaf ends or is interrupted."""
-        if new_status == Status.INVALID and self.status == Status.RUNNING:
+        """py_trees calls this when the leaf ends, or is interrupted: then its command is dropped."""
+        if new_status != Status.INVALID:
+            return
+        if self.status == Status.RUNNING:
             self.feedback_message = "interrupted"
+        if self._context is not None:
+            self._context.withdraw(self)
 
     def _fail(self, why: str) -> Status:
         self.feedback_message = why
@@ -205,9 +215,7 @@ class ConceptModel(ConceptNode):
 
     def arguments(self) -> dict[str, Any]:
         """Keyword arguments that build an equal leaf: parameters and settings that are not defaults."""
-        out = {
-            k: v for k, v in self.values.items() if (p := self.parameters()[k]).required or v != p.default
-        }
+        out = {k: v for k, v in self.values.items() if (p := self.parameters()[k]).required or v != p.default}
         out |= {k: v for k, v in self._settings.items() if v not in (None, {})}
         return out
 
@@ -240,7 +248,7 @@ class ConceptModel(ConceptNode):
 
     def programmed_motion(self, seen: Seen, memory: Any) -> Array:
         """The programmed policy's action ``(..., actions)``; by default none: the reference motion itself."""
-        return np.zeros(self.actions)
+        return _zeros(seen.tool, self.actions)
 
     @abc.abstractmethod
     def done(self, seen: Seen, memory: Any) -> Array:
@@ -248,7 +256,7 @@ class ConceptModel(ConceptNode):
 
     def necessary_cost(self, seen: Seen, memory: Any) -> Array:
         """How far the observed state is from the necessary goal: ``(...)``, 0 when reached."""
-        return np.zeros(np.shape(seen.observation.time))
+        return _zeros(seen.tool)
 
     def violated(self, seen: Seen, memory: Any) -> Array:
         """A limit is exceeded (stress, crushing): boolean ``(...)``."""
@@ -260,7 +268,7 @@ class ConceptModel(ConceptNode):
 
     def sufficient_cost(self, known: Known, memory: Any) -> Array:
         """How far the hidden state is from the sufficient goal at the completion signal: ``(...)``."""
-        return np.zeros(np.shape(known.hidden.time))
+        return _zeros(known.hidden.tool_pose)
 
     def looks(self, seen: Seen, memory: Any) -> bool:
         """Fresh images are wanted for the next tick."""
@@ -298,9 +306,7 @@ class Condition(ContextLeaf):
 
     def arguments(self) -> dict[str, Any]:
         """Keyword arguments that build an equal leaf."""
-        out = {
-            k: v for k, v in self.values.items() if (p := self.parameters()[k]).required or v != p.default
-        }
+        out = {k: v for k, v in self.values.items() if (p := self.parameters()[k]).required or v != p.default}
         return out | ({"name": self._named} if self._named else {})
 
     @abc.abstractmethod
@@ -317,6 +323,13 @@ class Condition(ContextLeaf):
         yes = bool(self.holds(seen))
         self.feedback_message = self.explain(seen)
         return Status.SUCCESS if yes else Status.FAILURE
+
+
+def _zeros(like: Array, *shape: int) -> Array:
+    """Zeros ``(..., *shape)`` in the library and with the batch dimensions of ``like (..., n)``."""
+    if type(like) is np.ndarray:
+        return np.zeros(like.shape[:-1] + shape)
+    return array_namespace(like).zeros((*like.shape[:-1], *shape), dtype=like.dtype, device=like.device)
 
 
 def _text(value: Any, owner: str, what: str) -> str | None:

@@ -8,13 +8,15 @@ the hidden state: they resolve names to array slices.
 from __future__ import annotations
 
 import typing
+from dataclasses import replace
 
 import numpy as np
+from py_trees.behaviour import Behaviour
 
 from bt_tasksim.errors import CommandConflictError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
-from bt_tasksim.world import Command, Hidden, Observation, ObjectModel, PlaceModel, WorldModel
+from bt_tasksim.world import Command, Hidden, ObjectModel, Observation, PlaceModel, WorldModel
 
 
 class Seen:
@@ -129,7 +131,7 @@ class Context:
         self.hidden: typing.Callable[[], Hidden | None] = lambda: None
         self.look = False
         self._command = Command()
-        self._writers: dict[str, str] = {}
+        self._writers: dict[str, Behaviour] = {}
         self._held: set[tuple[str, str]] = set()
 
     @property
@@ -172,7 +174,7 @@ class Context:
         self._writers.clear()
         self.look = False
 
-    def write(self, command: Command, leaf: str) -> None:
+    def write(self, command: Command, leaf: Behaviour) -> None:
         """Write a command, or a part of one.
 
         Raises:
@@ -184,13 +186,20 @@ class Context:
             if value is None:
                 continue
             if part in self._writers:
+                first = self._writers[part].name
                 raise CommandConflictError(
-                    f"two leaves command the {part} in one tick: '{self._writers[part]}' and '{leaf}'"
+                    f"two leaves command the {part} in one tick: '{first}' and '{leaf.name}'"
                 )
             if not np.isfinite(value.sum()):
-                raise ValueError(f"leaf '{leaf}' commands a {part} target that is not finite: {value}")
+                raise ValueError(f"leaf '{leaf.name}' commands a {part} target that is not finite: {value}")
             self._writers[part] = leaf
         self._command = command.over(self._command)
+
+    def withdraw(self, leaf: Behaviour) -> None:
+        """Drop what a leaf has written in this tick: it was interrupted, and others may act instead."""
+        for part in [p for p, writer in self._writers.items() if writer is leaf]:
+            del self._writers[part]
+            self._command = replace(self._command, **{part: None})
 
     @property
     def command(self) -> Command:

@@ -48,6 +48,13 @@ def _rot(q: list[float], v: list[float]) -> list[float]:
     ]
 
 
+def constant(value: Any, like: Array) -> Array:
+    """Plain numbers as an array of the same library, type and device as another one."""
+    if type(like) is np.ndarray:
+        return np.asarray(value, like.dtype)
+    return array_namespace(like).asarray(value, dtype=like.dtype, device=like.device)
+
+
 def quat_multiply(a: Array, b: Array) -> Array:
     """Hamilton product ``a * b`` of quaternions ``(..., 4)``."""
     if _single(a) and _single(b):
@@ -137,7 +144,9 @@ def rotation_vector(q: Array) -> Array:
     q = xp.where(q[..., :1] < 0, -q, q)
     s = xp.sqrt(xp.sum(q[..., 1:] ** 2, axis=-1, keepdims=True))
     small = s < _EPS
-    k = xp.where(small, xp.full_like(s, 2.0), 2 * xp.atan2(s, q[..., :1]) / xp.where(small, xp.ones_like(s), s))
+    k = xp.where(
+        small, xp.full_like(s, 2.0), 2 * xp.atan2(s, q[..., :1]) / xp.where(small, xp.ones_like(s), s)
+    )
     return k * q[..., 1:]
 
 
@@ -190,7 +199,7 @@ def interpolate(a: Array, b: Array, fraction: Array) -> Array:
 
 
 def frame_from_axes(z: Array, y: Array) -> Array:
-    """Unit quaternions ``(..., 4)`` of the frame with the given z axis and a y axis as near as can be to ``y``.
+    """Unit quaternions ``(..., 4)`` of the frame with the given z axis and its y axis nearest to ``y``.
 
     Args:
         z: Vectors ``(..., 3)``, not zero.
@@ -224,16 +233,18 @@ def from_matrix(m: Array) -> Array:
     """Unit quaternions ``(..., 4)`` of rotation matrices ``(..., 3, 3)``, stable at every angle."""
     xp = array_namespace(m)
     xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    wx, wy, wz = m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
+    xy, xz, yz = m[..., 0, 1] + m[..., 1, 0], m[..., 0, 2] + m[..., 2, 0], m[..., 1, 2] + m[..., 2, 1]
     # The four candidates are the rows of 4 q q^T; the longest one is well conditioned.
     rows = xp.stack(
         [
-            xp.stack([1 + xx + yy + zz, m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]], axis=-1),
-            xp.stack([m[..., 2, 1] - m[..., 1, 2], 1 + xx - yy - zz, m[..., 0, 1] + m[..., 1, 0], m[..., 0, 2] + m[..., 2, 0]], axis=-1),
-            xp.stack([m[..., 0, 2] - m[..., 2, 0], m[..., 0, 1] + m[..., 1, 0], 1 - xx + yy - zz, m[..., 1, 2] + m[..., 2, 1]], axis=-1),
-            xp.stack([m[..., 1, 0] - m[..., 0, 1], m[..., 0, 2] + m[..., 2, 0], m[..., 1, 2] + m[..., 2, 1], 1 - xx - yy + zz], axis=-1),
+            xp.stack([1 + xx + yy + zz, wx, wy, wz], axis=-1),
+            xp.stack([wx, 1 + xx - yy - zz, xy, xz], axis=-1),
+            xp.stack([wy, xy, 1 - xx + yy - zz, yz], axis=-1),
+            xp.stack([wz, xz, yz, 1 - xx - yy + zz], axis=-1),
         ],
         axis=-2,
-    )  # fmt: skip
+    )
     best = xp.argmax(xp.stack([rows[..., i, i] for i in range(4)], axis=-1), axis=-1)
     chosen = rows[..., 0, :]
     for i in range(1, 4):

@@ -118,7 +118,9 @@ class Runner:
         self.context.begin(world, self.pipeline.reset(configuration, world))
         return world
 
-    def run(self, seed: int, stream: str = "evaluation", record: Callable[[Step], None] | None = None) -> Result:
+    def run(
+        self, seed: int, stream: str = "evaluation", record: Callable[[Step], None] | None = None
+    ) -> Result:
         """One episode.
 
         Args:
@@ -257,13 +259,12 @@ def end_all(tree: Behaviour, culprit: Behaviour | None) -> None:
 
 
 def failed_leaf(tree: Behaviour) -> Behaviour | None:
-    """The leaf that made the tree fail: the last one in order of the tree that says FAILURE."""
-    found = None
-    for node in tree.iterate():
-        if not node.children and node.status == Status.FAILURE and node.feedback_message:
-            found = node
-            break
-    return found or tree.tip()
+    """The node that made the tree fail: the one that was decided last, with a reason."""
+    found = tree.tip()
+    if found is not None and found.feedback_message:
+        return found
+    failed = [n for n in tree.iterate() if n.status == Status.FAILURE and n.feedback_message]
+    return failed[-1] if failed else found
 
 
 def run(

@@ -13,9 +13,9 @@ from bt_tasksim.motion import plan, sample
 from bt_tasksim.parameters import Metres, MetresPerSecond, ObjectName, PlaceName, Points, Position
 from bt_tasksim.planning import Carried, clear_path
 from bt_tasksim.poses import Array
-from bt_tasksim.world import Command, ObjectModel
+from bt_tasksim.world import Command, ObjectModel, PlaceModel
 from concept_nodes.grasp import neutral_rotation, resting_place
-from concept_nodes.holding import HOLDING, holding, tool_distance
+from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
 from concept_nodes.pick import MoveMemory, arrived, miss
 
 
@@ -51,7 +51,7 @@ class Bring(ConceptModel):
         if (self.to is None) == (self.position is None):
             raise InputError(f"leaf '{self.name}': give either 'to' or 'position'")
         if not bool(holding(seen, self.target)):
-            return f"{self.target} is not held ({1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool)"
+            return not_held(seen, self.target)
         return ""
 
     def begin(self, seen: Seen) -> MoveMemory:
@@ -130,59 +130,78 @@ class Bring(ConceptModel):
 
 
 def destination(seen: Seen, name: str) -> tuple[Array, float]:
-    """Frame ``(7,)`` of a place, or of the top of an object, and the height in metres of its rim."""
+    """Frame ``(7,)`` of a place or ``(..., 7)`` of the top of an object, and its rim's height in metres."""
     if name in seen.world.places:
         place = seen.place(name)
         return place.pose, (place.height if place.kind == "bin" else 0.0)
     below, model = seen.object(name), seen.model(name)
-    top = below.copy()
-    top[2] += model.extent[2] / 2
-    return top, 0.0
+    return below + poses.constant([0, 0, model.extent[2] / 2, 0, 0, 0, 0], below), 0.0
 
 
 def standing_pose(
     frame: Array, now: Array, model: ObjectModel, height: float, towards: Array | None = None
 ) -> Array:
-    """Pose of an object that stands upright ``height`` above a frame, turned as its symmetry allows.
+    """Pose ``(..., 7)`` of an object that stands above a frame, turned as its symmetry allows.
 
     Args:
-        frame: Pose ``(7,)`` of the place.
-        now: Present pose ``(7,)`` of the object.
+        frame: Pose ``(..., 7)`` of the place.
+        now: Present pose ``(..., 7)`` of the object.
         model: The object.
         height: Free height below it, metres.
-        towards: Rotation ``(4,)`` of the object that is preferred; by default the present one.
+        towards: Rotation ``(..., 4)`` of the object that is preferred; by default the present one.
     """
-    towards = now[3:] if towards is None else towards
-    position = poses.transform(frame, np.array([0.0, 0.0, height + _half_height(now, model)]))
-    turns: list[Array] = []
-    if model.cubic:
-        turns = [poses.quat_multiply(frame[3:], q) for q in _CUBE]
-    elif model.symmetry == 0:
-        up = poses.rotate(now[3:], np.array([0.0, 0.0, 1.0]))
-        axis = poses.cross(up, poses.rotate(frame[3:], np.array([0.0, 0.0, 1.0])))
-        angle = float(np.arctan2(np.linalg.norm(axis), up @ poses.rotate(frame[3:], np.array([0.0, 0.0, 1.0]))))
-        length = float(np.linalg.norm(axis))
-        tilt = axis / length * angle if length > 1e-9 else np.zeros(3)
-        turns = [poses.quat_multiply(poses.from_rotation_vector(tilt), now[3:])]
+    towards = now[..., 3:] if towards is None else towards
+    frame = poses.constant(frame, now)
+    half = (max(model.extent) if model.cubic else model.extent[2]) / 2
+    position = poses.transform(frame, poses.constant([0.0, 0.0, height + half], now))
+    if model.symmetry == 0 and not model.cubic:
+        best = _upright(frame, now)
     else:
-        turns = [
-            poses.quat_multiply(frame[3:], poses.yaw(2 * np.pi * k / model.symmetry))
-            for k in range(model.symmetry)
-        ]
-    best = min(turns, key=lambda q: round(float(poses.angle_between(towards, q)), 9))
-    return poses.pose(position, best)
+        turns = (
+            _CUBE
+            if model.cubic
+            else [poses.yaw(2 * np.pi * k / model.symmetry) for k in range(model.symmetry)]
+        )
+        ways = [poses.quat_multiply(frame[..., 3:], poses.constant(q, now)) for q in turns]
+        best = _nearest_rotation(ways, towards)
+    xp = array_namespace(now)
+    batch = now.shape[:-1]
+    return xp.concat([xp.broadcast_to(position, (*batch, 3)), xp.broadcast_to(best, (*batch, 4))], axis=-1)
 
 
-def _half_height(now: Array, model: ObjectModel) -> float:
-    if not model.cubic:
-        return model.extent[2] / 2
-    return max(model.extent) / 2
+def _upright(frame: Array, now: Array) -> Array:
+    """The rotations ``(..., 4)`` that set the z axis upright on a frame by the shortest turn."""
+    xp = array_namespace(now)
+    z = poses.constant([0.0, 0.0, 1.0], now)
+    up, should = poses.rotate(now[..., 3:], z), poses.rotate(frame[..., 3:], z)
+    axis = poses.cross(up, should)
+    length = xp.sqrt(xp.sum(axis * axis, axis=-1, keepdims=True))
+    angle = xp.atan2(length, xp.sum(up * should, axis=-1, keepdims=True))
+    small = length <= 1e-9
+    tilt = axis * xp.where(
+        small, xp.zeros_like(length), angle / xp.where(small, xp.ones_like(length), length)
+    )
+    return poses.quat_multiply(poses.from_rotation_vector(tilt), now[..., 3:])
 
 
-def _place_below(seen: Seen, target: str) -> object:
+def _nearest_rotation(ways: list[Array], towards: Array) -> Array:
+    """Of rotations ``(..., 4)`` the one that is the shortest turn away; of equal ones the first."""
+    if len(ways) == 1:
+        return ways[0]
+    xp = array_namespace(towards)
+    # Alike as rotations where q and -q are: the larger |q . r|, the shorter the turn.
+    nearness = xp.stack([xp.abs(xp.sum(q * towards, axis=-1)) for q in ways], axis=-1)
+    first = xp.argmax(xp.round(nearness * 1e9), axis=-1)
+    best = ways[0]
+    for k in range(1, len(ways)):
+        best = xp.where((first == k)[..., None], ways[k], best)
+    return best
+
+
+def _place_below(seen: Seen, target: str) -> PlaceModel | None:
     """The place of a fixture above which a lifted object is, where that fixture would be in its way out."""
     pose = seen.object(target)
-    best = None
+    best: tuple[float, PlaceModel] | None = None
     for place in seen.world.places.values():
         local = poses.transform(poses.inverse(place.pose), pose[:3])
         inside = all(abs(float(local[i]) - place.centre[i]) <= place.extent[i] / 2 for i in range(2))

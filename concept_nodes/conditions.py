@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from array_api_compat import array_namespace
 
 from bt_tasksim import poses
@@ -57,7 +56,8 @@ class AtPose(Condition):
     def explain(self, seen: Seen) -> str:
         """How far off it is."""
         distance, angle = self._off(seen)
-        return f"{self.target} is {1000 * float(distance):.0f} mm and {math.degrees(float(angle)):.0f} degrees off"
+        degrees = math.degrees(float(angle))
+        return f"{self.target} is {1000 * float(distance):.0f} mm and {degrees:.0f} degrees off"
 
     def _off(self, seen: Seen) -> tuple[Array, Array]:
         now = seen.object(self.target)
@@ -89,7 +89,7 @@ class Upright(Condition):
 
     def _tilt(self, seen: Seen) -> Array:
         pose = seen.object(self.target)
-        up = poses.rotate(pose[..., 3:], np.array([0.0, 0.0, 1.0]))
+        up = poses.rotate(pose[..., 3:], poses.constant([0.0, 0.0, 1.0], pose))
         xp = array_namespace(up)
         return xp.acos(xp.clip(up[..., 2], -1.0, 1.0))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from array_api_compat import array_namespace
 
 from bt_tasksim.context import Seen
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, constant, inverse, transform
 
 HOLDING = "holding"
 """Name of the goal that `Grasp` reaches, `Pick`, `Bring` and `Place` maintain, and `Release` ends."""
@@ -16,11 +16,9 @@ def tool_distance(seen: Seen, target: str) -> Array:
 
     The box is the object's nominal bounding box at its estimated pose.
     """
-    from bt_tasksim.poses import inverse, transform
-
     local = transform(inverse(seen.object(target)), seen.tool[..., :3])
     xp = array_namespace(local)
-    half = xp.asarray([v / 2 for v in seen.model(target).extent], dtype=local.dtype)
+    half = constant([v / 2 for v in seen.model(target).extent], local)
     outside = xp.maximum(xp.abs(local) - half, xp.zeros_like(local))
     return xp.sqrt(xp.sum(outside * outside, axis=-1))
 
@@ -34,3 +32,8 @@ def holding(seen: Seen, target: str, reach: float = 0.03) -> Array:
         reach: Metres by which the estimate may lie outside the grasp.
     """
     return seen.opposed() & (tool_distance(seen, target) < reach)
+
+
+def not_held(seen: Seen, target: str) -> str:
+    """Says that an object is not in the hand, and where it is."""
+    return f"{target} is not held ({1000 * float(tool_distance(seen, target)):.0f} mm from the tool)"

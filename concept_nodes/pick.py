@@ -13,7 +13,7 @@ from bt_tasksim.motion import Path, plan, sample
 from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, ObjectName
 from bt_tasksim.poses import Array
 from bt_tasksim.world import Command
-from concept_nodes.holding import HOLDING, holding, tool_distance
+from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
 
 
 class MoveMemory(NamedTuple):
@@ -43,7 +43,7 @@ class Pick(ConceptModel):
     def initial_state(self, seen: Seen) -> str:
         """The object must be in the hand."""
         if not bool(holding(seen, self.target)):
-            return f"{self.target} is not held ({1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool)"
+            return not_held(seen, self.target)
         return ""
 
     def begin(self, seen: Seen) -> MoveMemory:

@@ -15,7 +15,7 @@ from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, Newtons, O
 from bt_tasksim.poses import Array
 from bt_tasksim.world import Command
 from concept_nodes.bring import destination, standing_pose
-from concept_nodes.holding import HOLDING, holding, tool_distance
+from concept_nodes.holding import HOLDING, holding, not_held
 
 FELT = 2
 """Ticks in a row for which the support must be felt."""
@@ -65,7 +65,7 @@ class Place(ConceptModel):
     def initial_state(self, seen: Seen) -> str:
         """The object must be in the hand."""
         if not bool(holding(seen, self.target)):
-            return f"{self.target} is not held ({1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool)"
+            return not_held(seen, self.target)
         return ""
 
     def begin(self, seen: Seen) -> PlaceMemory:
@@ -123,7 +123,7 @@ class Place(ConceptModel):
         d = -np.asarray(self.direction)
         f = poses.rotate(seen.tool[..., 3:], seen.wrench[..., :3])
         xp = array_namespace(f)
-        return xp.sum(f * xp.asarray(d), axis=-1)
+        return xp.sum(f * poses.constant(d, f), axis=-1)
 
     def _supported(self, seen: Seen, memory: PlaceMemory) -> Array:
         return (self._force(seen) - memory.baseline > self.press) & (seen.elapsed > 0.25)
