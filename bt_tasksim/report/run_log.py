@@ -150,7 +150,9 @@ class RunRecorder:
         extra = {name: _stacked(rows) for name, rows in self._rows.items()}
         said = list(self._said)
         if result.status == Status.INVALID and self._times:  # stopped from outside the tree
-            said.append((self._times[-1], 0, f"stopped: {result.reason}: {result.why}"))
+            time = min(result.sim_time, self._times[-1])
+            said.append((time, 0, f"stopped: {result.reason}: {result.why}"))
+            said.sort(key=lambda message: message[0])
         true = "state/objects" in extra
         poses = extra["state/objects" if true else "observations/objects"]
         extra |= {

@@ -140,8 +140,9 @@ def test_a_run_that_was_stopped_says_why():
     runner = Runner(pick_and_place.build(), pick_and_place.scene(), longest=0.5)
     recorder = RunRecorder(runner)
     run = recorder.demonstration(runner.run(3, record=recorder))
-    assert read_texts(run.extra["messages/text"]) == ["stopped: time over: not done within 0.5 s"]
-    assert run.extra["messages/node"].tolist() == [0]
+    texts = read_texts(run.extra["messages/text"])
+    assert texts == ["stopped: time over: not done within 0.5 s", "interrupted"]
+    assert run.extra["messages/node"].tolist() == [0, 1]
 
 
 def test_nodes_in_the_order_of_the_tree():
