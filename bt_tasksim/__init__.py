@@ -1,4 +1,4 @@
-"""bt-tasksim: one behaviour tree, authored or taken from a demonstration, trained, simulated and run on a robot.
+"""One behaviour tree, authored or taken from a demonstration, trained, simulated and run on a robot.
 
 Names are imported when they are first used: ``import bt_tasksim`` loads no simulator and no learning library.
 """
@@ -12,14 +12,16 @@ if TYPE_CHECKING:
     from bt_tasksim.concept import ConceptModel, Condition
     from bt_tasksim.engines.registry import EngineOptions
     from bt_tasksim.errors import BtTasksimError, InputError, MachineError
-    from bt_tasksim.runner import Result, Runner, run
+    from bt_tasksim.launch import run
+    from bt_tasksim.runner import Result, Runner
     from bt_tasksim.scene import Goal, ObjectSpec, Scene, SpotSpec
 
 _HOMES = {
     "bt_tasksim.concept": ("ConceptModel", "Condition"),
     "bt_tasksim.engines.registry": ("EngineOptions",),
     "bt_tasksim.errors": ("BtTasksimError", "InputError", "MachineError"),
-    "bt_tasksim.runner": ("Result", "Runner", "run"),
+    "bt_tasksim.launch": ("run",),
+    "bt_tasksim.runner": ("Result", "Runner"),
     "bt_tasksim.scene": ("Goal", "ObjectSpec", "Scene", "SpotSpec"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="bt-tasksim",
-        description="Behaviour trees of robot tasks: authored or taken from demonstrations, simulated, judged.",
+        description="Behaviour trees of robot tasks: from demonstrations or by hand, simulated, judged.",
     )
     parser.set_defaults(command=lambda options: parser.print_help())
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
@@ -92,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     _tree_arguments(evaluate)
     _engine_arguments(evaluate)
     evaluate.add_argument("--episodes", type=_count, default=100, metavar="N", help="default 100")
-    evaluate.add_argument("--workers", type=_count, default=1, metavar="W", help="worker processes, default 1")
+    evaluate.add_argument("--workers", type=_count, default=1, metavar="W", help="processes, default 1")
     evaluate.add_argument("--json", type=Path, metavar="F", help="write everything as JSON")
 
     bench = add("bench", _bench, "Measure speed, as ratios to peers in one run.")
@@ -103,7 +103,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def _tree_arguments(parser: argparse.ArgumentParser, seed: bool = True) -> None:
     parser.add_argument("tree", metavar="TREE", help="a scenario, a .py file with build(), or an .xml file")
-    parser.add_argument("--scene", metavar="S", help="a scenario's scene, or a .yaml file; default: the tree's own")
+    parser.add_argument(
+        "--scene", metavar="S", help="a scenario's scene or a .yaml file, if not the tree's own"
+    )
     parser.add_argument("--robot", metavar="R", help="panda, xarm7_ability, ... or a .yaml file")
     if seed:
         parser.add_argument("--seed", type=_seed, default=0, metavar="S", help="(first) seed, default 0")
@@ -113,7 +115,7 @@ def _engine_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--engines", default="sapien", metavar="E", help="default sapien")
     parser.add_argument("--perception", default="state", metavar="P", help="state (default) or camera")
     parser.add_argument(
-        "--noise", default="fine", metavar="N", help="error of the estimate: fine (default), none, original, hard"
+        "--noise", default="fine", metavar="N", help="estimate's error: fine (default), none, original, hard"
     )
 
 
@@ -167,9 +169,8 @@ def _demo(options: argparse.Namespace) -> int:
     from trees.load import load_source
 
     scene = load_source("shelf_to_shelf").scene
-    rendering = _can_render()
-    result, paths = _run_tree(tree, scene, DEMO_SEED, EngineOptions(rendering=rendering), options.out, "shelf_to_shelf")
-    print(f"{_summary(result)}; results: {_shown(paths)}")
+    result, files = _run_tree(tree, scene, DEMO_SEED, EngineOptions(rendering=True), options.out, scene.name)
+    print(f"{_summary(result)}; results: {_shown(files)}")
     return 0 if result.success else 1
 
 
@@ -233,18 +234,27 @@ def _run(options: argparse.Namespace) -> int:
     source = load_source(options.tree, options.robot, options.scene)
     engines = _options(options, rendering=options.video)
     folder = options.out or Path("runs") / f"{source.name}-{options.seed}"
-    result, paths = _run_tree(source.build(), source.scene, options.seed, engines, folder, source.name)
-    print(f"{_summary(result)}; results: {_shown(paths)}")
+    result, files = _run_tree(source.build(), source.scene, options.seed, engines, folder, source.name)
+    print(f"{_summary(result)}; results: {_shown(files)}")
     return 0 if result.success else 1
 
 
 def _run_tree(tree: Any, scene: Any, seed: int, engines: Any, folder: Path, name: str) -> tuple[Any, Any]:
-    from bt_tasksim.report.write import write_run
+    from bt_tasksim.report.write import filming_runner, write_run
     from bt_tasksim.runner import Runner
 
-    runner = Runner(tree, scene, engines)
+    why = ""
+    if engines.rendering:
+        runner, why = filming_runner(tree, scene, engines)
+        if why:
+            print(f"(without video: {why})", file=sys.stderr)
+    else:
+        runner = Runner(tree, scene, engines)
     with _progress("running", None):
-        return write_run(folder, runner, seed, scenario=name)
+        result, files = write_run(folder, runner, seed, scenario=name, no_video=why)
+    for remark in files.remarks:
+        print(remark)
+    return result, files
 
 
 def _replay(options: argparse.Namespace) -> int:
@@ -298,18 +308,8 @@ def _summary(result: Any) -> str:
     return f"{word}: {result.why} ({result.sim_time:.1f} s simulated, {result.wall_time:.1f} s)"
 
 
-def _shown(paths: Any) -> str:
-    folder = Path(paths.folder)
-    return str(folder / "report.html")
-
-
-def _can_render() -> bool:
-    from bt_tasksim.engines.rendering_sapien import device_missing
-
-    why = device_missing()
-    if why:
-        print(f"(without rendering: {why})", file=sys.stderr)
-    return not why
+def _shown(files: Any) -> str:
+    return str(Path(files.folder) / "report.html")
 
 
 @contextmanager

@@ -9,9 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
-import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
@@ -265,41 +263,3 @@ def failed_leaf(tree: Behaviour) -> Behaviour | None:
         return found
     failed = [n for n in tree.iterate() if n.status == Status.FAILURE and n.feedback_message]
     return failed[-1] if failed else found
-
-
-def run(
-    tree: Behaviour,
-    scene: Scene,
-    seed: int = 0,
-    *,
-    video: str | None = None,
-    options: EngineOptions | None = None,
-    **engines: Any,
-) -> Result:
-    """Run a tree once in a scene.
-
-    Args:
-        tree: The tree's root.
-        scene: The scene.
-        seed: Seed of the draw.
-        video: Path of a video to write.
-        options: Which engines; or name them by keyword, such as ``noise="none"``, ``perception="camera"``.
-        **engines: See `EngineOptions`.
-
-    Returns:
-        What became of it; ``result.status`` and ``result.why`` say it in short.
-    """
-    if options is None:
-        options = EngineOptions(**({"rendering": video is not None} | engines))
-    runner = Runner(tree, scene, options)
-    if video is None:
-        return runner.run(seed)
-    from bt_tasksim.report.video import VideoRecorder
-
-    with VideoRecorder(video) as recorder:
-        return runner.run(seed, record=recorder)
-
-
-def held_command(observation: Observation) -> Command:
-    """The command that holds the robot where it is."""
-    return Command(tool=observation.tool_pose, hand=np.asarray(observation.closure)[..., None])

@@ -56,7 +56,7 @@ def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePip
     if options.rendering or options.perception == "camera":
         from bt_tasksim.engines.rendering_sapien import SapienRendering
 
-        rendering = SapienRendering(robot)
+        rendering = SapienRendering()
     postprocess: PostProcessEngine
     if options.perception == "camera":
         from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
