@@ -35,9 +35,9 @@ _LENGTH = 0.3
 _DAMPING = 1e-7
 _TRACK, _HARDER, _SETTLE = 6, 200, 60
 """Iterations of a tracking step, of a solve that tries hard, and of settling into the preferred posture."""
-_PULL = 0.1
+_PULL = 0.2
 """Share of the way to the preferred posture that one tracking step asks of the null space."""
-_PULL_LIMIT = 0.03
+_PULL_LIMIT = 0.05
 """Largest such step of any joint, rad."""
 _SWING, _SWING_PER_METRE, _SWING_PER_RADIAN = 0.5, 10.0, 2.0
 """A tracked arm may change its posture at once by so much: rad, and more for the way that the tool goes."""

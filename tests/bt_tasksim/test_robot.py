@@ -146,7 +146,7 @@ def test_drive_arrays_are_in_joint_order() -> None:
     assert limits.shape == (len(robot.joints),)
     by_name = dict(zip(robot.joints, limits, strict=True))
     assert by_name["joint1"] == 500.0
-    assert by_name["thumb_q2"] == 4 * by_name["index_q1"]
+    assert by_name["thumb_q2"] == 2.5 * by_name["index_q1"]
 
 
 BAD: list[tuple[str, Any, str]] = [
