@@ -104,7 +104,12 @@ def unproject(camera: CameraModel, depth: Array) -> Array:
 
     Pixels in which nothing was seen (depth 0) give the camera's own position.
     """
-    v, u = np.mgrid[0 : camera.height, 0 : camera.width] + 0.5
-    x = (u - camera.matrix[0, 2]) / camera.matrix[0, 0]
-    y = (v - camera.matrix[1, 2]) / camera.matrix[1, 1]
+    rows, columns = np.mgrid[0 : camera.height, 0 : camera.width]
+    return unproject_pixels(camera, rows, columns, depth)
+
+
+def unproject_pixels(camera: CameraModel, rows: Array, columns: Array, depth: Array) -> Array:
+    """Points ``(..., 3)``, robot base frame, of pixels ``rows``, ``columns (...)`` with ``depth (...)`` metres."""
+    x = (columns + 0.5 - camera.matrix[0, 2]) / camera.matrix[0, 0]
+    y = (rows + 0.5 - camera.matrix[1, 2]) / camera.matrix[1, 1]
     return poses.transform(camera.pose, np.stack([x * depth, y * depth, depth], axis=-1))

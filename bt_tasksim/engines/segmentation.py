@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from bt_tasksim import poses
-from bt_tasksim.engines.cameras import unproject
+from bt_tasksim.engines.cameras import unproject_pixels
 from bt_tasksim.engines.pipeline import CameraModel
 from bt_tasksim.poses import Array
 from bt_tasksim.world import Obstacle
@@ -25,7 +25,10 @@ WIDEST_ANGLE = np.deg2rad(16.0)
 DARKEST = 0.004
 """Linear brightness below which a pixel has no colour to speak of."""
 
-_LINEAR = (np.arange(256) / 255.0) ** 2.2
+TWINS = np.deg2rad(5.0)
+"""Angle between two colours that cannot be told apart."""
+
+_LINEAR = ((np.arange(256) / 255.0) ** 2.2).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -46,23 +49,22 @@ class Segment:
         return len(self.points)
 
 
-def colour_angles(image: Array, colours: Array) -> Array:
-    """Angles ``(height, width, k)`` in radians between the pixels' colours and given ones, in linear RGB.
+def colour_cosines(image: Array, colours: Array) -> Array:
+    """Cosines ``(height, width, k)`` of the angles between the pixels' colours and given ones, in linear RGB.
 
     Shading scales a colour and leaves its direction: the spectral angle of Kruse et al., "The spectral image
-    processing system (SIPS)", Remote Sensing of Environment 44 (1993).
+    processing system (SIPS)", Remote Sensing of Environment 44 (1993). Black pixels give -1.
 
     Args:
         image: ``(height, width, 3)`` uint8, sRGB.
         colours: ``(k, 3)`` sRGB, 0 to 1.
     """
-    linear = _LINEAR[image]
-    length = np.linalg.norm(linear, axis=-1, keepdims=True)
-    wanted = np.asarray(colours, float) ** 2.2
+    linear = cv2.LUT(np.ascontiguousarray(image), _LINEAR)
+    length = np.sqrt(np.einsum("ijk,ijk->ij", linear, linear))[..., None]
+    wanted = (np.asarray(colours, float) ** 2.2).astype(np.float32)
     wanted = wanted / np.maximum(np.linalg.norm(wanted, axis=-1, keepdims=True), 1e-9)
-    cosine = linear / np.maximum(length, 1e-9) @ wanted.T
-    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
-    return np.where(length > DARKEST, angle, np.pi)
+    cosine = linear @ wanted.T / np.maximum(length, 1e-9)
+    return np.where(length > DARKEST, cosine, -1.0)
 
 
 def classify(image: Array, colours: Sequence[tuple[float, float, float]], others: Array) -> list[Array]:
@@ -74,16 +76,13 @@ def classify(image: Array, colours: Sequence[tuple[float, float, float]], others
         others: Colours ``(k, 3)`` of everything else; those that look like an object's do not count.
     """
     wanted = np.asarray(colours, float).reshape(-1, 3)
-    own = colour_angles(image, wanted)
-    rivals = np.full(image.shape[:2], np.pi)
-    swatch = np.round(255 * np.asarray(others, float).reshape(1, -1, 3)).astype(np.uint8)
-    distinct = np.all(colour_angles(swatch, wanted)[0] > np.deg2rad(5.0), axis=-1)
-    if np.any(distinct):
-        rivals = np.min(colour_angles(image, np.asarray(others, float)[distinct]), axis=-1)
-    nearest = np.min(own, axis=-1)
+    others = np.asarray(others, float).reshape(-1, 3)
+    swatch = np.round(255 * others[None]).astype(np.uint8)
+    distinct = np.all(colour_cosines(swatch, wanted)[0] < np.cos(TWINS), axis=-1)
+    cosine = colour_cosines(image, np.concatenate([wanted, others[distinct]]))
+    best = np.max(cosine, axis=-1)
     return [
-        (own[..., i] <= nearest + 1e-9) & (own[..., i] < rivals) & (own[..., i] < WIDEST_ANGLE)
-        for i in range(len(wanted))
+        (cosine[..., i] >= best - 1e-6) & (cosine[..., i] > np.cos(WIDEST_ANGLE)) for i in range(len(wanted))
     ]
 
 
@@ -122,30 +121,28 @@ def find_segments(
     rows, columns = np.nonzero(mask & (depth > 0))
     if len(rows) < smallest:
         return []
-    points = unproject(camera, depth)
+    points = unproject_pixels(camera, rows, columns, depth[rows, columns])
+    free = outside(points, boxes, margin)
+    rows, columns, points = rows[free], columns[free], points[free]
     kept = np.zeros(mask.shape, np.uint8)
-    free = outside(points[rows, columns], boxes, margin)
-    kept[rows[free], columns[free]] = 1
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(kept, connectivity=8)
-    order = sorted(range(1, count), key=lambda k: -int(stats[k, cv2.CC_STAT_AREA]))
-    order = [k for k in order if stats[k, cv2.CC_STAT_AREA] >= max(3, smallest // 10)]
-    middles = {k: np.median(points[labels == k], axis=0) for k in order[:12]}
-    segments, used = [], set()
-    for k in middles:
+    kept[rows, columns] = 1
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(kept, connectivity=8)
+    label, area = labels[rows, columns], stats[:, cv2.CC_STAT_AREA]
+    order = [
+        int(k) for k in 1 + np.argsort(-area[1:], kind="stable")[:12] if area[k] >= max(3, smallest // 10)
+    ]
+    middles = {k: np.median(points[label == k], axis=0) for k in order}
+    segments: list[Segment] = []
+    used: set[int] = set()
+    for k in order:
         if k in used:
             continue
-        parts = [
-            j for j in middles if j not in used and np.linalg.norm(middles[j] - middles[k]) < 0.75 * size
-        ]
+        parts = [j for j in order if j not in used and np.linalg.norm(middles[j] - middles[k]) < 0.75 * size]
         used.update(parts)
-        region = _without_stragglers(np.isin(labels, parts), points, middles[k], size)
-        if np.count_nonzero(region) >= smallest:
-            segments.append(Segment(region, points[region]))
+        gap = points - middles[k]
+        chosen = np.isin(label, parts) & (np.sum(gap * gap, axis=-1) < size * size)
+        if np.count_nonzero(chosen) >= smallest:
+            region = np.zeros(mask.shape, bool)
+            region[rows[chosen], columns[chosen]] = True
+            segments.append(Segment(region, points[chosen]))
     return sorted(segments, key=lambda s: -s.pixels)
-
-
-def _without_stragglers(mask: Array, points: Array, middle: Array, size: float) -> Array:
-    """The mask without points that are farther from the middle than the object is large."""
-    gap = points - middle
-    near: Array = mask & (np.sum(gap * gap, axis=-1) < size * size)
-    return near

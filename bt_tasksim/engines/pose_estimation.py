@@ -1,0 +1,200 @@
+"""The pose of a known object from its segment in one RGB-D image.
+
+Most things stand: their height is known from the surface below and only place and heading are looked for,
+from several headings at once. Where that does not explain the image, the object lies or leans, and all six
+motions are looked for, from every side that it may lie on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bt_tasksim import poses
+from bt_tasksim.engines.registration import (
+    FREE,
+    UPRIGHT,
+    Fit,
+    ModelPoints,
+    View,
+    judge_fit,
+    register,
+    sample_surface,
+)
+from bt_tasksim.poses import Array
+from bt_tasksim.shapes import Shape
+from bt_tasksim.world import ObjectModel, PlaceModel
+
+GOOD = 0.26
+"""Cost of a fit, see `Fit`, up to which a standing pose is taken without looking for others."""
+POOR = 0.5
+"""Cost beyond which no pose is believed."""
+_COARSE, _FINE = (120, 350), (700, 1600)
+"""Numbers of points seen and of model points, for trying and for the last word."""
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """An object that is looked for: its category and its geometry."""
+
+    model: ObjectModel
+    shape: Shape
+
+    @property
+    def diameter(self) -> float:
+        """Length of the bounding box's diagonal, metres."""
+        return math.hypot(*self.model.extent)
+
+    @property
+    def headings(self) -> Array:
+        """Headings ``(k,)`` in radians from which a fit finds every other one, up to symmetry."""
+        n = self.model.symmetry
+        if n == 0:
+            return np.zeros(1)
+        return np.arange(8) * (2 * math.pi / n / 8)
+
+
+def estimate_pose(
+    target: Target, view: View, places: Sequence[PlaceModel], before: Array | None = None
+) -> Fit | None:
+    """The pose of an object.
+
+    Args:
+        target: The object.
+        view: Its points and the image.
+        places: Surfaces on which it may stand.
+        before: Pose ``(7,)`` at which it last was seen, if any: tried first.
+
+    Returns:
+        The best fit, or None where no pose explains what is seen.
+    """
+    points = sample_surface(target.shape)
+    standing = stand_on(target, view, places, points, before)
+    if standing is not None and standing.cost < GOOD:
+        return standing
+    free = lie_about(target, view, points, before)
+    free = _settled(free, target, view, places, points)
+    best = free if standing is None or free.cost < standing.cost - 0.02 else standing
+    return best if best.cost < POOR else None
+
+
+def follow(target: Target, view: View, start: Array) -> Fit:
+    """The pose near ``start (7,)``, all motions free: for an object in the hand, of which little is seen."""
+    points = sample_surface(target.shape)
+    pose = register(
+        points.thinned(_FINE[1]), view.thinned(_FINE[0]), start, FREE, steps=15, reach=(0.006, 0.003)
+    )
+    return judge_fit(points, view, pose)
+
+
+def stand_on(
+    target: Target,
+    view: View,
+    places: Sequence[PlaceModel],
+    points: ModelPoints,
+    before: Array | None = None,
+) -> Fit | None:
+    """The best pose at which the object stands upright on one of the places, or None."""
+    height = target.model.extent[2]
+    middle = np.median(view.points, axis=0)
+    best: Fit | None = None
+    seen: set[int] = set()
+    for place in places:
+        up = poses.rotate(place.pose[3:], np.array([0.0, 0.0, 1.0]))
+        local = poses.transform(poses.inverse(place.pose), middle)
+        level = float(place.pose[2])
+        inside = all(abs(local[i] - place.centre[i]) < place.extent[i] / 2 + 0.05 for i in range(2))
+        if up[2] < 0.999 or not inside or not -0.02 < local[2] < height + 0.02 or round(1e5 * level) in seen:
+            continue
+        seen.add(round(1e5 * level))
+        starts = [
+            poses.pose([*_behind(middle, view, target)[:2], level + height / 2], poses.yaw(angle))
+            for angle in target.headings
+        ]
+        if before is not None:
+            heading = 2 * math.atan2(float(before[6]), float(before[3]))
+            starts.append(poses.pose([*before[:2], level + height / 2], poses.yaw(heading)))
+        fit = _best(points, view, starts, UPRIGHT, keep=2)
+        if best is None or fit.cost < best.cost:
+            best = fit
+    return best
+
+
+def lie_about(target: Target, view: View, points: ModelPoints, before: Array | None = None) -> Fit:
+    """The best pose with all motions free."""
+    position = _behind(np.median(view.points, axis=0), view, target)
+    starts = [poses.pose(position, q) for q in _orientations(target)]
+    if before is not None:
+        starts.append(np.concatenate([position, before[3:]]))
+        starts.append(np.array(before, float))
+    return _best(points, view, starts, FREE, keep=4)
+
+
+def _best(points: ModelPoints, view: View, starts: Sequence[Array], free: Sequence[int], keep: int) -> Fit:
+    """Fit from every start with few points, then the best ``keep`` of them with many."""
+    few, coarse = view.thinned(_COARSE[0]), points.thinned(_COARSE[1])
+    if len(starts) > keep:
+        tried = [judge_fit(coarse, few, register(coarse, few, s, free, steps=8)) for s in starts]
+        starts = _distinct(sorted(tried, key=lambda f: f.cost), keep)
+    many, fine = view.thinned(_FINE[0]), points.thinned(_FINE[1])
+    return min((judge_fit(points, view, register(fine, many, s, free)) for s in starts), key=lambda f: f.cost)
+
+
+def _distinct(fits: Sequence[Fit], n: int) -> list[Array]:
+    """The first ``n`` poses that are more than some degrees apart."""
+    kept: list[Array] = []
+    for fit in fits:
+        if all(float(poses.angle_between(fit.pose[3:], other[3:])) > math.radians(12.0) for other in kept):
+            kept.append(fit.pose)
+        if len(kept) == n:
+            break
+    return kept
+
+
+def _behind(middle: Array, view: View, target: Target) -> Array:
+    """The object's likely centre: behind the middle of what is seen of it, as the camera looks."""
+    ray = middle - view.camera.pose[:3]
+    ray = ray / np.linalg.norm(ray)
+    return middle + 0.3 * min(target.model.extent) * ray
+
+
+def _orientations(target: Target) -> list[Array]:
+    """Rotations ``(4,)`` with each side of the object down and at several headings."""
+    model = target.model
+    down = [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)]
+    if model.symmetry != 0:
+        down += [(-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)]
+        down += [tuple(s * v for v in axis) for axis in model.grasp_axes[1:] for s in (1, -1)]  # type: ignore[misc]
+    out = []
+    for axis in down:
+        round_up = model.symmetry == 0 and abs(axis[2]) > 0.5
+        tip = _turning(np.array(axis), np.array([0.0, 0.0, 1.0]))
+        out += [
+            poses.quat_multiply(poses.yaw(2 * math.pi * k / 10), tip) for k in range(1 if round_up else 10)
+        ]
+    return out
+
+
+def _turning(a: Array, b: Array) -> Array:
+    """The shortest rotation ``(4,)`` that turns unit vector ``a`` onto ``b``."""
+    axis, cosine = np.cross(a, b), float(a @ b)
+    if cosine < -1 + 1e-9:
+        return np.array([0.0, 1.0, 0.0, 0.0]) if abs(a[0]) < 0.9 else np.array([0.0, 0.0, 1.0, 0.0])
+    return poses.normalise(np.array([1.0 + cosine, *axis]))
+
+
+def _settled(fit: Fit, target: Target, view: View, places: Sequence[PlaceModel], points: ModelPoints) -> Fit:
+    """The same pose, moved up or down to touch the surface below where it nearly does."""
+    lowest = float(np.min(poses.transform(fit.pose, target.shape.visual.vertices)[:, 2]))
+    for place in places:
+        local = poses.transform(poses.inverse(place.pose), fit.pose[:3])
+        inside = all(abs(local[i] - place.centre[i]) < place.extent[i] / 2 for i in range(2))
+        gap = lowest - float(place.pose[2])
+        if inside and abs(gap) < 0.008:
+            pose = fit.pose.copy()
+            pose[2] -= gap
+            return judge_fit(points, view, pose)
+    return fit

@@ -1,0 +1,240 @@
+"""Post-process with images: where the objects are, as an RGB-D camera sees them and the hand feels them.
+
+Images are few, because they are dear: one at the beginning, one when a concept asks for it, and some after
+the hand has let go of something, until it lies still. In between, an object that the fingers hold moves with
+the tool, and everything else stays where it was seen.
+
+Nothing here knows where objects truly are. What is used of the configuration is what a robot is told: the
+objects' shapes and colours by category, the calibrated fixtures and places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bt_tasksim import poses
+from bt_tasksim.engines.camera_errors import CameraErrors, as_calibrated
+from bt_tasksim.engines.features import TOUCH, ObservationBuilder
+from bt_tasksim.engines.pipeline import Image
+from bt_tasksim.engines.pose_estimation import Target, estimate_pose, follow
+from bt_tasksim.engines.registration import Fit, View
+from bt_tasksim.engines.segmentation import NEUTRAL, classify, find_segments
+from bt_tasksim.errors import MachineError
+from bt_tasksim.poses import Array
+from bt_tasksim.robot import RobotDescription
+from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.world import Observation, PlaceModel, WorldModel, WorldState
+
+REACH = 0.03
+"""Metres between tool and object within which opposing contacts mean that the object is held."""
+APART = 3
+"""Ticks in a row without contact after which the hand has let go (contacts flicker)."""
+WAIT = 0.25
+"""Seconds from the end of contact to a look, and from that to the next one."""
+LOOKS = 8
+"""Looks after the end of contact, at most."""
+SAME = (0.006, np.deg2rad(6.0))
+"""Metres and radians within which two looks agree: the object is at rest."""
+
+
+@dataclass
+class Track:
+    """What is remembered of one object.
+
+    Attributes:
+        grip: Pose ``(7,)`` in the tool frame while the hand holds it, or None.
+        apart: Ticks in a row without the contacts that hold it or touch it.
+        touched: The hand has touched it since it last was seen at rest.
+        due: Time of the next look, seconds; infinite for none.
+        looks: Looks that are left before it is given up.
+        note: Why it was not seen in the last look; empty when it was.
+    """
+
+    grip: Array | None = None
+    apart: int = 0
+    touched: bool = False
+    due: float = np.inf
+    looks: int = 0
+    note: str = ""
+
+
+class CameraPostProcess:
+    """A post-process engine with images.
+
+    An object that was never seen has NaN for its estimated pose, and `unseen` says why; one that was seen and
+    is not any more keeps the pose at which it last was.
+
+    Args:
+        robot: The robot.
+        errors: Errors that are added to rendered images; on a real robot `camera_errors.PERFECT`.
+        camera: Name of the RGB-D camera.
+    """
+
+    perception = "camera"
+
+    def __init__(
+        self, robot: RobotDescription, errors: CameraErrors | None = None, camera: str = "scene"
+    ) -> None:
+        self.robot = robot
+        self.errors = CameraErrors() if errors is None else errors
+        self.camera = camera
+
+    def reset(self, configuration: ActorConfiguration, model: WorldModel) -> None:
+        """See `PostProcessEngine.reset`."""
+        n = len(configuration.objects)
+        self._model = model
+        self._targets = [
+            Target(known, actor.shape())
+            for known, actor in zip(model.objects, configuration.objects, strict=True)
+        ]
+        self._colours = [actor.colour for actor in configuration.objects]
+        fixtures = {box.colour for fixture in configuration.fixtures for box in fixture.boxes}
+        self._others = np.array([NEUTRAL, *sorted(fixtures)])
+        self._rng = configuration.generator("camera")
+        self._calibration = self.errors.calibration(self._rng)
+        self._tracks = [Track() for _ in range(n)]
+        self._estimate = np.full((n, 7), np.nan)
+        self._builder = ObservationBuilder(self.robot, configuration)
+        self._next = 0.0
+
+    def cameras(self, needed: bool) -> tuple[str, ...]:
+        """The camera, when a concept asks for a look or an object is to be looked at."""
+        due = any(track.due <= self._next + 1e-6 for track in self._tracks)
+        return (self.camera,) if self._tracks and (needed or due) else ()
+
+    def observe(self, state: WorldState, images: Mapping[str, Image]) -> Observation:
+        """See `PostProcessEngine.observe`.
+
+        Raises:
+            MachineError: An image has no depth.
+        """
+        time = float(state.time)
+        self._next = time + self._model.control_period
+        self._feel(state)
+        for image in images.values():
+            self._look(image, time)
+        return self._builder.build(state, self._estimate.copy())
+
+    def unseen(self) -> dict[str, str]:
+        """For each object that was not seen in the last look at it, one sentence that says so, by name."""
+        return {
+            target.model.name: track.note
+            for target, track in zip(self._targets, self._tracks, strict=True)
+            if track.note
+        }
+
+    def _feel(self, state: WorldState) -> None:
+        """Move what the hand holds; notice what it takes and what it lets go."""
+        touching = np.sum(state.tip_force**2, axis=-1) > TOUCH * TOUCH
+        opposed = all(any(touching[i] for i in group) for group in self.robot.opposition)
+        near = self._in_reach(state.tool_pose)
+        for i, track in enumerate(self._tracks):
+            if track.grip is not None:
+                track.apart = 0 if opposed else track.apart + 1
+                if opposed:
+                    self._estimate[i] = poses.multiply(state.tool_pose, track.grip)
+                elif track.apart >= APART:
+                    track.grip = None
+                    self._look_later(track, float(state.time))
+            elif i == near and opposed and not any(t.grip is not None for t in self._tracks):
+                track.grip = poses.multiply(poses.inverse(state.tool_pose), self._estimate[i])
+                track.touched, track.apart, track.due = True, 0, np.inf
+            elif i == near and np.any(touching):
+                track.touched, track.apart, track.due = True, 0, np.inf
+            elif track.touched and not np.isfinite(track.due):
+                track.apart += 1
+                if track.apart >= APART:
+                    self._look_later(track, float(state.time))
+
+    def _look_later(self, track: Track, time: float) -> None:
+        track.touched, track.apart, track.due, track.looks = False, 0, time + WAIT, LOOKS
+
+    def _in_reach(self, tool: Array) -> int:
+        """Index of the object whose nominal box is nearest to the tool, within reach of the fingers; or -1."""
+        best, found = REACH, -1
+        for i, target in enumerate(self._targets):
+            if np.isfinite(self._estimate[i, 0]):
+                local = poses.transform(poses.inverse(self._estimate[i]), tool[:3])
+                gap = np.maximum(np.abs(local) - np.array(target.model.extent) / 2, 0.0)
+                distance = float(np.linalg.norm(gap))
+                if distance < best:
+                    best, found = distance, i
+        return found
+
+    def _look(self, image: Image, time: float) -> None:
+        if image.depth is None:
+            raise MachineError(f"camera '{image.camera.name}' gives no depth: poses need an RGB-D camera")
+        camera = as_calibrated(image.camera, self._calibration)
+        depth = self.errors.depth(image.depth, self._rng)
+        masks = classify(image.colour, self._colours, self._others)
+        taken = np.zeros(depth.shape, bool)
+        for i, (target, track) in enumerate(zip(self._targets, self._tracks, strict=True)):
+            segments = find_segments(
+                camera, depth, masks[i] & ~taken, self._model.obstacles, size=target.diameter
+            )
+            others = np.any([m for k, m in enumerate(masks) if k != i] or [taken], axis=0)
+            fit, segment, pixels = None, None, segments[0].pixels if segments else 0
+            for candidate in segments[:3]:
+                view = View(camera, depth, self._rng.permutation(candidate.points), others)
+                found = self._estimated(i, view)
+                if found is not None and (fit is None or found.cost < fit.cost):
+                    fit, segment = found, candidate
+            if fit is None or segment is None:
+                track.note = (
+                    f"{target.model.name} is not seen: camera '{image.camera.name}' shows {pixels} pixels "
+                    f"of its colour that could be it"
+                )
+                self._again(track, time, settled=False)
+            else:
+                track.note = ""
+                taken |= segment.mask
+                self._accept(i, fit, time)
+
+    def _estimated(self, i: int, view: View) -> Fit | None:
+        """The fit of object ``i`` to what may be it, or None."""
+        target, before = self._targets[i], self._estimate[i]
+        if self._tracks[i].grip is not None:
+            fit = follow(target, view, before)
+            moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
+            turned = float(poses.angle_between(fit.pose[3:], before[3:]))
+            return fit if fit.cost < 0.3 and moved < 0.02 and turned < 0.35 else None
+        known = before if np.isfinite(before[0]) else None
+        return estimate_pose(target, view, [*self._model.places.values(), *self._tops(i)], known)
+
+    def _tops(self, i: int) -> list[PlaceModel]:
+        """The tops of the other objects that stand, as places."""
+        tops = []
+        table = next(iter(self._model.places.values()), None)
+        for k, target in enumerate(self._targets):
+            pose = self._estimate[k]
+            if k == i or table is None or not np.isfinite(pose[0]):
+                continue
+            if poses.rotate(pose[3:], np.array([0.0, 0.0, 1.0]))[2] > 0.99:
+                x, y, z = target.model.extent
+                top = poses.multiply(pose, poses.pose([0.0, 0.0, z / 2]))
+                tops.append(
+                    replace(table, name=target.model.name, pose=top, extent=(x, y), centre=(0.0, 0.0))
+                )
+        return tops
+
+    def _accept(self, i: int, fit: Fit, time: float) -> None:
+        track, before = self._tracks[i], self._estimate[i].copy()
+        self._estimate[i] = fit.pose
+        if track.grip is not None:
+            # What holds is the tool: its pose is known far better than the object's.
+            back = poses.multiply(poses.inverse(before), fit.pose)
+            track.grip = poses.multiply(track.grip, back)
+            return
+        moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
+        up = np.array([0.0, 0.0, 1.0])
+        tipped = float(np.linalg.norm(poses.rotate(fit.pose[3:], up) - poses.rotate(before[3:], up)))
+        self._again(track, time, settled=moved < SAME[0] and tipped < SAME[1])
+
+    def _again(self, track: Track, time: float, settled: bool) -> None:
+        """Whether to look once more at something that the hand has let go."""
+        if np.isfinite(track.due) and track.due <= time + 1e-6:
+            track.looks -= 1
+            track.due = np.inf if settled or track.looks <= 0 else time + WAIT

@@ -1,0 +1,209 @@
+"""Fitting a known shape to the points of a depth image, seen from one side.
+
+Point-to-plane iterative closest points: Y. Chen and G. Medioni, "Object modelling by registration of multiple
+range images", Image and Vision Computing 10 (1992). Only the model's points that face the camera take part,
+so the side that nobody sees does not pull; weights are Cauchy's, so that stray points hardly count.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from bt_tasksim import poses
+from bt_tasksim.engines.cameras import project
+from bt_tasksim.engines.pipeline import CameraModel
+from bt_tasksim.poses import Array
+from bt_tasksim.shapes import Shape
+
+UPRIGHT = (0, 1, 5)
+"""Free motions of a thing that stands on a plane: x, y, rotation about z."""
+FREE = (0, 1, 2, 3, 4, 5)
+"""All motions: x, y, z, and rotations about x, y, z of the robot base frame."""
+SEE_THROUGH = 0.012
+"""Metres by which something behind the model is seen in its place before the model is in doubt."""
+FAR = 0.010
+"""Metres from the model at which a point counts as not explained at all."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelPoints:
+    """Points ``(n, 3)`` on a shape's visible surface and unit normals ``(n, 3)`` there, object's frame.
+
+    ``area`` is that of the whole surface in square metres.
+    """
+
+    points: Array
+    normals: Array
+    area: float
+
+    @property
+    def spacing(self) -> float:
+        """Distance between neighbouring points, about, in metres."""
+        return math.sqrt(self.area / max(len(self.points), 1))
+
+    def thinned(self, n: int) -> ModelPoints:
+        """The first ``n`` of them; they lie in random order."""
+        return ModelPoints(self.points[:n], self.normals[:n], self.area)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What is known of one object from one image.
+
+    Attributes:
+        camera: The camera.
+        depth: ``(height, width)`` metres, of everything.
+        points: ``(n, 3)`` the object's points, robot base frame, in random order.
+        others: ``(height, width)`` boolean: pixels that show another known object or are not to be judged.
+    """
+
+    camera: CameraModel
+    depth: Array
+    points: Array
+    others: Array | None = None
+
+    def thinned(self, n: int) -> View:
+        """With at most ``n`` points."""
+        return View(self.camera, self.depth, self.points[:n], self.others)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A pose and how well it explains an image.
+
+    Attributes:
+        pose: ``(7,)`` robot base frame.
+        distance: Mean distance of the points to the model, each counted as `FAR` at most; metres.
+        missing: Share of the model's facing points in whose place something behind is seen, 0 to 1.
+    """
+
+    pose: Array
+    distance: float
+    missing: float
+
+    @property
+    def cost(self) -> float:
+        """0 for a perfect fit, about 1 where nothing fits."""
+        return self.distance / FAR + self.missing
+
+
+@lru_cache(maxsize=256)
+def sample_surface(shape: Shape, n: int = 3000) -> ModelPoints:
+    """Points spread evenly over what is seen of a shape; the same ones at every call."""
+    mesh = shape.visual
+    corners = mesh.vertices[mesh.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(normal, axis=-1)
+    rng = np.random.default_rng(0)
+    # Evenly spaced along the summed area, then shuffled: less clustered than independent draws.
+    along = (np.arange(n) + rng.uniform(0, 1, n)) / n * np.sum(area)
+    which = np.minimum(np.searchsorted(np.cumsum(area), along), len(area) - 1)
+    rng.shuffle(which)
+    u, v = rng.uniform(0, 1, (2, n, 1))
+    flip = u + v > 1
+    u, v = np.where(flip, 1 - u, u), np.where(flip, 1 - v, v)
+    c = corners[which]
+    points = c[:, 0] + u * (c[:, 1] - c[:, 0]) + v * (c[:, 2] - c[:, 0])
+    return ModelPoints(points, normal[which] / area[which][:, None], float(np.sum(area)) / 2)
+
+
+def register(
+    model: ModelPoints,
+    view: View,
+    start: Array,
+    free: Sequence[int],
+    *,
+    steps: int = 20,
+    reach: tuple[float, float] = (0.02, 0.003),
+) -> Array:
+    """The pose ``(7,)`` near ``start`` at which the model fits the points best.
+
+    Args:
+        model: Points of the shape.
+        view: The object's points and the camera.
+        start: Pose ``(7,)`` to begin at, robot base frame.
+        free: Motions that are looked for, see `FREE`.
+        steps: How many iterations at most.
+        reach: Width of Cauchy's weight at the first step and at the last, metres.
+    """
+    pose = np.array(start, float)
+    columns, points = list(free), view.points
+    eye = view.camera.pose[:3]
+    small = 0
+    for k in range(steps):
+        width = reach[0] * (reach[1] / reach[0]) ** min(1.0, 1.5 * k / max(steps - 1, 1))
+        surface, normal = _facing(model, pose, eye)
+        if len(surface) < 10:
+            return pose
+        nearest, distance2 = _closest(points, surface)
+        a, n = surface[nearest] - pose[:3], normal[nearest]
+        residual = np.sum(n * (points - surface[nearest]), axis=-1)
+        weight = 1.0 / (1.0 + distance2 / (width * width))
+        J = np.concatenate([n, np.cross(a, n)], axis=-1)[:, columns]
+        H = J.T @ (weight[:, None] * J)
+        # A motion that the shape does not show stays still; rotations count by a lever of 3 cm.
+        scale = np.array([1.0, 1.0, 1.0, 0.03, 0.03, 0.03])[columns] ** 2
+        H[np.diag_indices_from(H)] += 1e-3 * np.sum(weight) * scale
+        step = np.zeros(6)
+        step[columns] = np.linalg.solve(H, J.T @ (weight * residual))
+        step[3:] *= min(1.0, 0.4 / max(float(np.linalg.norm(step[3:])), 1e-9))
+        pose[:3] += step[:3]
+        pose[3:] = poses.normalise(poses.quat_multiply(poses.from_rotation_vector(step[3:]), pose[3:]))
+        small = small + 1 if np.linalg.norm(step[:3]) < 2e-5 and np.linalg.norm(step[3:]) < 2e-4 else 0
+        if small >= 2 and k >= 0.7 * steps:
+            break
+    return pose
+
+
+def judge_fit(model: ModelPoints, view: View, pose: Array) -> Fit:
+    """How well a pose explains the object's points, and what is seen where the object should be."""
+    surface, normal = _facing(model, pose, view.camera.pose[:3])
+    if len(surface) < 10:
+        return Fit(pose, FAR, 1.0)
+    nearest, distance2 = _closest(view.points, surface)
+    across2 = np.sum(normal[nearest] * (view.points - surface[nearest]), axis=-1) ** 2
+    # Beside a sample of the surface is still on the surface, as far as the next sample.
+    along = np.maximum(np.sqrt(np.maximum(distance2 - across2, 0.0)) - model.spacing, 0.0)
+    distance = float(np.mean(np.minimum(np.sqrt(across2 + along * along), FAR)))
+    return Fit(pose, distance, _missing(surface, view))
+
+
+def _missing(surface: Array, view: View) -> float:
+    """Share of the points ``(n, 3)`` of which neither the object nor anything before it is seen."""
+    pixel, depth = project(view.camera, surface)
+    column, row = np.floor(pixel).astype(int).T
+    height, width = view.depth.shape
+    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height) & (depth > 0)
+    column, row, depth = column[inside], row[inside], depth[inside]
+    seen = view.depth[row, column]
+    through = (seen > depth + SEE_THROUGH) & (seen > 0)
+    if view.others is not None:
+        through &= ~view.others[row, column]
+    # What lies outside of the picture is neither seen nor missed.
+    return float(np.count_nonzero(through)) / max(len(surface), 1)
+
+
+def _facing(model: ModelPoints, pose: Array, eye: Array) -> tuple[Array, Array]:
+    """The model's points and normals, base frame, that face a camera at ``eye (3,)``."""
+    matrix = poses.to_matrix(pose[3:])
+    local_eye = matrix.T @ (eye - pose[:3])
+    to_eye = local_eye - model.points
+    cosine = np.sum(to_eye * model.normals, axis=-1) / np.sqrt(np.sum(to_eye * to_eye, axis=-1))
+    facing = cosine > 0.08
+    return model.points[facing] @ matrix.T + pose[:3], model.normals[facing] @ matrix.T
+
+
+def _closest(points: Array, surface: Array) -> tuple[Array, Array]:
+    """For each of ``points (n, 3)`` the nearest of ``surface (m, 3)``: index ``(n,)``, distance squared ``(n,)``."""
+    middle = surface[0]
+    p, s = points - middle, surface - middle
+    cross = p @ s.T
+    square = np.sum(s * s, axis=-1)
+    nearest = np.argmin(square - 2 * cross, axis=-1)
+    gap = p - s[nearest]
+    return nearest, np.sum(gap * gap, axis=-1)
