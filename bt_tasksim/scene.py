@@ -112,13 +112,15 @@ class Disturbance:
         delay: Seconds between the moment at which the hand first holds the object clear of its support and
             the push.
         force: Force ``(3,)`` in N, robot base frame, kept up until the object has left the hand.
+        speed: Speed along the force, m/s, above which it pauses: a push rather than a shot.
         limit: Longest time in seconds for which it is kept up.
     """
 
     object: str
     delay: float
     force: tuple[float, float, float]
-    limit: float = 0.3
+    speed: float = 0.5
+    limit: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -397,11 +399,11 @@ def _draw_object(
 
 def _draw_disturbance(name: str, rng: np.random.Generator) -> Disturbance:
     heading = rng.uniform(-np.pi, np.pi)
-    force = rng.uniform(40.0, 60.0)
+    side = rng.uniform(0.0, 20.0)
     return Disturbance(
         object=name,
-        delay=float(rng.uniform(0.0, 2.5)),
-        force=(float(8 * np.cos(heading)), float(8 * np.sin(heading)), float(-force)),
+        delay=float(rng.uniform(0.0, 1.6)),
+        force=(float(side * np.cos(heading)), float(side * np.sin(heading)), -120.0),
     )
 
 

@@ -9,6 +9,7 @@ from concept_nodes.grasp import Grasp
 from concept_nodes.pick import Pick
 from concept_nodes.place import Place
 from concept_nodes.release import Release
+from concept_nodes.wait import Wait
 
 __all__ = [
     "AtPose",
@@ -20,6 +21,7 @@ __all__ = [
     "Release",
     "TimePassed",
     "Upright",
+    "Wait",
     "catalogue",
 ]
 
@@ -27,6 +29,6 @@ __all__ = [
 def catalogue() -> dict[str, type[ConceptModel] | type[Condition]]:
     """All concepts and conditions by name, as trees in XML name them."""
     leaves: list[type[ConceptModel] | type[Condition]] = [
-        Grasp, Pick, Bring, Place, Release, Holding, AtPose, Upright, TimePassed,
+        Grasp, Pick, Bring, Place, Release, Wait, Holding, AtPose, Upright, TimePassed,
     ]  # fmt: skip
     return {leaf.__name__: leaf for leaf in leaves}

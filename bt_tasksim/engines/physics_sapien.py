@@ -78,19 +78,20 @@ class SapienPhysics:
         self._dt = 1.0 / configuration.physics_frequency
         self._substeps = configuration.physics_frequency // configuration.control_frequency
         self._time = 0.0
-        self._steps = 0
         self._materials: dict[float, Any] = {}
         self._bodies: dict[Any, tuple[str, int]] = {}
         self._keep: list[Any] = []
         self._penetration = 0.0
         self._falling = False
+        self._last_dt = self._dt
         self._build_fixtures(configuration)
         self._build_objects(configuration)
         self._build_robot(configuration)
         self._disturbance = configuration.disturbance
         self._disturbed = _DISTURBANCE_WAITING if configuration.disturbance else _DISTURBANCE_OVER
         self._held_since: float | None = None
-        self._pushed_until = 0.0
+        self._push_end = 0.0
+        self._names = [actor.name for actor in configuration.objects]
         self._n_bodies = len(configuration.objects) + len(configuration.fixtures)
         return self._state()
 
@@ -213,6 +214,7 @@ class SapienPhysics:
 
     def step(self, target: JointTarget) -> WorldState:
         """See `PhysicsEngine.step`."""
+        self._last_dt = self._dt
         position, velocity = target.position, target.velocity
         changed = (position != self._target) | (velocity != self._velocity_target)
         if changed.any():
@@ -222,22 +224,26 @@ class SapienPhysics:
                 joint.set_drive_target(p[i])
                 joint.set_drive_velocity_target(v[i])
             self._target, self._velocity_target = position, velocity
-        if self._falling:
-            self._scene.set_timestep(self._dt / FINE)
-            for _ in range(self._substeps * FINE):
-                self._system.step()
-            self._scene.set_timestep(self._dt)
-        elif self._disturbed == _DISTURBANCE_OVER:
+        if self._disturbed != _DISTURBANCE_OVER:
+            for _ in range(self._substeps):
+                self._disturbed_step()
+        elif self._falling:
+            self._fine_steps(self._substeps)
+        else:
             step = self._system.step
             for _ in range(self._substeps):
                 step()
-        else:
-            for _ in range(self._substeps):
-                self._disturb()
-                self._system.step()
-        self._steps += 1
         self._time += self._dt * self._substeps
         return self._state()
+
+    def _fine_steps(self, n: int) -> None:
+        self._scene.set_timestep(self._dt / FINE)
+        self._last_dt = self._dt / FINE
+        for _ in range(n * FINE):
+            if self._disturbed == _DISTURBANCE_PUSHING:
+                self._push()
+            self._system.step()
+        self._scene.set_timestep(self._dt)
 
     def _state(self) -> WorldState:
         articulation = self._articulation
@@ -299,7 +305,7 @@ class SapienPhysics:
         hand_force = [0.0] * n
         distance = [math.inf] * n
         support: set[tuple[int, int]] = set()
-        rate = 1.0 / (self._dt / FINE if self._falling else self._dt)
+        rate = 1.0 / self._last_dt
         deepest = self._penetration
         for contact in self._system.get_contacts():
             a, b = contact.bodies
@@ -361,28 +367,35 @@ class SapienPhysics:
 
     # ---- disturbance ------------------------------------------------------------------------------------
 
-    def _disturb(self) -> None:
-        """Push the object out of the hand, once, some time after it was first held clear of its support."""
-        disturbance: Disturbance | None = self._disturbance
-        assert disturbance is not None
-        k = next(i for i, b in enumerate(self._objects) if b.entity.name == disturbance.object)
-        held = self._hand_force[k] > 1.0 and not any(i == k for i, _ in self._support)
+    def _disturbed_step(self) -> None:
+        """One physics step, with a push that begins some time after the object was first held clear."""
+        disturbance: Disturbance = self._disturbance
         if self._disturbed == _DISTURBANCE_WAITING:
-            if not held:
-                return
+            k = self._names.index(disturbance.object)
             if self._held_since is None:
-                self._held_since = self._time
-            if self._time - self._held_since < disturbance.delay:
-                return
-            self._disturbed = _DISTURBANCE_PUSHING
-            self._pushed_until = self._time + disturbance.limit
+                if self._hand_force[k] > 1.0 and not any(i == k for i, _ in self._support):
+                    self._held_since = self._time
+            elif self._time - self._held_since >= disturbance.delay:
+                self._disturbed = _DISTURBANCE_PUSHING
+                self._push_end = self._time + disturbance.limit
+        if self._disturbed == _DISTURBANCE_PUSHING or self._falling:
+            self._fine_steps(1)
+        else:
+            self._system.step()
+
+    def _push(self) -> None:
+        """Push the object until it has left the hand, no faster than the disturbance says."""
+        disturbance: Disturbance = self._disturbance
+        k = self._names.index(disturbance.object)
         self._read_contacts()
-        if self._time > self._pushed_until or self._hand_force[k] <= 0.0:
+        if self._time > self._push_end or self._hand_force[k] <= 0.0:
             self._disturbed = _DISTURBANCE_OVER
             return
+        force = np.array(disturbance.force)
         body = self._objects[k]
-        body.wake_up()
-        body.add_force_at_point(list(disturbance.force), body.entity_pose.p)
+        if float(body.linear_velocity @ force) < disturbance.speed * float(np.linalg.norm(force)):
+            body.wake_up()
+            body.add_force_at_point(force.tolist(), body.entity_pose.p)
 
 
 _DISTURBANCE_WAITING, _DISTURBANCE_PUSHING, _DISTURBANCE_OVER = range(3)
