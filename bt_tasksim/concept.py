@@ -26,7 +26,7 @@ LOST_TICKS = 3
 """Ticks in a row without a maintained goal after which it counts as lost (contacts flicker)."""
 
 
-class ContextLeaf(Behaviour):  # type: ignore[misc]
+class ContextLeaf(Behaviour):
     """A leaf that reads and writes the tree's `Context`."""
 
     def __init__(self, name: str) -> None:
@@ -94,9 +94,11 @@ class ConceptNode(ContextLeaf, abc.ABC):
 
     def update(self) -> Status:
         """One tick: judge, then act."""
-        model, context = self._model, self.context
+        model, context, policy = self._model, self._context, self._policy
+        if context is None or policy is None:
+            raise RuntimeError(f"leaf '{self.name}' was ticked before it was set up")
         if not self._active:
-            self._started = context.time
+            self._started = context.now
             seen = context.seen(0.0)
             why = model.initial_state(seen)
             if why:
@@ -107,7 +109,7 @@ class ConceptNode(ContextLeaf, abc.ABC):
                 return self._fail(f"cannot start: {error}")
             self._active = True
         else:
-            seen = context.seen(context.time - self._started)
+            seen = context.seen(context.now - self._started)
         memory = self.memory
         if bool(model.violated(seen, memory)):
             return self._fail(f"limit violated: {model.explain(seen, memory)}")
@@ -122,7 +124,7 @@ class ConceptNode(ContextLeaf, abc.ABC):
                 break
         else:
             self._lost = 0
-        action = self.policy_in_use.act(model, seen, memory)
+        action = policy.act(model, seen, memory)
         if bool(action.terminate):
             for goal in model.ends:
                 context.end(goal, model.actor)
@@ -133,7 +135,8 @@ class ConceptNode(ContextLeaf, abc.ABC):
         if seen.elapsed > model.timeout:
             return self._fail(f"not done within {model.timeout:g} s: {model.explain(seen, memory)}")
         context.write(model.command(action.motion, seen, memory), self)
-        context.look = context.look or model.looks(seen, memory)
+        if model.looks(seen, memory):
+            context.look = True
         self.memory = model.advance(seen, memory)
         self.feedback_message = ""
         return Status.RUNNING

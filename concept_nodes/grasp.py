@@ -149,18 +149,14 @@ def resting_place(seen: Seen, target: str) -> PlaceModel | None:
     best: tuple[float, PlaceModel] | None = None
     for place in seen.world.places.values():
         local = poses.transform(poses.inverse(place.pose), pose[:3])
-        inside = all(
-            abs(float(local[i]) - place.centre[i]) <= place.extent[i] / 2 + 0.02 for i in range(2)
-        )
+        inside = all(abs(float(local[i]) - place.centre[i]) <= place.extent[i] / 2 + 0.02 for i in range(2))
         gap = abs(float(local[2]) - half)
         if inside and gap < 0.05 and (best is None or gap < best[0] - 1e-6):
             best = (gap, place)
     return best[1] if best else None
 
 
-def grasp_pose(
-    seen: Seen, target: str, approach: Array | None = None, closing: Array | None = None
-) -> Array:
+def grasp_pose(seen: Seen, target: str, approach: Array | None = None, closing: Array | None = None) -> Array:
     """The tool pose ``(7,)`` for a grasp of an object at its estimated pose.
 
     Of the object's grasp axes those count that lie across the approach and fit into the hand; of the tool

@@ -1,0 +1,135 @@
+"""Bring: pure in batches, where it ends, which way it takes, and what it says when it cannot."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from bt_tasksim import poses
+from bt_tasksim.errors import InputError
+from bt_tasksim.world import Obstacle
+from concept_nodes import Bring
+from concept_nodes.bring import standing_pose
+
+
+@pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf", "pick_and_throw"])
+def test_one_by_one_and_in_batches_are_the_same(situations, functions, scenario):
+    answers = {name: situations(Bring, scenario).check(name) for name in functions}
+    for name in ("done", "maintained", "necessary_cost", "sufficient_cost"):
+        assert len({float(np.squeeze(a)) for a in answers[name]}) > 1, name
+
+
+def carry(toy, leaf, name="cup", obstacles=None):
+    stage = toy(leaf)
+    if obstacles is not None:
+        stage.context._world = dataclasses.replace(stage.context.world, obstacles=tuple(obstacles))
+    stage.world.hold(name)
+    stage.look()
+    seen = stage.context.seen(0.0)
+    grip = poses.multiply(poses.inverse(seen.tool), seen.object(name))
+    status = stage.tick(400)
+    tools = np.array([c.tool for c in stage.world.steps])
+    ends = poses.multiply(tools[-1], grip) if len(tools) else None
+    return stage, status, tools, ends
+
+
+def test_it_ends_upright_above_the_place_with_its_heading(toy):
+    stage, status, _, cup = carry(toy, Bring("box", to="goal", hover=0.05), "box")
+    assert status == Status.SUCCESS
+    place, model = stage.context.world.place("goal"), stage.context.world.object("box")
+    local = poses.multiply(poses.inverse(place.pose), cup)
+    assert np.allclose(local[:3], [0, 0, model.extent[2] / 2 + 0.05], atol=1e-3)
+    turned = min(float(poses.angle_between(local[3:], poses.yaw(k * np.pi))) for k in range(model.symmetry))
+    assert turned < 1e-2
+
+
+def test_above_another_object_and_to_a_position(toy):
+    stage, status, _, cup = carry(toy, Bring("cup", to="box", hover=0.03))
+    box, world = stage.context.seen(0.0).object("box"), stage.context.world
+    top = box[2] + world.object("box").extent[2] / 2
+    assert status == Status.SUCCESS and np.allclose(cup[:2], box[:2], atol=1e-3)
+    assert cup[2] - world.object("cup").extent[2] / 2 == pytest.approx(top + 0.03, abs=1e-3)
+    _, status, _, cup = carry(toy, Bring("cup", position=(0.5, 0.1, 0.4)))
+    assert status == Status.SUCCESS and np.allclose(cup[:3], [0.5, 0.1, 0.4], atol=1e-3)
+
+
+def test_via_points_are_passed_in_order(toy):
+    via = [(0.0, -0.2, 0.3), (0.1, -0.1, 0.35)]
+    leaf = Bring("cup", position=(0.5, 0.2, 0.3), via=via)
+    _, status, tools, _ = carry(toy, leaf)
+    cup = tools[:, :3]  # the toy holds objects at the tool's origin
+    assert status == Status.SUCCESS
+    near = [np.linalg.norm(cup - (np.array([0.5, 0.2, 0.3]) + v), axis=-1) for v in via]
+    assert all(n.min() < 0.04 for n in near) and near[0].argmin() < near[1].argmin()
+
+
+def test_it_goes_round_what_is_in_the_way(toy):
+    wall = Obstacle(poses.pose([0.45, 0.22, 0.2]), (0.6, 0.03, 0.5), "wall")
+    leaf = Bring("cup", position=(0.45, 0.45, 0.35))
+    _, status, straight, _ = carry(toy, leaf, obstacles=[])
+    assert status == Status.SUCCESS and straight[:, 2].max() < 0.36
+    stage, status, tools, _ = carry(toy, Bring("cup", position=(0.45, 0.45, 0.35)), obstacles=[wall])
+    assert status == Status.SUCCESS, stage.tree.feedback_message
+    assert tools[:, 2].max() > 0.45
+
+
+def test_no_way_is_a_failure_that_others_can_act_upon(toy):
+    shut = [Obstacle(poses.pose([0.45, 0.0, 0.35 + s * 0.35]), (0.8, 0.8, 0.02), "cage") for s in (-1, 1)] + [
+        Obstacle(poses.pose([0.45 + s * a * 0.35, s * (1 - a) * 0.35, 0.35]), size, "cage")
+        for s in (-1, 1)
+        for a, size in ((1, (0.02, 0.8, 0.8)), (0, (0.8, 0.02, 0.8)))
+    ]
+    leaf = Bring("cup", position=(0.45, 0.6, 0.35))
+    _, status, _, _ = carry(toy, leaf, obstacles=shut)
+    assert status == Status.FAILURE
+    assert leaf.feedback_message.startswith("cannot start: no way for the hand from [0.45, 0.0, 0.35] to [")
+
+
+@pytest.mark.parametrize("arguments", [{}, {"to": "goal", "position": (0.4, 0, 0.3)}])
+def test_one_of_to_and_position(toy, arguments):
+    stage = toy(Bring("cup", **arguments))
+    stage.world.hold("cup")
+    stage.look()
+    with pytest.raises(InputError, match="leaf 'bring cup': give either 'to' or 'position'"):
+        stage.tick()
+
+
+def test_without_the_object_in_the_hand_it_cannot_start(toy):
+    stage = toy(Bring("cup", to="goal"))
+    assert stage.tick() == Status.FAILURE
+    assert stage.tree.feedback_message.startswith("cannot start: cup is not held (")
+
+
+# ---- how an object stands ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["box", "cube", "cylinder", "cup", "oval", "diamond"])
+def test_standing_poses_are_upright_near_and_the_same_in_batches(kind):
+    from bt_tasksim.shapes import ShapeSize, object_model
+
+    torch = pytest.importorskip("torch")
+    size = (
+        (0.06, 0.06, 0.06) if kind == "cube" else (0.05, 0.05 if kind in ("cylinder", "cup") else 0.07, 0.1)
+    )
+    model = object_model("thing", kind, ShapeSize(size, (1.0, 1.0), None))
+    rng = np.random.default_rng(0)
+    now = rng.normal(size=(40, 7))
+    now[:, 3:] = poses.normalise(now[:, 3:])
+    frame = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.7))
+    single = np.array([standing_pose(frame, n, model, 0.03) for n in now])
+    assert np.allclose(standing_pose(frame, now, model, 0.03), single, atol=1e-12)
+    assert np.allclose(standing_pose(frame, torch.from_numpy(now), model, 0.03).numpy(), single, atol=1e-12)
+    half = model.extent[2] / 2
+    assert np.allclose(single[:, :3], [0.4, 0.1, 0.23 + half])
+    turns = np.array([poses.angle_between(n[3:], s[3:]) for n, s in zip(now, single, strict=True)])
+    if kind == "cube":  # some face is down, and no orientation of a cube is further away than this
+        assert turns.max() < np.deg2rad(62.8)
+        assert np.allclose(
+            np.sort(np.abs(poses.to_matrix(single[:, 3:])[:, 2]), axis=-1), [0, 0, 1], atol=1e-9
+        )
+    else:
+        assert np.allclose(poses.rotate(single[:, 3:], np.array([0.0, 0, 1])), [0, 0, 1], atol=1e-9)
+    if model.symmetry == 0:  # the shortest turn to upright is the tilt itself
+        tilt = np.arccos(np.clip(poses.rotate(now[:, 3:], np.array([0.0, 0, 1]))[:, 2], -1, 1))
+        assert np.allclose(turns, tilt, atol=1e-6)

@@ -1,0 +1,102 @@
+"""Grasp: pure in batches, the right pose, and why it fails."""
+
+import math
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from bt_tasksim import poses
+from concept_nodes import Grasp
+from concept_nodes.grasp import grasp_pose
+
+SCENARIOS = ("pick_and_place", "shelf_to_shelf")
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize(
+    "name", ["command", "done", "necessary_cost", "violated", "advance", "sufficient_cost", "act"]
+)
+def test_one_by_one_and_in_batches_are_the_same(situations, scenario, name):
+    answers = situations(Grasp, scenario).check(name)
+    if name in ("done", "violated", "necessary_cost"):
+        assert len({float(a) for a in answers}) > 1, "the situations should differ in their answers"
+
+
+def view(toy, tree):
+    return toy(tree).context.seen(0.0)
+
+
+def test_the_pose_is_over_the_object_across_its_narrow_side(toy):
+    seen = view(toy, Grasp("box"))
+    pose, model = seen.object("box"), seen.model("box")
+    tool = grasp_pose(seen, "box")
+    assert np.allclose(tool[:2], pose[:2], atol=1e-9)
+    z, y = (poses.rotate(tool[3:], np.eye(3)[i]) for i in (2, 1))
+    assert np.allclose(z, [0, 0, -1], atol=1e-9)
+    axis = poses.rotate(pose[3:], np.array(model.grasp_axes[0]))
+    assert abs(y @ axis) == pytest.approx(1.0)
+    assert tool[2] == pytest.approx(pose[2] + max(0.0, model.extent[2] / 2 - seen.robot.depth))
+
+
+@pytest.mark.parametrize("approach", [(0, 0, -1), (1, 0, 0), (math.sqrt(0.5), 0, -math.sqrt(0.5))])
+def test_an_approach_is_obeyed(toy, approach):
+    seen = view(toy, Grasp("cup", approach=approach))
+    tool = grasp_pose(seen, "cup", approach)
+    assert np.allclose(poses.rotate(tool[3:], np.array([0.0, 0, 1])), approach, atol=1e-9)
+
+
+def test_closing_axis_and_standoff_are_obeyed(toy):
+    leaf = Grasp("box", closing=(1, 0, 0), standoff=0.2)
+    seen = view(toy, leaf)
+    goal = grasp_pose(seen, "box", None, leaf.closing)
+    y = poses.rotate(goal[3:], np.array([0.0, 1, 0]))
+    assert abs(y @ poses.rotate(seen.object("box")[3:], np.array([1.0, 0, 0]))) == pytest.approx(1.0)
+    memory = leaf.begin(seen)
+    near = memory.path.table[np.linalg.norm(memory.path.table[:, :3] - goal[:3], axis=-1) < 0.17]
+    assert len(near) > 3 and np.allclose(near[:, :2], goal[:2], atol=1e-6), "the last 0.17 m are straight"
+    assert np.allclose(memory.path.table[-1], goal, atol=1e-9)
+
+
+def test_an_object_wider_than_the_hand_is_refused_with_both_widths(toy):
+    from bt_tasksim.scene import ObjectSpec, Scene
+
+    wide = ObjectSpec(("box",), on="table", size=((0.11, 0.11, 0.11), (0.11, 0.11, 0.11)))
+    stage = toy(Grasp("box"), Scene(objects={"box": wide}))
+    assert stage.tick() == Status.FAILURE
+    assert stage.tree.feedback_message == "cannot start: box is 110 mm wide, the hand opens 80 mm"
+
+
+def test_done_only_after_contacts_on_both_sides_and_a_still_hand(toy):
+    leaf = Grasp("cup", timeout=30)
+    stage = toy(leaf)
+    assert stage.tick(400) == Status.FAILURE  # the toy hand closes on nothing
+    assert leaf.feedback_message.startswith("limit violated: hand 100 % closed, no contact, tool ")
+
+    for contacts, status in (([True, False], Status.FAILURE), ([True, True], Status.SUCCESS)):
+        leaf = Grasp("cup", timeout=6)
+        stage = toy(leaf)
+        step = stage.world.step
+
+        def grip(command, look=False, step=step, stage=stage, contacts=contacts):
+            step(command)
+            if stage.world.now.closure > 0.5:
+                stage.world.put(closure=np.float64(0.5), contacts=np.array(contacts))
+            return stage.world.now
+
+        stage.world.step = grip
+        assert stage.tick(400) == status, leaf.feedback_message
+        words = leaf.feedback_message
+        if status == Status.SUCCESS:
+            assert "hand 50 % closed, contact at left, right, tool 0 mm from cup" in words
+            assert stage.context.reached("holding", "cup")
+        else:
+            assert words.startswith("not done within 6 s: hand 50 % closed, contact at left,")
+            assert not stage.context.reached("holding", "cup")
+
+
+def test_an_unknown_object_is_named(toy):
+    from bt_tasksim.errors import InputError
+
+    with pytest.raises(InputError, match="no object 'cupp' in the scene; did you mean 'cup'"):
+        toy(Grasp("cupp")).tick()

@@ -1,0 +1,50 @@
+"""Pick: pure in batches, a straight way off the support, and what it says when it cannot."""
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from concept_nodes import Pick
+
+
+@pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf"])
+def test_one_by_one_and_in_batches_are_the_same(situations, functions, scenario):
+    answers = {name: situations(Pick, scenario).check(name) for name in functions}
+    for name in ("done", "maintained", "necessary_cost", "sufficient_cost"):
+        assert len({float(np.squeeze(a)) for a in answers[name]}) > 1, name
+
+
+@pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0.6, 0.8)])
+def test_it_goes_straight_so_far_in_that_direction(toy, direction):
+    leaf = Pick("cup", direction=direction, distance=0.15, speed=0.3)
+    stage = toy(leaf)
+    stage.world.hold("cup")
+    stage.look()
+    start = stage.world.now.tool_pose.copy()
+    assert stage.tick(100) == Status.SUCCESS
+    tools = np.array([c.tool for c in stage.world.steps])
+    gap = tools[:, :3] - start[:3]
+    along = gap @ np.array(direction, float)
+    assert along[-1] == pytest.approx(0.15, abs=1e-3) and np.all(np.diff(along) >= -1e-12)
+    assert np.abs(gap - np.outer(along, direction)).max() < 1e-9
+    assert np.diff(along).max() / 0.05 < 0.3 * 1.05
+    assert np.allclose(tools[:, 3:], start[3:]) and all(c.hand is None for c in stage.world.steps)
+    assert (
+        leaf.feedback_message.startswith("done after ") and "tool 0 mm from its goal" in leaf.feedback_message
+    )
+
+
+def test_without_the_object_in_the_hand_it_cannot_start(toy):
+    stage = toy(Pick("cup"))
+    assert stage.tick() == Status.FAILURE
+    assert stage.tree.feedback_message.startswith("cannot start: cup is not held (")
+    assert stage.tree.feedback_message.endswith(" mm from the tool)")
+    assert stage.context.command.tool is None
+
+
+def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
+    from bt_tasksim.context import Known
+
+    decisions = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick]
+    cost = [float(d.leaf.sufficient_cost(Known(d.hidden, d.seen.world), d.memory)) for d in decisions]
+    assert cost[0] == 1.0 and cost[-1] == 0.0

@@ -1,0 +1,67 @@
+"""Release: pure in batches, opens before it draws back, and ends what was held."""
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from bt_tasksim import poses
+from concept_nodes import Release
+
+
+@pytest.mark.parametrize("scenario", ["pick_and_place", "pick_and_throw"])
+def test_one_by_one_and_in_batches_are_the_same(situations, functions, scenario):
+    for name in functions:
+        if name != "maintained":  # it maintains nothing
+            situations(Release, scenario).check(name)
+
+
+def start(toy, leaf):
+    stage = toy(leaf)
+    stage.world.hold("cup")
+    stage.look()
+    stage.context.reach("holding", "cup")
+    step = stage.world.step
+
+    def let_go(command, look=False):
+        step(command)
+        stage.world.put(contacts=np.full(2, bool(stage.world.now.closure > 0.3)))
+        return stage.world.now
+
+    stage.world.step = let_go
+    return stage
+
+
+def test_it_opens_then_draws_back_against_its_approach(toy):
+    leaf = Release("cup", retreat=0.12, opening=0.4)
+    stage = start(toy, leaf)
+    first = stage.world.now.tool_pose.copy()
+    assert stage.tick(200) == Status.SUCCESS
+    tools = np.array([c.tool for c in stage.world.steps])
+    hands = np.array([c.hand[0] for c in stage.world.steps])
+    assert hands[0] == pytest.approx(0.5) and np.all(np.diff(hands) <= 1e-12) and hands[-1] == 0.0
+    moved = np.linalg.norm(tools[:, :3] - first[:3], axis=-1)
+    assert np.all(moved[hands > 0.01] < 1e-9), "it draws back only when it is open"
+    back = -poses.rotate(first[3:], np.array([0.0, 0, 1]))
+    assert np.allclose(tools[-1][:3] - first[:3], 0.12 * back, atol=1e-3)
+
+
+def test_afterwards_nothing_is_held(toy):
+    stage = start(toy, Release("cup"))
+    stage.tick(200)
+    assert not stage.context.reached("holding", "cup")
+
+
+def test_a_hand_that_still_touches_something_is_not_done(toy):
+    leaf = Release("cup", timeout=4)
+    stage = start(toy, leaf)
+    step = stage.world.step
+
+    def stuck(command, look=False):
+        step(command)
+        stage.world.put(contacts=np.array([True, False]))
+        return stage.world.now
+
+    stage.world.step = stuck
+    assert stage.tick(200) == Status.FAILURE
+    assert leaf.feedback_message == "not done within 4 s: hand 100 % open, 1 fingertips in contact"
+    assert stage.context.reached("holding", "cup")

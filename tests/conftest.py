@@ -1,0 +1,207 @@
+"""What many tests share: a toy world without physics, and real runs recorded decision by decision."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_tasksim import poses
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.context import Seen
+from bt_tasksim.robot import load_robot
+from bt_tasksim.runner import Runner
+from bt_tasksim.scene import Goal, ObjectSpec, Scene, SpotSpec
+from bt_tasksim.world import Command, Hidden, Observation
+
+SCENE = Scene(
+    objects={
+        "cup": ObjectSpec(kinds=("cup",), on="table", centre=(0.0, -0.14), area=(0.01, 0.01)),
+        "box": ObjectSpec(kinds=("box",), on="table", centre=(0.0, 0.05), area=(0.01, 0.01)),
+    },
+    spots=[SpotSpec("goal", on="table", centre=(0.0, 0.25), area=(0.01, 0.01))],
+    goal=Goal("cup", "goal"),
+    name="toy",
+)
+
+
+class ToyWorld:
+    """Stands in for an engine pipeline: tool and hand are at once where they are told to be.
+
+    Attributes:
+        now: The present observation; tests change it by `put`.
+        steps: The commands it was stepped with.
+        grip: The hand feels something when it is half closed, and its objects follow the tool.
+    """
+
+    def __init__(self) -> None:
+        self.steps: list[Command] = []
+        self.held: str | None = None
+        self.resets = 0
+
+    def reset(self, configuration: Any, model: Any) -> Observation:
+        self.robot, self.model = load_robot(configuration.robot), model
+        self.steps.clear()
+        self.resets += 1
+        n_hand, n_tips = len(self.robot.hand_joints), len(self.robot.tips)
+        down = poses.frame_from_axes(np.array([0.0, 0, -1]), np.array([0.0, 1, 0]))
+        self.now = Observation(
+            time=np.float64(0.0),
+            arm_position=self.robot.rest.copy(),
+            arm_velocity=np.zeros(len(self.robot.arm_joints)),
+            hand_position=np.zeros(n_hand),
+            hand_effort=np.zeros(n_hand),
+            closure=np.float64(0.0),
+            tool_pose=poses.pose([0.45, 0.0, 0.35], down),
+            tips=np.zeros((n_tips, 3)),
+            contacts=np.zeros(n_tips, bool),
+            contact_force=np.zeros((n_tips, 3)),
+            wrench=np.zeros(6),
+            objects=np.array([a.pose for a in configuration.objects]),
+            contact_points=np.zeros((n_tips, 3)),
+            motion=np.zeros(6),
+        )
+        return self.now
+
+    def put(self, **changes: Any) -> None:
+        """Change what is observed from the next step on."""
+        self.now = dataclasses.replace(self.now, **changes)
+
+    def hold(self, name: str) -> None:
+        """Have an object in the hand."""
+        objects = self.now.objects.copy()
+        objects[self.model.object_index(name), :3] = self.now.tool_pose[:3]
+        self.put(objects=objects, contacts=np.ones(len(self.robot.tips), bool), closure=np.float64(0.5))
+
+    def step(self, command: Command, *, look: bool = False) -> Observation:
+        self.steps.append(command)
+        before = self.now
+        closure = before.closure if command.hand is None else np.float64(command.hand[0])
+        self.put(
+            time=before.time + 0.05,
+            tool_pose=before.tool_pose if command.tool is None else command.tool,
+            closure=closure,
+        )
+        return self.now
+
+    def hidden(self) -> Hidden | None:
+        return None
+
+
+class Toy:
+    """A tree in a toy world, ticked by the real runner."""
+
+    def __init__(self, tree: Behaviour, scene: Scene = SCENE, seed: int = 0) -> None:
+        self.world = ToyWorld()
+        self.tree = tree
+        self.runner = Runner(tree, scene, pipeline=self.world)
+        self.context = self.runner.context
+        self.runner.begin(seed)
+
+    def look(self) -> None:
+        """Have the leaves see the world as it now is, without a step."""
+        self.context.advance(self.world.now)
+
+    def tick(self, n: int = 1) -> Status:
+        """Tick and step, n times or until the tree ends."""
+        for _ in range(n):
+            self.runner.tick()
+            if self.tree.status != Status.RUNNING:
+                break
+            self.context.advance(self.world.step(self.context.command))
+        return self.tree.status
+
+
+@pytest.fixture
+def toy() -> type[Toy]:
+    """Builds a tree in a toy world: ``toy(tree)``."""
+    return Toy
+
+
+class Act(ConceptModel):
+    """A concept for tests: commands the parts it is told to, and is done after some time."""
+
+    actions = 0
+
+    def __init__(self, name, parts="tool", ticks=3, height=0.4, **settings):
+        super().__init__(name=name, **settings)
+        self.parts, self.ticks, self.height = parts.split(), ticks, height
+        self.ended: list[Status] = []
+
+    def begin(self, seen: Seen) -> Any:
+        return 0
+
+    def advance(self, seen: Seen, memory: Any) -> Any:
+        return memory + 1
+
+    def command(self, action: Any, seen: Seen, memory: Any) -> Command:
+        tool = seen.tool.copy()
+        tool[2] = self.height
+        return Command(
+            tool=tool if "tool" in self.parts else None,
+            hand=np.array([0.5]) if "hand" in self.parts else None,
+        )
+
+    def done(self, seen: Seen, memory: Any) -> Any:
+        return np.bool_(memory >= self.ticks)
+
+    def terminate(self, new_status: Status) -> None:
+        self.ended.append(new_status)
+        super().terminate(new_status)
+
+
+@pytest.fixture
+def act() -> type[Act]:
+    """A concept for tests: ``act(name, parts="tool hand", ticks=3, height=0.4)``."""
+    return Act
+
+
+class Decision(NamedTuple):
+    """One decision of one leaf in a real run."""
+
+    leaf: ConceptModel
+    seen: Seen
+    memory: Any
+    hidden: Hidden
+
+
+class Spy:
+    """A policy that notes what it is asked and decides as another one does."""
+
+    name = "spy"
+
+    def __init__(self, policy: Any, runner: Runner, notes: list[Decision]) -> None:
+        self.policy, self.runner, self.notes = policy, runner, notes
+
+    def act(self, model: ConceptModel, seen: Seen, memory: Any) -> Any:
+        self.notes.append(Decision(model, seen, memory, self.runner.context.hidden()))
+        return self.policy.act(model, seen, memory)
+
+
+@pytest.fixture(scope="session")
+def recorded_run():
+    """Every decision of every concept in a real run: ``recorded_run(scenario, seed)``."""
+    from trees.load import load_source
+
+    kept: dict[tuple[str, int], list[Decision]] = {}
+
+    def run(scenario: str, seed: int = 1) -> list[Decision]:
+        if (scenario, seed) not in kept:
+            source = load_source(scenario)
+            runner = Runner(source.build(), source.scene)
+            notes: list[Decision] = []
+            leaves = [leaf for leaf in runner.tree.iterate() if isinstance(leaf, ConceptModel)]
+            policies = [leaf.policy_in_use for leaf in leaves]
+            for leaf, policy in zip(leaves, policies, strict=True):
+                leaf._policy = Spy(policy, runner, notes)
+            runner.run(seed)
+            for leaf, policy in zip(leaves, policies, strict=True):
+                leaf._policy = policy
+            kept[scenario, seed] = notes
+        return kept[scenario, seed]
+
+    return run
