@@ -18,7 +18,8 @@ import eigenpy
 import numpy as np
 import pinocchio as pin
 
-from bt_tasksim.errors import InputError, UnreachableError, nearest
+from bt_tasksim.engines.pinocchio_models import arm_model, body_index, full_model, se3
+from bt_tasksim.errors import UnreachableError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.world import Command, JointTarget, WorldState
@@ -43,7 +44,6 @@ _SWING, _SWING_PER_METRE, _SWING_PER_RADIAN = 0.5, 10.0, 2.0
 """A tracked arm may change its posture at once by so much: rad, and more for the way that the tool goes."""
 _RESTARTS = 24
 _LOCAL, _BASE = pin.ReferenceFrame.LOCAL, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-_XYZQUAT = np.array([0, 1, 2, 4, 5, 6, 3])
 _WXYZ = np.array([0, 1, 2, 6, 3, 4, 5])
 
 
@@ -66,9 +66,9 @@ class PinocchioKinematics:
     def __init__(self, robot: RobotDescription, control_period: float = 0.05) -> None:
         self.robot = robot
         self._n = len(robot.arm_joints)
-        self._full, self._order = _full_model(robot)
+        self._full, self._order = full_model(robot)
         self._full_data = self._full.createData()
-        self._model = _arm_model(robot, self._full)
+        self._model = arm_model(robot, self._full)
         self._data = self._model.createData()
         self._frame = self._model.getFrameId("tool", pin.FrameType.OP_FRAME)
         self._full_frame = self._full.getFrameId("tool", pin.FrameType.OP_FRAME)
@@ -158,7 +158,7 @@ class PinocchioKinematics:
 
     def _track(self, tool: Array) -> Array:
         """Joints ``(n_arm,)`` for the tool pose, continuous with the last solution where that is possible."""
-        pose = _se3(tool)
+        pose = se3(tool)
         last = self._goal[: self._n]
         pull = _PULL * self.robot.posture * (self._rest - last)
         largest = float(np.abs(pull).max())
@@ -193,7 +193,7 @@ class PinocchioKinematics:
             UnreachableError: No posture brings the tool there; says by how much the nearest one misses.
         """
         starts = [self._rest] if seed is None else [np.asarray(seed, float), self._rest]
-        return self._search(_se3(pose), starts, self._rest if posture is None else np.asarray(posture, float))
+        return self._search(se3(pose), starts, self._rest if posture is None else np.asarray(posture, float))
 
     def _search(self, pose: Any, starts: Sequence[Array], posture: Array, best: Array | None = None) -> Array:
         """The solution nearest to a posture from given starts, or else from one of the random ones."""
@@ -352,83 +352,15 @@ class PinocchioKinematics:
         q[self._order] = joints
         pin.framesForwardKinematics(model, data, q)
         names = [f.name for f in model.frames if f.type == pin.FrameType.BODY] if links is None else links
-        return {name: pin.SE3ToXYZQUAT(data.oMf[_body(model, name, self.robot)])[_WXYZ] for name in names}
+        return {
+            name: pin.SE3ToXYZQUAT(data.oMf[body_index(model, name, self.robot)])[_WXYZ] for name in names
+        }
 
     def tips(self, joints: Array) -> Array:
         """Positions ``(n_tips, 3)`` of the fingertips, robot base frame, of all joints ``(n_joints,)``."""
         tips = self.robot.tips
         frames = self.link_poses(joints, [tip.links[0] for tip in tips])
-        return np.array([_se3(frames[tip.links[0]]).act(np.array(tip.point)) for tip in tips])
-
-
-def _se3(pose: Array) -> Any:
-    p = np.asarray(pose, float)
-    square = float(p[3:] @ p[3:])
-    if not 0.25 < square < 4.0:
-        raise InputError(
-            f"a tool pose needs a unit quaternion (w x y z) behind its position, found {p.tolist()}"
-        )
-    if abs(square - 1.0) > 1e-9:
-        p = np.concatenate([p[:3], p[3:] / np.sqrt(square)])
-    return pin.XYZQUATToSE3(p[_XYZQUAT])
-
-
-def _full_model(robot: RobotDescription) -> tuple[Any, Array]:
-    """The whole robot with its root at the base link, and where each of ``robot.joints`` is in its ``q``."""
-    try:
-        model = pin.buildModelFromUrdf(str(robot.urdf))
-    except (ValueError, RuntimeError) as error:
-        raise InputError(
-            f"robot file '{robot.source}': the URDF '{robot.urdf}' is unreadable: {error}"
-        ) from error
-    base = model.frames[_body(model, robot.base_link, robot)]
-    if base.parentJoint != 0:
-        raise InputError(f"robot file '{robot.source}': base_link '{robot.base_link}' moves with a joint")
-    shift = base.placement.inverse()
-    for i in range(1, model.njoints):
-        if model.parents[i] == 0:
-            model.jointPlacements[i] = shift * model.jointPlacements[i]
-    for frame in model.frames:
-        if frame.parentJoint == 0:
-            frame.placement = shift * frame.placement
-    link = model.frames[_body(model, robot.tool_link, robot)]
-    placement = link.placement * _se3(robot.tool_pose)
-    model.addFrame(pin.Frame("tool", link.parentJoint, placement, pin.FrameType.OP_FRAME))
-    order = []
-    for name in robot.joints:
-        if not model.existJointName(name):
-            known = list(model.names)[1:]
-            raise InputError(
-                f"robot file '{robot.source}': the URDF has no joint '{name}'{nearest(name, known)}"
-            )
-        joint = model.joints[model.getJointId(name)]
-        if joint.nq != 1:
-            raise InputError(
-                f"robot file '{robot.source}': joint '{name}' is not a hinge or slide with limits"
-            )
-        order.append(joint.idx_q)
-    for name in [robot.wrist_link, *robot.pad_links, *(link for tip in robot.tips for link in tip.links)]:
-        _body(model, name, robot)
-    return model, np.array(order)
-
-
-def _arm_model(robot: RobotDescription, full: Any) -> Any:
-    """The arm alone, with every other joint locked."""
-    locked = [i for i in range(1, full.njoints) if full.names[i] not in robot.arm_joints]
-    model = pin.buildReducedModel(full, locked, pin.neutral(full))
-    names = tuple(model.names)[1:]
-    if names != robot.arm_joints:
-        raise InputError(
-            f"robot file '{robot.source}': arm.joints should be listed from the base on: {', '.join(names)}"
-        )
-    return model
-
-
-def _body(model: Any, name: str, robot: RobotDescription) -> int:
-    if not model.existBodyName(name):
-        known = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
-        raise InputError(f"robot file '{robot.source}': the URDF has no link '{name}'{nearest(name, known)}")
-    return int(model.getBodyId(name))
+        return np.array([se3(frames[tip.links[0]]).act(np.array(tip.point)) for tip in tips])
 
 
 def _unreachable(robot: str, pose: Any, distance: float, angle: float, how: str = "") -> UnreachableError:

@@ -1,0 +1,102 @@
+"""Pinocchio models of a robot description: the whole robot, and its arm alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.poses import Array
+from bt_tasksim.robot import RobotDescription
+
+_XYZQUAT = np.array([0, 1, 2, 4, 5, 6, 3])
+
+
+def se3(pose: Array) -> Any:
+    """Pinocchio's form of a pose ``(7,)``; its quaternion is normalised.
+
+    Raises:
+        InputError: The quaternion is nowhere near a unit one.
+    """
+    p = np.asarray(pose, float)
+    square = float(p[3:] @ p[3:])
+    if not 0.25 < square < 4.0:
+        raise InputError(
+            f"a tool pose needs a unit quaternion (w x y z) behind its position, found {p.tolist()}"
+        )
+    if abs(square - 1.0) > 1e-9:
+        p = np.concatenate([p[:3], p[3:] / np.sqrt(square)])
+    return pin.XYZQUATToSE3(p[_XYZQUAT])
+
+
+def full_model(robot: RobotDescription) -> tuple[Any, Array]:
+    """The whole robot with its root at the base link, and where each of ``robot.joints`` is in its ``q``.
+
+    Raises:
+        InputError: The description names what the URDF has not, or the URDF is unreadable.
+    """
+    try:
+        model = pin.buildModelFromUrdf(str(robot.urdf))
+    except (ValueError, RuntimeError) as error:
+        raise InputError(
+            f"robot file '{robot.source}': the URDF '{robot.urdf}' is unreadable: {error}"
+        ) from error
+    base = model.frames[body_index(model, robot.base_link, robot)]
+    if base.parentJoint != 0:
+        raise InputError(f"robot file '{robot.source}': base_link '{robot.base_link}' moves with a joint")
+    shift = base.placement.inverse()
+    for i in range(1, model.njoints):
+        if model.parents[i] == 0:
+            model.jointPlacements[i] = shift * model.jointPlacements[i]
+    for frame in model.frames:
+        if frame.parentJoint == 0:
+            frame.placement = shift * frame.placement
+    link = model.frames[body_index(model, robot.tool_link, robot)]
+    placement = link.placement * se3(robot.tool_pose)
+    model.addFrame(pin.Frame("tool", link.parentJoint, placement, pin.FrameType.OP_FRAME))
+    order = []
+    for name in robot.joints:
+        if not model.existJointName(name):
+            known = list(model.names)[1:]
+            raise InputError(
+                f"robot file '{robot.source}': the URDF has no joint '{name}'{nearest(name, known)}"
+            )
+        joint = model.joints[model.getJointId(name)]
+        if joint.nq != 1:
+            raise InputError(
+                f"robot file '{robot.source}': joint '{name}' is not a hinge or slide with limits"
+            )
+        order.append(joint.idx_q)
+    for name in [robot.wrist_link, *robot.pad_links, *(link for tip in robot.tips for link in tip.links)]:
+        body_index(model, name, robot)
+    return model, np.array(order)
+
+
+def arm_model(robot: RobotDescription, full: Any) -> Any:
+    """The arm alone, with every other joint locked.
+
+    Raises:
+        InputError: The joints are not listed from the base on.
+    """
+    locked = [i for i in range(1, full.njoints) if full.names[i] not in robot.arm_joints]
+    model = pin.buildReducedModel(full, locked, pin.neutral(full))
+    names = tuple(model.names)[1:]
+    if names != robot.arm_joints:
+        raise InputError(
+            f"robot file '{robot.source}': arm.joints should be listed from the base on: {', '.join(names)}"
+        )
+    return model
+
+
+def body_index(model: Any, name: str, robot: RobotDescription) -> int:
+    """Index of a link's frame.
+
+    Raises:
+        InputError: There is no such link.
+    """
+    if not model.existBodyName(name):
+        known = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
+        raise InputError(f"robot file '{robot.source}': the URDF has no link '{name}'{nearest(name, known)}")
+    return int(model.getBodyId(name))
