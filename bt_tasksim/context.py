@@ -8,7 +8,7 @@ the hidden state: they resolve names to array slices.
 from __future__ import annotations
 
 import typing
-from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -130,8 +130,10 @@ class Context:
         self._observation: Observation | None = None
         self.hidden: typing.Callable[[], Hidden | None] = lambda: None
         self.look = False
-        self._command = Command()
-        self._writers: dict[str, Behaviour] = {}
+        self.now = 0.0
+        """Seconds since the episode began."""
+        self._tool: tuple[Array, Behaviour] | None = None
+        self._hand: tuple[Array, Behaviour] | None = None
         self._held: set[tuple[str, str]] = set()
 
     @property
@@ -156,11 +158,6 @@ class Context:
             raise RuntimeError("no episode has begun: a tree with concepts is ticked by a Runner")
         return self._observation
 
-    @property
-    def time(self) -> float:
-        """Seconds since the episode began."""
-        return float(self.observation.time)
-
     def begin(self, world: WorldModel, observation: Observation) -> None:
         """Begin an episode."""
         self._world = world
@@ -170,8 +167,8 @@ class Context:
     def advance(self, observation: Observation) -> None:
         """Go on to the next tick: a new observation, and an empty command."""
         self._observation = observation
-        self._command = Command()
-        self._writers.clear()
+        self.now = float(observation.time)
+        self._tool = self._hand = None
         self.look = False
 
     def write(self, command: Command, leaf: Behaviour) -> None:
@@ -179,32 +176,37 @@ class Context:
 
         Raises:
             CommandConflictError: Another leaf has written the same part in this tick.
-            ValueError: A part is not finite.
         """
-        for part in ("tool", "hand"):
-            value = getattr(command, part)
-            if value is None:
-                continue
-            if part in self._writers:
-                first = self._writers[part].name
-                raise CommandConflictError(
-                    f"two leaves command the {part} in one tick: '{first}' and '{leaf.name}'"
-                )
-            if not np.isfinite(value.sum()):
-                raise ValueError(f"leaf '{leaf.name}' commands a {part} target that is not finite: {value}")
-            self._writers[part] = leaf
-        self._command = command.over(self._command)
+        if command.tool is not None:
+            if self._tool is not None:
+                raise _conflict("tool", self._tool[1], leaf)
+            self._tool = (command.tool, leaf)
+        if command.hand is not None:
+            if self._hand is not None:
+                raise _conflict("hand", self._hand[1], leaf)
+            self._hand = (command.hand, leaf)
 
     def withdraw(self, leaf: Behaviour) -> None:
         """Drop what a leaf has written in this tick: it was interrupted, and others may act instead."""
-        for part in [p for p, writer in self._writers.items() if writer is leaf]:
-            del self._writers[part]
-            self._command = replace(self._command, **{part: None})
+        if self._tool is not None and self._tool[1] is leaf:
+            self._tool = None
+        if self._hand is not None and self._hand[1] is leaf:
+            self._hand = None
 
     @property
     def command(self) -> Command:
-        """What the leaves have written in this tick."""
-        return self._command
+        """What the leaves have written in this tick.
+
+        Raises:
+            ValueError: A part is not finite; names the leaf that wrote it.
+        """
+        tool, hand = self._tool, self._hand
+        for part, written in (("tool", tool), ("hand", hand)):
+            if written is not None and not isfinite(written[0] @ written[0]):
+                raise ValueError(
+                    f"leaf '{written[1].name}' commands a {part} target that is not finite: {written[0]}"
+                )
+        return Command(None if tool is None else tool[0], None if hand is None else hand[0])
 
     def reach(self, goal: str, target: str) -> None:
         """A concept has reached a goal (such as ``holding``) that later ones may have to maintain."""
@@ -220,4 +222,12 @@ class Context:
 
     def seen(self, elapsed: float) -> Seen:
         """The view of this tick's observation."""
-        return Seen(self.observation, self.world, self.robot, np.float64(elapsed))
+        if self._world is None or self._observation is None:
+            raise RuntimeError("no episode has begun: a tree with concepts is ticked by a Runner")
+        return Seen(self._observation, self._world, self.robot, np.float64(elapsed))
+
+
+def _conflict(part: str, first: Behaviour, second: Behaviour) -> CommandConflictError:
+    return CommandConflictError(
+        f"two leaves command the {part} in one tick: '{first.name}' and '{second.name}'"
+    )

@@ -147,9 +147,9 @@ class Runner:
         steps, reason, why = 0, "", ""
         limit = round(self.longest * configuration.control_frequency)
         while True:
-            self.tick()
+            command = self.tick()
             if record is not None:
-                record(Step(context.observation, context.command, tree.status, pipeline))
+                record(Step(context.observation, command, tree.status, pipeline))
             if tree.status != Status.RUNNING:
                 break
             if steps >= limit:
@@ -157,14 +157,14 @@ class Runner:
                 reason, why = "time over", f"not done within {self.longest:g} s"
                 break
             try:
-                context.advance(pipeline.step(context.command, look=context.look))
+                context.advance(pipeline.step(command, look=context.look))
             except UnreachableError as error:
                 tree.stop(Status.INVALID)
                 reason, why = "out of reach", str(error)
                 break
             steps += 1
         status = tree.status
-        sim_time = context.time
+        sim_time = context.now
         verdict = self._settle_and_judge(configuration, world, record)
         if status == Status.SUCCESS:
             if verdict is not None:
@@ -189,8 +189,8 @@ class Runner:
             configuration=configuration,
         )
 
-    def tick(self) -> None:
-        """Tick the tree once.
+    def tick(self) -> Command:
+        """Tick the tree once; returns the command that its leaves have written.
 
         Raises:
             LeafError: A leaf raised; every node has ended.
@@ -199,6 +199,7 @@ class Runner:
         try:
             for _ in self.tree.tick():
                 pass
+            return self.context.command
         except BaseException as error:
             culprit = raising_leaf(error, self.tree)
             end_all(self.tree, culprit)

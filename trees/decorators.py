@@ -147,7 +147,7 @@ class Timeout(PassThrough):
         """
         if self._context is None:
             raise RuntimeError(f"'{self.name}' was ticked before it was set up")
-        now = self._context.time
+        now = self._context.now
         if self.status != Status.RUNNING:
             self._started = now
             self.feedback_message = ""

@@ -305,7 +305,7 @@ def hand_opening(tips: NDArray[np.float64], robot: RobotDescription) -> NDArray[
 
 
 def _necessary_cost(leaf: ConceptNode) -> float:
-    seen = leaf.context.seen(leaf.context.time - leaf._started)
+    seen = leaf.context.seen(leaf.context.now - leaf._started)
     return float(leaf._model.necessary_cost(seen, leaf.memory))
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -119,7 +117,7 @@ def test_a_failed_parallel_says_why():
 
 def clocked(tree):
     context = Context.__new__(Context)
-    context._observation = SimpleNamespace(time=0.0)
+    context.now = 0.0
     for node in tree.iterate():
         node.setup(context=context)
     return context
@@ -131,7 +129,7 @@ def test_timeout_counts_episode_time():
     context = clocked(tree)
     out = ""
     for tick in range(5):
-        context._observation.time = 7.0 + sum([0.05] * tick)
+        context.now = 7.0 + sum([0.05] * tick)
         out += ticks(tree, 1)
     assert out == "RRRFR"
     assert leaf.log == "RRRxR"
@@ -141,7 +139,7 @@ def test_timeout_names_what_was_not_done():
     tree = trees.timeout(0.1, Scripted("R"))
     context = clocked(tree)
     tree.tick_once()
-    context._observation.time = 0.1
+    context.now = 0.1
     tree.tick_once()
     assert tree.status == Status.FAILURE
     assert tree.feedback_message == "not done within 0.1 s: answer 1"
