@@ -1,0 +1,232 @@
+"""The life of a leaf: it acts, it completes, it fails with a reason, it is interrupted."""
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from bt_tasksim.concept import LOST_TICKS, ConceptModel, Condition
+from bt_tasksim.errors import InputError
+from bt_tasksim.parameters import Metres, ObjectName
+from bt_tasksim.world import Command
+from concept_nodes import Grasp, TimePassed, catalogue
+from trees import reactive_fallback, repeat, retry, sequence
+
+
+def test_success_writes_nothing_and_the_next_sibling_acts_in_the_same_tick(toy, act):
+    first, second = act("first", ticks=2, height=0.5), act("second", height=0.3)
+    stage = toy(sequence("root", first, second))
+    stage.tick(2)
+    assert first.status == Status.RUNNING and second.status == Status.INVALID
+    stage.runner.tick()
+    assert first.status == Status.SUCCESS and second.status == Status.RUNNING
+    assert stage.context.command.tool[2] == 0.3
+    assert first.feedback_message == "done after 0.10 s: "
+
+
+def test_the_last_success_leaves_no_command(toy, act):
+    stage = toy(act("only", ticks=1))
+    stage.tick(1)
+    stage.runner.tick()
+    assert stage.tree.status == Status.SUCCESS and stage.context.command == Command()
+
+
+def test_time_out_counts_episode_time(toy, act):
+    leaf = act("slow", ticks=10**6, timeout=0.32)
+    stage = toy(leaf)
+    assert stage.tick(1000) == Status.FAILURE
+    assert stage.context.now == pytest.approx(0.35)
+    assert leaf.feedback_message == "not done within 0.32 s: "
+    stage.runner.begin(0)
+    assert stage.tick(6) == Status.RUNNING, "a second episode begins to count anew"
+
+
+def test_each_activation_counts_from_its_own_begin(toy, act):
+    leaf = act("again", ticks=4, timeout=0.3)
+    stage = toy(repeat(3, leaf))
+    assert stage.tick(100) == Status.SUCCESS
+    assert leaf.activations == 3 and stage.context.now > 0.5
+
+
+class Careful(ConceptModel):
+    """Maintains that something is held, and has a limit and a precondition."""
+
+    target: ObjectName
+    limit: Metres = 1.0
+    maintains = ("holding",)
+    held = True
+
+    def initial_state(self, seen):
+        return "" if seen.tool[2] < 0.6 else f"the tool is {seen.tool[2]:.2f} m high"
+
+    def command(self, action, seen, memory):
+        return Command(tool=seen.tool)
+
+    def done(self, seen, memory):
+        return np.False_
+
+    def violated(self, seen, memory):
+        return seen.elapsed > self.limit
+
+    def maintained(self, goal, seen, memory):
+        return np.bool_(type(self).held)
+
+    def explain(self, seen, memory):
+        return f"{float(seen.elapsed):.2f} s gone"
+
+
+@pytest.fixture
+def careful(monkeypatch):
+    monkeypatch.setattr(Careful, "held", True)
+    return Careful("cup")
+
+
+def test_an_unmet_precondition_is_a_failure_without_a_command(toy, careful):
+    stage = toy(careful)
+    stage.world.put(tool_pose=stage.world.now.tool_pose + np.array([0, 0, 0.3, 0, 0, 0, 0]))
+    stage.look()
+    assert stage.tick() == Status.FAILURE
+    assert careful.feedback_message == "cannot start: the tool is 0.65 m high"
+    assert stage.context.command == Command()
+
+
+def test_a_violated_limit_is_a_failure_with_numbers(toy):
+    leaf = Careful("cup", limit=0.12)
+    assert toy(leaf).tick(100) == Status.FAILURE
+    assert leaf.feedback_message == "limit violated: 0.15 s gone"
+
+
+def test_a_goal_that_flickers_is_not_lost_and_one_that_stays_away_is(toy, careful):
+    stage = toy(careful)
+    stage.context.reach("holding", "cup")
+    stage.tick(2)
+    for _ in range(4):
+        Careful.held = False
+        assert stage.tick(LOST_TICKS - 1) == Status.RUNNING
+        Careful.held = True
+        assert stage.tick(1) == Status.RUNNING
+    Careful.held = False
+    assert stage.tick(LOST_TICKS - 1) == Status.RUNNING
+    assert stage.tick(1) == Status.FAILURE
+    assert careful.feedback_message.startswith("lost: cup is no longer holding; 0.")
+    assert not stage.context.reached("holding", "cup")
+
+
+def test_a_goal_that_nobody_reached_is_not_maintained(toy, careful):
+    Careful.held = False
+    stage = toy(careful)
+    stage.context.reach("holding", "box")
+    assert stage.tick(10) == Status.RUNNING
+
+
+def test_success_reaches_and_ends_goals(toy, act):
+    class Take(act):
+        target: ObjectName = "cup"
+        reaches = ("holding",)
+
+    class Drop(act):
+        target: ObjectName = "cup"
+        ends = ("holding",)
+
+    stage = toy(sequence("root", Take("take", ticks=1), Drop("drop", ticks=2)))
+    stage.tick(1)
+    assert not stage.context.reached("holding", "cup")
+    stage.tick(1)
+    assert stage.context.reached("holding", "cup")
+    stage.tick(5)
+    assert not stage.context.reached("holding", "cup")
+
+
+def test_an_interrupted_leaf_is_ended_and_begins_anew(toy, act):
+    leaf = act("leaf", ticks=50)
+    stage = toy(sequence("root", reactive_fallback("until", TimePassed(0.1), leaf), act("then", ticks=50)))
+    stage.tick(3)
+    assert leaf.status == Status.INVALID and leaf.feedback_message == "interrupted"
+    assert leaf.ended[-1] == Status.INVALID and leaf.memory == 2
+    leaf.memory = "old"
+    stage.runner.begin(0)
+    stage.tick(1)
+    assert leaf.memory == 1 and leaf.activations == 2
+
+
+def test_a_retried_leaf_begins_anew(toy, act):
+    leaf = act("leaf", ticks=10, timeout=0.2)
+    assert toy(retry(3, leaf)).tick(100) == Status.FAILURE
+    assert leaf.activations == 3 and leaf.ended.count(Status.FAILURE) == 3
+
+
+def test_images_are_asked_for_only_by_the_active_concept(toy, act):
+    class Looking(act):
+        def looks(self, seen, memory):
+            return memory % 2 == 0
+
+    looked = []
+    stage = toy(sequence("root", Looking("look", ticks=4), act("act", ticks=3)))
+    while stage.tree.status != Status.SUCCESS:
+        stage.runner.tick()
+        looked.append(stage.context.look)
+        stage.context.advance(stage.world.step(stage.context.command))
+    assert looked == [True, False, True, False, False, False, False, False]
+
+
+# ---- declarations -----------------------------------------------------------------------------------------
+
+
+def test_a_concept_must_say_what_it_commands_and_when_it_is_done():
+    class Half(ConceptModel):
+        def done(self, seen, memory):
+            return np.True_
+
+    with pytest.raises(TypeError, match="command"):
+        Half()
+
+    class Mute(Condition):
+        pass
+
+    with pytest.raises(TypeError, match="holds"):
+        Mute()
+
+
+def test_unknown_policies_are_refused_when_the_tree_is_set_up(toy):
+    with pytest.raises(
+        InputError, match="concept 'grasp' on robot 'panda': no policy 'clever'; known: programmed"
+    ):
+        toy(Grasp("cup", policy="clever"))
+
+
+def test_every_concept_declares_what_the_design_asks_for():
+    concepts = [c for c in catalogue().values() if issubclass(c, ConceptModel)]
+    assert {"Grasp", "Pick", "Bring", "Place", "Release"} <= {c.__name__ for c in concepts}
+    for concept in concepts:
+        assert concept.__doc__ and concept.default_timeout > 0 and concept.default_tolerance > 0
+        for name in ("maintains", "reaches", "ends"):
+            assert isinstance(getattr(concept, name), tuple), f"{concept.__name__}.{name}"
+
+
+def test_what_an_earlier_concept_reaches_later_ones_maintain_until_one_ends_it():
+    leaves = catalogue()
+    assert leaves["Grasp"].reaches == ("holding",)
+    assert all(leaves[n].maintains == ("holding",) for n in ("Pick", "Bring", "Place"))
+    assert leaves["Release"].ends == ("holding",)
+
+
+def test_defaults_of_the_pure_functions_have_the_batchs_shape():
+    torch = pytest.importorskip("torch")
+
+    class Plain(ConceptModel):
+        actions = 2
+
+        def command(self, action, seen, memory):
+            return Command()
+
+        def done(self, seen, memory):
+            return np.False_
+
+    class View:
+        def __init__(self, tool):
+            self.tool = tool
+
+    leaf = Plain()
+    for tool in (np.zeros(7), np.zeros((4, 7)), torch.zeros((4, 7))):
+        assert tuple(leaf.programmed_motion(View(tool), None).shape) == (*tool.shape[:-1], 2)
+        assert tuple(leaf.necessary_cost(View(tool), None).shape) == tuple(tool.shape[:-1])
+        assert type(leaf.programmed_motion(View(tool), None)) is type(tool)
