@@ -1,0 +1,302 @@
+"""How fast: `make bench`, or ``bt-tasksim bench``. Ratios within one run, medians over rounds.
+
+1. Control steps per second of ``pick_and_place``, whole episodes with their resets, against steps of
+   ManiSkill's ``PickCube-v1`` (one process, state observations, ``pd_joint_delta_pos``, random actions, no
+   resets), both with 100 Hz physics and 20 Hz control.
+2. Time outside physics for one control step, by part.
+3. A tick without the concepts' own functions, over a tick of a plain py_trees tree of the same shape.
+4. ``bt-tasksim --help``.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import py_trees
+from py_trees.common import Status
+
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.engines.vulkan import use_software_driver
+from bt_tasksim.files import write_text
+from bt_tasksim.policy import Action
+from bt_tasksim.runner import Runner
+from bt_tasksim.world import Command
+from trees.load import load_source
+
+BARS = {"steps_ratio": 3.0, "outside_us": 250.0, "tick_ratio": 1.5, "help_s": 0.5}
+
+
+def main(quick: bool = False, json_path: Path | None = None) -> int:
+    """Measure, print the tables, and write the numbers as JSON if asked."""
+    rounds = 3 if quick else 7
+    found: dict[str, Any] = {}
+    found |= throughput(rounds, episodes=3 if quick else 6)
+    found |= outside_physics(episodes=5 if quick else 20)
+    found |= tick_overhead(2000 if quick else 10000)
+    found |= help_time(rounds)
+    _print(found)
+    if json_path is not None:
+        write_text(json_path, json.dumps(found, indent=2) + "\n")
+        print(f"wrote {json_path}")
+    return 0
+
+
+def throughput(rounds: int, episodes: int) -> dict[str, Any]:
+    """Control steps per second of both, in turns; the ratio is the median over the rounds."""
+    runner = _runner("pick_and_place")
+    peer, why = _maniskill()
+    runner.run(0)
+    ours, theirs = [], []
+    for k in range(rounds):
+        started, steps = time.perf_counter(), 0
+        for seed in range(episodes):
+            steps += runner.run(1 + k * episodes + seed).control_steps
+        ours.append(steps / (time.perf_counter() - started))
+        if peer is not None:
+            theirs.append(_maniskill_rate(peer, 150))
+    out: dict[str, Any] = {"steps_per_s": statistics.median(ours)}
+    if theirs:
+        out["maniskill_steps_per_s"] = statistics.median(theirs)
+        out["steps_ratio"] = statistics.median(a / b for a, b in zip(ours, theirs, strict=True))
+    else:
+        out["maniskill_missing"] = why
+    return out
+
+
+def _maniskill() -> tuple[Any, str]:
+    use_software_driver()
+    try:
+        import gymnasium
+        import mani_skill.envs  # noqa: F401
+
+        env = gymnasium.make(
+            "PickCube-v1", obs_mode="state", control_mode="pd_joint_delta_pos", num_envs=1, sim_backend="cpu"
+        )
+        env.reset(seed=0)
+    except Exception as error:  # any reason it does not start here
+        return None, f"{type(error).__name__}: {error}"
+    return env, ""
+
+
+def _maniskill_rate(env: Any, steps: int) -> float:
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, (steps, *env.action_space.shape)).astype(np.float32)
+    started = time.perf_counter()
+    for action in actions:
+        env.step(action)
+    return steps / (time.perf_counter() - started)
+
+
+def outside_physics(episodes: int, robot: str = "panda") -> dict[str, Any]:
+    """Median microseconds a control step spends in each part; physics is PhysX's own stepping."""
+    runner = _runner("pick_and_place", robot)
+    runner.run(0)
+    assert runner.pipeline is not None
+    clock = _Clock()
+    physics: Any = runner.pipeline.physics
+    clock.wrap(runner, "tick", "tick")
+    for leaf in runner.tree.iterate():
+        for name in ("initial_state", "begin", "violated", "maintained", "command", "looks", "advance", "explain"):
+            if hasattr(leaf, name):
+                clock.wrap(leaf, name, "concepts")
+        if hasattr(leaf, "_policy"):
+            clock.wrap(leaf._policy, "act", "concepts")
+    clock.wrap(runner.pipeline.kinematics, "solve", "kinematics")
+    clock.wrap(runner.pipeline.postprocess, "observe", "observation")
+    clock.wrap(physics, "step", "physics engine")
+    clock.wrap(physics, "_state", "state")
+    clock.wrap(runner.pipeline, "step", "pipeline")
+    for seed in range(1, 1 + episodes):
+        runner.run(seed, record=lambda step: clock.next())
+    parts = clock.table()
+    tick, concepts = parts["tick"] - parts["concepts"], parts["concepts"]
+    stepping = parts["physics engine"] - parts["state"]
+    rest = parts["pipeline"] - parts["kinematics"] - parts["physics engine"] - parts["observation"]
+    table = {
+        "tick": np.median(tick),
+        "concept functions": np.median(concepts),
+        "kinematics": np.median(parts["kinematics"]),
+        "observation": np.median(parts["observation"] + parts["state"]),
+        "pipeline": np.median(rest),
+    }
+    outside = tick + concepts + parts["kinematics"] + parts["observation"] + parts["state"] + rest
+    return {
+        "parts_us": {k: float(1e6 * v) for k, v in table.items()},
+        "outside_us": float(1e6 * np.median(outside)),
+        "outside_mean_us": float(1e6 * np.mean(outside)),
+        "physics_us": float(1e6 * np.median(stepping)),
+    }
+
+
+class _Clock:
+    """Adds up the time of calls within each control step."""
+
+    def __init__(self) -> None:
+        self.now: dict[str, float] = {}
+        self.rows: list[dict[str, float]] = []
+        self.depth = 0
+
+    def wrap(self, owner: Any, name: str, part: str) -> None:
+        call: Callable[..., Any] = getattr(owner, name)
+
+        def timed(*args: Any, **kwargs: Any) -> Any:
+            nested = part == "concepts" and self.depth > 0
+            self.depth += part == "concepts"
+            started = time.perf_counter()
+            try:
+                return call(*args, **kwargs)
+            finally:
+                spent = time.perf_counter() - started
+                self.depth -= part == "concepts"
+                if not nested:
+                    self.now[part] = self.now.get(part, 0.0) + spent
+
+        object.__setattr__(owner, name, timed)
+
+    def next(self) -> None:
+        self.rows.append(self.now)
+        self.now = {}
+
+    def table(self) -> dict[str, Any]:
+        names = {name for row in self.rows for name in row}
+        # Settling after the tree's end has no tick; those steps are not control steps of the tree.
+        rows = [row for row in self.rows if "tick" in row and "physics engine" in row]
+        return {name: np.array([row.get(name, 0.0) for row in rows]) for name in names}
+
+
+class _Idle(ConceptModel):
+    """A concept whose own functions cost next to nothing."""
+
+    def command(self, action: Any, seen: Any, memory: Any) -> Command:
+        """A command made beforehand."""
+        return _COMMAND
+
+    def done(self, seen: Any, memory: Any) -> Any:
+        """Never."""
+        return np.False_
+
+
+class _Decided:
+    name = "decided"
+
+    def act(self, model: Any, seen: Any, memory: Any) -> Action:
+        return _ACTION
+
+
+_COMMAND = Command(np.array([0.4, 0.0, 0.3, 0.0, 1.0, 0.0, 0.0]), np.array([0.0]))
+_ACTION = Action(np.zeros(0), np.False_)
+
+
+class _Noop(py_trees.behaviour.Behaviour):  # type: ignore[misc]
+    def update(self) -> Status:
+        return Status.RUNNING
+
+
+def tick_overhead(n: int) -> dict[str, Any]:
+    """A tick of five concepts in a sequence, less their own functions, over one of five no-op leaves."""
+    from trees.authoring import sequence
+
+    runner = _runner("pick_and_place")
+    runner.begin(0)
+    context = runner.context
+    plain = py_trees.composites.Sequence("plain", memory=True, children=[_Noop(str(i)) for i in range(5)])
+    leaves = [_Idle(name=str(i)) for i in range(5)]
+    tree = sequence("ours", *leaves)
+    for node in tree.iterate():
+        node.setup(context=context)
+    for leaf in leaves:
+        leaf._policy = _Decided()
+    observation, first = context.observation, leaves[0]
+
+    def tick(root: Any) -> None:
+        for _ in root.tick():
+            pass
+
+    def ours() -> None:
+        context.advance(observation)
+        tick(tree)
+
+    ours()
+    seen, motion = context.seen(0.0), _ACTION.motion
+
+    def functions() -> None:
+        first.violated(seen, None)
+        first._policy.act(first, seen, None)
+        first.command(motion, seen, None)
+        first.looks(seen, None)
+        first.advance(seen, None)
+
+    def turn() -> tuple[float, ...]:
+        return tuple(
+            _best(call, n // 10)
+            for call in (ours, lambda: context.advance(observation), functions, lambda: tick(plain))
+        )
+
+    turns = np.array([turn() for _ in range(10)])
+    own = turns[:, 0] - turns[:, 1] - turns[:, 2]
+    return {
+        "tick_us": float(1e6 * np.median(own)),
+        "py_trees_tick_us": float(1e6 * np.median(turns[:, 3])),
+        "tick_ratio": float(np.median(own / turns[:, 3])),
+    }
+
+
+def _best(call: Callable[[], None], n: int) -> float:
+    times = []
+    for _ in range(n):
+        started = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - started)
+    return statistics.median(times)
+
+
+def help_time(rounds: int) -> dict[str, Any]:
+    """Seconds of ``bt-tasksim --help`` in a process of its own, and what it must not import."""
+    command = [sys.executable, "-m", "bt_tasksim.cli", "--help"]
+    times = []
+    for _ in range(rounds):
+        started = time.perf_counter()
+        subprocess.run(command, check=True, capture_output=True)
+        times.append(time.perf_counter() - started)
+    check = "import sys, bt_tasksim, bt_tasksim.cli; print(*sorted({'torch','sapien','mani_skill'} & set(sys.modules)))"
+    heavy = subprocess.run([sys.executable, "-c", check], check=True, capture_output=True, text=True).stdout.split()
+    return {"help_s": statistics.median(times), "help_imports": heavy}
+
+
+def _runner(scenario: str, robot: str = "panda") -> Runner:
+    source = load_source(scenario, robot)
+    return Runner(source.build(), source.scene, EngineOptions())
+
+
+def _print(found: dict[str, Any]) -> None:
+    print(f"pick_and_place, episodes with resets    {found['steps_per_s']:8.0f} control steps/s")
+    if "steps_ratio" in found:
+        print(f"ManiSkill PickCube-v1, steps alone      {found['maniskill_steps_per_s']:8.0f} control steps/s")
+        print(f"ratio                                   {found['steps_ratio']:8.2f}   (bar: at least {BARS['steps_ratio']:g})")
+    else:
+        print(f"ManiSkill PickCube-v1 did not start: {found['maniskill_missing']}")
+    print()
+    for part, value in found["parts_us"].items():
+        print(f"outside physics: {part:22} {value:8.0f} us")
+    print(f"outside physics, together               {found['outside_us']:8.0f} us  (bar: at most {BARS['outside_us']:g})")
+    print(f"physics                                 {found['physics_us']:8.0f} us")
+    print()
+    print(f"tick without concept functions          {found['tick_us']:8.2f} us")
+    print(f"tick of plain py_trees                  {found['py_trees_tick_us']:8.2f} us")
+    print(f"ratio                                   {found['tick_ratio']:8.2f}   (bar: at most {BARS['tick_ratio']:g})")
+    print()
+    heavy = ", ".join(found["help_imports"]) or "none of torch, sapien, mani_skill"
+    print(f"bt-tasksim --help                       {found['help_s']:8.3f} s   (bar: under {BARS['help_s']:g}; imports {heavy})")
+
+
+if __name__ == "__main__":
+    sys.exit(main("--quick" in sys.argv))
