@@ -97,6 +97,8 @@ class RobotDescription:
             (x, y, z, rotations about x, y, z): 0 leaves one free, for arms of fewer than six joints.
         envelope: Boxes ``(pose (7,), full size (3,))`` in the tool frame that hold the hand and the end of
             the arm, for keeping clear of obstacles.
+        solver_iterations: Position iterations of a physics engine that solves contacts by iteration: as many as
+            keep the fingers from sinking into what they press on.
         cameras: By name: pose, size and field of view; see the rendering engine.
         source: Path of the data file.
     """
@@ -132,6 +134,7 @@ class RobotDescription:
     pad_links: tuple[str, ...]
     task_mask: Array
     envelope: tuple[tuple[Array, tuple[float, float, float]], ...]
+    solver_iterations: int
     cameras: Mapping[str, Any]
     source: Path
 
@@ -227,6 +230,7 @@ _KEYS: Mapping[str, Any] = {
 _OPTIONAL: Mapping[str, Any] = {
     "task_mask": None,
     "cameras": None,
+    "solver_iterations": None,
     "arm": {"posture": None},
     "hand": {"synergies": None, "drive_scale": None},
 }
@@ -289,6 +293,7 @@ def _description(data: Mapping[str, Any], path: Path) -> RobotDescription:
         pad_links=_names(data["pads"]["links"], "pads.links"),
         task_mask=_vector(data.get("task_mask", [1.0] * 6), 6, "task_mask"),
         envelope=tuple(_box(b) for b in data["envelope"]),
+        solver_iterations=int(_number(data.get("solver_iterations", 15), "solver_iterations")),
         cameras=data.get("cameras") or {},
         source=path,
     )

@@ -16,15 +16,13 @@ from bt_tasksim.scene import ActorConfiguration, Disturbance
 from bt_tasksim.shapes import BoxPiece
 from bt_tasksim.world import Hidden, JointTarget, WorldState
 
-CONTACT_OFFSET = {"robot": 0.002, "object": 0.012, "fixture": 0.012}
+CONTACT_OFFSET = {"robot": 0.001, "object": 0.003, "fixture": 0.027}
 """Metres by body; PhysX looks for contacts of two bodies within the sum of theirs. It must exceed what a
 falling object covers in one step (2.2 m/s after 25 cm: 22 mm), or the object is stopped only inside."""
-POSITION_ITERATIONS = 15
-"""Of the solver, as ManiSkill's default."""
-FALLING = (0.2, 3.0)
-"""Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are `FINE` times shorter: a tilted object that
-lands spins so fast that it would be millimetres deep within one step of a hundredth of a second."""
-FINE = 5
+FALLING = (0.1, 1.5)
+"""Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are `FINE` times
+shorter: a tilted object that lands spins so fast that it would be millimetres deep within one step."""
+FINE = 8
 TOUCH_DISTANCE = 0.002
 """Metres of separation beyond which a contact of PhysX carries no force and counts for nothing."""
 SUPPORT_DISTANCE = 5e-4
@@ -32,7 +30,6 @@ SUPPORT_DISTANCE = 5e-4
 
 _ROBOT = ("arm", "hand")
 _ARM_BIT = 1 << 8  # shapes that share a bit of group 2 do not collide with each other
-_HAND_BIT = 1 << 9
 
 
 class SapienPhysics:
@@ -69,7 +66,9 @@ class SapienPhysics:
         """See `PhysicsEngine.reset`."""
         sapien, physx = self._sapien, self._physx
         physx.set_scene_config(enable_enhanced_determinism=False, bounce_threshold=2.0)
-        physx.set_body_config(solver_position_iterations=POSITION_ITERATIONS, solver_velocity_iterations=1)
+        physx.set_body_config(
+            solver_position_iterations=self.robot.solver_iterations, solver_velocity_iterations=1
+        )
         physx.set_shape_config(contact_offset=CONTACT_OFFSET["object"], rest_offset=0.0)
         physx.set_default_material(0.5, 0.5, 0.0)
         self._system = physx.PhysxCpuSystem()
@@ -109,7 +108,9 @@ class SapienPhysics:
         for k, fixture in enumerate(configuration.fixtures):
             body = self._physx.PhysxRigidStaticComponent()
             for box in fixture.boxes:
-                shape = self._physx.PhysxCollisionShapeBox([s / 2 for s in box.size], self._material(box.friction))
+                shape = self._physx.PhysxCollisionShapeBox(
+                    [s / 2 for s in box.size], self._material(box.friction)
+                )
                 shape.set_local_pose(self._pose(box.pose))
                 shape.set_contact_offset(CONTACT_OFFSET["fixture"])
                 body.attach(shape)
@@ -170,7 +171,7 @@ class SapienPhysics:
             link.set_disable_gravity(True)
             in_hand = name in hand
             for shape in link.get_collision_shapes():
-                bits = _ARM_BIT if not in_hand else (_ARM_BIT if name not in tip_of else 0) | _HAND_BIT * 0
+                bits = 0 if name in tip_of else _ARM_BIT
                 shape.set_collision_groups([1, 1, bits, 0])
                 shape.set_contact_offset(CONTACT_OFFSET["robot"])
                 if name in robot.pad_links:
@@ -207,6 +208,8 @@ class SapienPhysics:
         self._wrist = [link.name for link in articulation.get_links()].index(robot.wrist_link)
         self._wrist_link = links[robot.wrist_link]
         self._tool_identity = bool(np.array_equal(robot.tool_pose, [0, 0, 0, 1, 0, 0, 0]))
+        in_wrist = poses.multiply(poses.inverse(_array(self._wrist_link.entity_pose)), self._tool())
+        self._lever, self._to_tool = in_wrist[:3], in_wrist[3:] * _CONJUGATE
         self._tip_links = [links[tip.links[0]] for tip in robot.tips]
         self._tip_points = [np.array(tip.point) for tip in robot.tips]
 
@@ -274,26 +277,23 @@ class SapienPhysics:
             joint_velocity=v,
             joint_effort=effort,
             tip_force=self._tip_force,
-            wrench=self._wrench(tool),
+            wrench=self._wrench(),
             tool_pose=tool,
             tips=tips,
             objects=objects,
             velocities=velocities,
         )
 
-    def _wrench(self, tool: Array) -> Array:
+    def _wrench(self) -> Array:
         """External wrench at the tool, from the wrist joint's incoming force.
 
         SAPIEN reports the force that the wrist's parent exerts on it in the link's frame; at rest the
         world's force on the hand is its opposite. Moments are moved to the tool origin: t' = t + r x f.
         """
-        incoming = (-self._articulation.get_link_incoming_joint_forces()[self._wrist].astype(np.float64))
-        in_wrist = poses.inverse(_array(self._wrist_link.entity_pose))
-        local = poses.multiply(in_wrist, tool)  # the tool in the wrist's frame
-        back = local[3:] * _CONJUGATE
+        incoming = -self._articulation.get_link_incoming_joint_forces()[self._wrist].astype(np.float64)
         force = incoming[:3]
-        torque = incoming[3:] - np.array(poses.cross(local[:3], force))
-        return np.concatenate([poses.rotate(back, force), poses.rotate(back, torque)])
+        torque = incoming[3:] - poses.cross(self._lever, force)
+        return np.concatenate([poses.rotate(self._to_tool, force), poses.rotate(self._to_tool, torque)])
 
     def _tool(self) -> Array:
         tool = _array(self._tool_link.entity_pose)
