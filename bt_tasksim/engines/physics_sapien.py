@@ -206,10 +206,12 @@ class SapienPhysics:
             joint.set_drive_velocity_target(0.0)
         self._tool_link = links[robot.tool_link]
         self._wrist = [link.name for link in articulation.get_links()].index(robot.wrist_link)
-        self._wrist_link = links[robot.wrist_link]
+        wrist = links[robot.wrist_link]
+        joint = next(j for j in articulation.get_joints() if j.child_link == wrist)
         self._tool_identity = bool(np.array_equal(robot.tool_pose, [0, 0, 0, 1, 0, 0, 0]))
-        in_wrist = poses.multiply(poses.inverse(_array(self._wrist_link.entity_pose)), self._tool())
-        self._lever, self._to_tool = in_wrist[:3], in_wrist[3:] * _CONJUGATE
+        frame = poses.multiply(_array(wrist.entity_pose), _array(joint.pose_in_child))
+        in_joint = poses.multiply(poses.inverse(frame), self._tool())
+        self._lever, self._to_tool = in_joint[:3], in_joint[3:] * _CONJUGATE
         self._tip_links = [links[tip.links[0]] for tip in robot.tips]
         self._tip_points = [np.array(tip.point) for tip in robot.tips]
 
@@ -287,8 +289,9 @@ class SapienPhysics:
     def _wrench(self) -> Array:
         """External wrench at the tool, from the wrist joint's incoming force.
 
-        SAPIEN reports the force that the wrist's parent exerts on it in the link's frame; at rest the
-        world's force on the hand is its opposite. Moments are moved to the tool origin: t' = t + r x f.
+        SAPIEN reports the force that the wrist's parent exerts on it in the joint's frame, which may be turned
+        against the link's; at rest the world's force on the hand is its opposite. Moments are moved to the
+        tool origin: t' = t - r x f.
         """
         incoming = -self._articulation.get_link_incoming_joint_forces()[self._wrist].astype(np.float64)
         force = incoming[:3]
@@ -369,7 +372,8 @@ class SapienPhysics:
 
     def _disturbed_step(self) -> None:
         """One physics step, with a push that begins some time after the object was first held clear."""
-        disturbance: Disturbance = self._disturbance
+        disturbance = self._disturbance
+        assert disturbance is not None
         if self._disturbed == _DISTURBANCE_WAITING:
             k = self._names.index(disturbance.object)
             if self._held_since is None:
@@ -385,7 +389,8 @@ class SapienPhysics:
 
     def _push(self) -> None:
         """Push the object until it has left the hand, no faster than the disturbance says."""
-        disturbance: Disturbance = self._disturbance
+        disturbance = self._disturbance
+        assert disturbance is not None
         k = self._names.index(disturbance.object)
         self._read_contacts()
         if self._time > self._push_end or self._hand_force[k] <= 0.0:
