@@ -32,6 +32,8 @@ from bt_tasksim.runner import Runner
 from bt_tasksim.world import Command
 from trees.load import load_source
 
+PURE = ("initial_state", "begin", "violated", "maintained", "command", "looks", "advance", "explain")
+"""The concepts' own functions that a tick calls, besides the policy's."""
 BARS = {"steps_ratio": 3.0, "outside_us": 250.0, "tick_ratio": 1.5, "help_s": 0.5}
 
 
@@ -105,7 +107,7 @@ def outside_physics(episodes: int, robot: str = "panda") -> dict[str, Any]:
     physics: Any = runner.pipeline.physics
     clock.wrap(runner, "tick", "tick")
     for leaf in runner.tree.iterate():
-        for name in ("initial_state", "begin", "violated", "maintained", "command", "looks", "advance", "explain"):
+        for name in PURE:
             if hasattr(leaf, name):
                 clock.wrap(leaf, name, "concepts")
         if hasattr(leaf, "_policy"):
@@ -267,8 +269,12 @@ def help_time(rounds: int) -> dict[str, Any]:
         started = time.perf_counter()
         subprocess.run(command, check=True, capture_output=True)
         times.append(time.perf_counter() - started)
-    check = "import sys, bt_tasksim, bt_tasksim.cli; print(*sorted({'torch','sapien','mani_skill'} & set(sys.modules)))"
-    heavy = subprocess.run([sys.executable, "-c", check], check=True, capture_output=True, text=True).stdout.split()
+    check = (
+        "import sys, bt_tasksim, bt_tasksim.cli; "
+        "print(*sorted({'torch', 'sapien', 'mani_skill'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", check], check=True, capture_output=True, text=True)
+    heavy = done.stdout.split()
     return {"help_s": statistics.median(times), "help_imports": heavy}
 
 
@@ -278,24 +284,27 @@ def _runner(scenario: str, robot: str = "panda") -> Runner:
 
 
 def _print(found: dict[str, Any]) -> None:
-    print(f"pick_and_place, episodes with resets    {found['steps_per_s']:8.0f} control steps/s")
+    def row(label: str, value: float, unit: str, digits: int = 0, bar: str = "") -> None:
+        print(f"{label:40}{value:10.{digits}f} {unit:18}{f'(bar: {bar})' if bar else ''}".rstrip())
+
+    row("pick_and_place, episodes with resets", found["steps_per_s"], "control steps/s")
     if "steps_ratio" in found:
-        print(f"ManiSkill PickCube-v1, steps alone      {found['maniskill_steps_per_s']:8.0f} control steps/s")
-        print(f"ratio                                   {found['steps_ratio']:8.2f}   (bar: at least {BARS['steps_ratio']:g})")
+        row("ManiSkill PickCube-v1, steps alone", found["maniskill_steps_per_s"], "control steps/s")
+        row("ratio", found["steps_ratio"], "", 2, f"at least {BARS['steps_ratio']:g}")
     else:
         print(f"ManiSkill PickCube-v1 did not start: {found['maniskill_missing']}")
     print()
     for part, value in found["parts_us"].items():
-        print(f"outside physics: {part:22} {value:8.0f} us")
-    print(f"outside physics, together               {found['outside_us']:8.0f} us  (bar: at most {BARS['outside_us']:g})")
-    print(f"physics                                 {found['physics_us']:8.0f} us")
+        row(f"outside physics: {part}", value, "us")
+    row("outside physics, together", found["outside_us"], "us", 0, f"at most {BARS['outside_us']:g}")
+    row("physics", found["physics_us"], "us")
     print()
-    print(f"tick without concept functions          {found['tick_us']:8.2f} us")
-    print(f"tick of plain py_trees                  {found['py_trees_tick_us']:8.2f} us")
-    print(f"ratio                                   {found['tick_ratio']:8.2f}   (bar: at most {BARS['tick_ratio']:g})")
+    row("tick without concept functions", found["tick_us"], "us", 2)
+    row("tick of plain py_trees", found["py_trees_tick_us"], "us", 2)
+    row("ratio", found["tick_ratio"], "", 2, f"at most {BARS['tick_ratio']:g}")
     print()
-    heavy = ", ".join(found["help_imports"]) or "none of torch, sapien, mani_skill"
-    print(f"bt-tasksim --help                       {found['help_s']:8.3f} s   (bar: under {BARS['help_s']:g}; imports {heavy})")
+    row("bt-tasksim --help", found["help_s"], "s", 3, f"under {BARS['help_s']:g}")
+    print(f"it imports {', '.join(found['help_imports']) or 'none of torch, sapien, mani_skill'}")
 
 
 if __name__ == "__main__":

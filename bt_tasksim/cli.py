@@ -240,6 +240,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _run_tree(tree: Any, scene: Any, seed: int, engines: Any, folder: Path, name: str) -> tuple[Any, Any]:
+    from bt_tasksim.report.report import NO_VIDEO
     from bt_tasksim.report.write import filming_runner, write_run
     from bt_tasksim.runner import Runner
 
@@ -251,7 +252,7 @@ def _run_tree(tree: Any, scene: Any, seed: int, engines: Any, folder: Path, name
     else:
         runner = Runner(tree, scene, engines)
     with _progress("running", None):
-        result, files = write_run(folder, runner, seed, scenario=name, no_video=why)
+        result, files = write_run(folder, runner, seed, scenario=name, no_video=why or NO_VIDEO)
     for remark in files.remarks:
         print(remark)
     return result, files

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Mapping
-from typing import Any, ClassVar, dataclass_transform
+from typing import Any, ClassVar
 
 import numpy as np
 from array_api_compat import array_namespace
@@ -155,7 +155,6 @@ class ConceptNode(ContextLeaf, abc.ABC):
         return Status.FAILURE
 
 
-@dataclass_transform()
 class ConceptModel(ConceptNode):
     """A task described well enough to learn it, or programmed where nothing is unknown.
 

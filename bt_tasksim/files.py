@@ -47,13 +47,15 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         A path in the same folder, with the same suffix, of a file that does not exist yet.
 
     Raises:
-        InputError: The folder does not exist, or the path is a folder.
+        InputError: The folder does not exist, or the path is a folder or a device.
         MachineError: The disk is full or not writable, or the block wrote nothing.
     """
     path = Path(path)
     _check_parent(path)
     if path.is_dir():
         raise InputError(f"cannot write '{path}': it is a folder; name a file in it")
+    if path.exists() and not path.is_file():
+        raise InputError(f"cannot write '{path}': it is a device or a pipe; name a file")
     unfinished = _beside(path)
     try:
         yield unfinished

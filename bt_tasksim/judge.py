@@ -19,6 +19,8 @@ AT_REST = (0.01, 0.1)
 """Speeds in m/s and rad/s below which an object is at rest."""
 DEEPEST = 0.002
 """Metres of overlap of two bodies that may not be exceeded at any time of a run."""
+TOUCHING = 1e-4
+"""Metres between hand and object within which the hand touches it."""
 KNOCKED = (0.05, math.radians(15.0))
 """Metres and radians by which another object may be shifted or tilted."""
 
@@ -55,33 +57,39 @@ def judge(configuration: ActorConfiguration, model: WorldModel, hidden: Hidden) 
     goal = configuration.goal
     depth = float(hidden.penetration)
     if goal is None:
-        return _verdict("", "no goal is set for this scene", math.nan, math.nan, depth)
+        return Verdict(True, "", "no goal is set for this scene", math.nan, math.nan, depth)
     k = model.object_index(goal.object)
     place, thing = model.place(goal.place), model.object(goal.object)
     distance, angle, placed = _placement(goal, place, thing, hidden.objects[k])
-    where = f"{goal.object} {_where(goal, place)}, {1000 * distance:.0f} mm and {math.degrees(angle):.1f} degrees off"
+    off = f"{1000 * distance:.0f} mm and {math.degrees(angle):.1f} degrees off"
+
+    def end(reason: str, why: str) -> Verdict:
+        return Verdict(not reason, reason, why, distance, angle, depth)
+
     if not placed:
-        reason = "not in the bin" if goal.relation == "inside" else _misplaced(goal, distance)
-        return _verdict(reason, where.replace("stands on", "is not on").replace("is in", "is not in"), distance, angle, depth)
+        inside = goal.relation == "inside"
+        reason = "not in the bin" if inside else _misplaced(goal, distance)
+        return end(
+            reason, f"{goal.object} {'is not in' if inside else 'does not stand on'} {goal.place}: {off}"
+        )
     speed, turning = (float(np.linalg.norm(v)) for v in np.split(hidden.velocities[k], 2))
     if speed > AT_REST[0] or turning > AT_REST[1]:
-        return _verdict("not at rest", f"{goal.object} still moves at {1000 * speed:.0f} mm/s", distance, angle, depth)
-    if float(hidden.hand_distance[k]) < np.inf and float(hidden.hand_distance[k]) <= 1e-4:
-        return _verdict("hand not clear", f"the hand still touches {goal.object}", distance, angle, depth)
+        return end("not at rest", f"{goal.object} still moves at {1000 * speed:.0f} mm/s")
+    if float(hidden.hand_distance[k]) <= TOUCHING:
+        return end("hand not clear", f"the hand still touches {goal.object}")
     for i, actor in enumerate(configuration.objects):
         if i == k:
             continue
         shift = float(np.linalg.norm(hidden.objects[i][:3] - np.array(actor.pose[:3])))
         tilt = _tilt(hidden.objects[i]) - _tilt(np.array(actor.pose))
         if shift > KNOCKED[0] or tilt > KNOCKED[1]:
-            return _verdict(
-                "knocked something over",
-                f"{actor.name} was shifted by {1000 * shift:.0f} mm and tilted by {math.degrees(tilt):.0f} degrees",
-                distance, angle, depth,
-            )  # fmt: skip
+            moved = f"was shifted by {1000 * shift:.0f} mm and tilted by {math.degrees(tilt):.0f} degrees"
+            return end("knocked something over", f"{actor.name} {moved}")
     if depth > DEEPEST:
-        return _verdict("penetration", f"two bodies overlapped by {1000 * depth:.1f} mm", distance, angle, depth)
-    return _verdict("", where, distance, angle, depth)
+        return end("penetration", f"two bodies overlapped by {1000 * depth:.1f} mm")
+    return end(
+        "", f"{goal.object} {'is in' if goal.relation == 'inside' else 'stands on'} {goal.place}, {off}"
+    )
 
 
 def at_rest(hidden: Hidden) -> bool:
@@ -91,14 +99,6 @@ def at_rest(hidden: Hidden) -> bool:
         np.all(np.linalg.norm(v[:, :3], axis=-1) < AT_REST[0] / 2)
         and np.all(np.linalg.norm(v[:, 3:], axis=-1) < AT_REST[1] / 2)
     )
-
-
-def _verdict(reason: str, why: str, distance: float, angle: float, depth: float) -> Verdict:
-    return Verdict(not reason, reason, why, distance, angle, depth)
-
-
-def _where(goal: Goal, place: PlaceModel) -> str:
-    return f"is in {goal.place}" if goal.relation == "inside" else f"stands on {goal.place}"
 
 
 def _misplaced(goal: Goal, distance: float) -> str:

@@ -5,6 +5,7 @@ A path is planned once, when a concept becomes active, and then only looked up a
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -62,7 +63,7 @@ def plan(
     line = _rounded(waypoints, blend)
     lengths = [
         max(float(np.linalg.norm(b[:3] - a[:3])), float(poses.angle_between(a[3:], b[3:])) * speed / turn)
-        for a, b in zip(line[:-1], line[1:], strict=True)
+        for a, b in itertools.pairwise(line)
     ]
     along = np.concatenate([[0.0], np.cumsum(lengths)])
     total = float(along[-1])
@@ -108,7 +109,9 @@ def _rounded(waypoints: Sequence[Array], blend: float, pieces: int = 6) -> list[
         a = poses.interpolate(before, corner, 1.0 - min(blend, into / 2) / into)
         b = poses.interpolate(corner, after, min(blend, out / 2) / out)
         line.append(a)
-        for t in np.linspace(0.0, 1.0, pieces)[1:]:  # quadratic Bezier curve (de Casteljau)
-            line.append(poses.interpolate(poses.interpolate(a, corner, t), poses.interpolate(corner, b, t), t))
+        line.extend(  # quadratic Bezier curve (de Casteljau)
+            poses.interpolate(poses.interpolate(a, corner, t), poses.interpolate(corner, b, t), t)
+            for t in np.linspace(0.0, 1.0, pieces)[1:]
+        )
     line.append(np.asarray(waypoints[-1], float))
     return line

@@ -14,6 +14,7 @@ built; the same declarations are the ports of the XML form.
 
 from __future__ import annotations
 
+import inspect
 import math
 import typing
 from collections.abc import Mapping, Sequence
@@ -203,7 +204,9 @@ def _number(value: Any, quantity: Quantity) -> float:
 
 
 def _vector(value: Any, quantity: Quantity) -> Vector:
-    if isinstance(value, str | _Unreadable) or not isinstance(value, Sequence) and not hasattr(value, "__len__"):
+    if isinstance(value, str | _Unreadable) or (
+        not isinstance(value, Sequence) and not hasattr(value, "__len__")
+    ):
         raise TypeError
     numbers = [_number(v, Quantity(quantity.unit)) for v in value]
     if len(numbers) != 3:
@@ -247,7 +250,7 @@ def declared_parameters(cls: type, base: type) -> tuple[Parameter, ...]:
         if owner is base or not issubclass(owner, base):
             continue
         hints = typing.get_type_hints(owner, include_extras=True)
-        for name in owner.__dict__.get("__annotations__", {}):
+        for name in inspect.get_annotations(owner):
             hint = hints[name]
             quantity, optional = _quantity(hint)
             if quantity is not None:

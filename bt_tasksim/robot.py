@@ -97,8 +97,8 @@ class RobotDescription:
             (x, y, z, rotations about x, y, z): 0 leaves one free, for arms of fewer than six joints.
         envelope: Boxes ``(pose (7,), full size (3,))`` in the tool frame that hold the hand and the end of
             the arm, for keeping clear of obstacles.
-        solver_iterations: Position iterations of a physics engine that solves contacts by iteration: as many as
-            keep the fingers from sinking into what they press on.
+        solver_iterations: Position iterations of a physics engine that solves contacts by iteration: as many
+            as keep the fingers from sinking into what they press on.
         cameras: By name: pose, size and field of view; see the rendering engine.
         source: Path of the data file.
     """

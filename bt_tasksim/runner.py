@@ -25,7 +25,7 @@ from bt_tasksim.world import Command, Observation, WorldModel
 
 LONGEST = 120.0
 """Seconds of an episode after which it is stopped."""
-SETTLE = 2.0
+SETTLE = 4.0
 """Longest time in seconds for which things may come to rest after the tree has ended."""
 
 
@@ -159,8 +159,9 @@ class Runner:
             try:
                 context.advance(pipeline.step(command, look=context.look))
             except UnreachableError as error:
+                leaf = tree.tip()
                 tree.stop(Status.INVALID)
-                reason, why = "out of reach", str(error)
+                reason, why = "out of reach", f"{tree.name if leaf is None else leaf.name}: {error}"
                 break
             steps += 1
         status = tree.status

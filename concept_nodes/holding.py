@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 from array_api_compat import array_namespace
 
 from bt_tasksim.context import Seen
@@ -17,6 +20,11 @@ def tool_distance(seen: Seen, target: str) -> Array:
     The box is the object's nominal bounding box at its estimated pose.
     """
     local = transform(inverse(seen.object(target)), seen.tool[..., :3])
+    if type(local) is np.ndarray and local.ndim == 1:  # one instant, in plain floats
+        outside = [
+            max(abs(x) - v / 2, 0.0) for x, v in zip(local.tolist(), seen.model(target).extent, strict=True)
+        ]
+        return np.float64(math.hypot(*outside))
     xp = array_namespace(local)
     half = constant([v / 2 for v in seen.model(target).extent], local)
     outside = xp.maximum(xp.abs(local) - half, xp.zeros_like(local))

@@ -133,7 +133,8 @@ def translation_normals(normals: ArrayLike) -> NDArray[np.float64]:
     bad = np.flatnonzero(~np.isfinite(lengths) | (lengths < 1e-9))
     if bad.size:
         raise InputError(f"contact normal {bad[0]} is zero or not finite; give a direction")
-    return array / lengths[:, None]
+    unit: NDArray[np.float64] = array / lengths[:, None]
+    return unit
 
 
 def rotation_normals(normals: ArrayLike, points: ArrayLike, centre: ArrayLike) -> NDArray[np.float64]:

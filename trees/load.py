@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
 import pkgutil
@@ -56,6 +57,7 @@ def load_source(tree: str, robot: str | None = None, scene: str | None = None) -
     if path.suffix == ".py":
         module = _module(path)
         build = _function(module, "build", path)
+        build = functools.partial(_called, build, path)
         own = getattr(module, "scene", None)
         source = TreeSource(
             path.stem, build, _scene(scene, robot) if scene or own is None else _made(own, robot, path)
@@ -162,7 +164,7 @@ def _scene(name: str | None, robot: str | None) -> Scene:
 
 
 def _made(build: Any, robot: str | None, path: Path) -> Scene:
-    made = build() if robot is None else build(robot)
+    made = _called(build, path) if robot is None else _called(build, path, robot)
     if not isinstance(made, Scene):
         raise InputError(f"'{path}': scene() should return a Scene, found {type(made).__name__}")
     return made
@@ -175,14 +177,19 @@ def _module(path: Path) -> Any:
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
+    _called(spec.loader.exec_module, path, module)
+    return module
+
+
+def _called(function: Callable[..., Any], path: Path, *arguments: Any) -> Any:
+    """What a function of a tree's file returns; whatever it raises is one sentence with the line."""
     try:
-        spec.loader.exec_module(module)
+        return function(*arguments)
     except InputError:
         raise
-    except Exception as error:
-        line = _line_in(error, path)
-        raise InputError(f"'{path}'{line}: {type(error).__name__}: {error}") from error
-    return module
+    except (Exception, SystemExit) as error:
+        text = (error.msg if isinstance(error, SyntaxError) else str(error)) or "no reason given"
+        raise InputError(f"'{path}'{_line_in(error, path)}: {type(error).__name__}: {text}") from error
 
 
 def _line_in(error: BaseException, path: Path) -> str:
@@ -190,7 +197,7 @@ def _line_in(error: BaseException, path: Path) -> str:
         return f", line {error.lineno}"
     trace, line = error.__traceback__, ""
     while trace is not None:
-        if trace.tb_frame.f_code.co_filename == str(path):
+        if Path(trace.tb_frame.f_code.co_filename).absolute() == path.absolute():
             line = f", line {trace.tb_lineno}"
         trace = trace.tb_next
     return line

@@ -109,7 +109,7 @@ def unproject(camera: CameraModel, depth: Array) -> Array:
 
 
 def unproject_pixels(camera: CameraModel, rows: Array, columns: Array, depth: Array) -> Array:
-    """Points ``(..., 3)``, robot base frame, of pixels ``rows``, ``columns (...)`` with ``depth (...)`` metres."""
+    """Points ``(..., 3)``, base frame, of pixels ``rows``, ``columns (...)`` with ``depth (...)`` metres."""
     x = (columns + 0.5 - camera.matrix[0, 2]) / camera.matrix[0, 0]
     y = (rows + 0.5 - camera.matrix[1, 2]) / camera.matrix[1, 1]
     return poses.transform(camera.pose, np.stack([x * depth, y * depth, depth], axis=-1))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from bt_tasksim import poses
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.shapes import nearest_point
+from bt_tasksim.shapes import Shape, nearest_point
 from bt_tasksim.world import Observation, WorldState
 
 TOUCH = 0.2
@@ -26,58 +28,119 @@ class ObservationBuilder:
     def __init__(self, robot: RobotDescription, configuration: ActorConfiguration) -> None:
         self._robot = robot
         self._n_arm = len(robot.arm_joints)
-        self._limit = robot.hand_drive.force_limit
+        self._limit = robot.hand_drive.force_limit * robot.hand_drive_scale
         self._shapes = [actor.shape() for actor in configuration.objects]
-        self._before: tuple[int, Array, float] | None = None
+        self._before: _Instant | None = None
 
     def build(self, state: WorldState, estimate: Array) -> Observation:
         """The observation for estimated object poses ``(n_objects, 7)``."""
         n = self._n_arm
-        tips, tool = state.tips, state.tool_pose
-        which = self._nearest(tool, estimate)
-        if which < 0:
-            points, motion = tips.copy(), np.zeros(6)
-        else:
-            pose = estimate[which]
-            back = poses.inverse(pose)
-            local = np.array([poses.transform(back, tip) for tip in tips])
-            nearest = nearest_point(self._shapes[which], local)
-            points = np.array([poses.transform(pose, p) for p in nearest])
-            motion = self._motion(which, poses.multiply(poses.inverse(tool), pose), float(state.time))
+        now = _Instant(float(state.time), state.tool_pose, estimate)
         force = state.tip_force
-        return Observation(
-            time=state.time,
-            arm_position=state.joint_position[:n],
-            arm_velocity=state.joint_velocity[:n],
-            hand_position=state.joint_position[n:],
-            hand_effort=state.joint_effort[n:] / self._limit,
-            closure=self._robot.closure(state.joint_position[n:]),
-            tool_pose=tool,
-            tips=tips,
-            contacts=(force * force).sum(-1) > TOUCH * TOUCH,
-            contact_force=force,
-            wrench=state.wrench,
-            objects=estimate,
-            contact_points=points,
-            motion=motion,
+        arm, hand = state.joint_position[:n], state.joint_position[n:]
+        known = (
+            state.time,
+            arm,
+            state.joint_velocity[:n],
+            hand,
+            state.joint_effort[n:] / self._limit,
+            self._robot.closure(hand),
+            state.tool_pose,
+            state.tips,
+            np.einsum("ij,ij->i", force, force) > TOUCH * TOUCH,
+            force,
+            state.wrench,
+            estimate,
         )
+        observation = LazyObservation.of(known, (self._shapes, self._before, now))
+        self._before = now
+        return observation
 
-    def _nearest(self, tool: Array, estimate: Array) -> int:
-        if len(estimate) == 0:
-            return -1
-        if len(estimate) == 1:
-            return 0
-        gap = estimate[:, :3] - tool[:3]
+
+class _Instant:
+    """What the visual features of an instant are made of."""
+
+    __slots__ = ("objects", "time", "tool")
+
+    def __init__(self, time: float, tool: Array, objects: Array) -> None:
+        self.time = time
+        self.tool = tool
+        self.objects = objects
+
+    def nearest(self) -> int:
+        """Index of the object nearest to the tool; -1 where there is none."""
+        if len(self.objects) < 2:
+            return len(self.objects) - 1
+        gap = self.objects[:, :3] - self.tool[:3]
         return int(np.argmin((gap * gap).sum(-1)))
 
-    def _motion(self, which: int, relative: Array, time: float) -> Array:
-        """Twist ``(6,)`` of the object relative to the tool, by a finite difference, tool frame."""
-        before, self._before = self._before, (which, relative, time)
-        if before is None or before[0] != which or time <= before[2]:
-            return np.zeros(6)
-        dt = time - before[2]
-        turned = poses.quat_multiply(relative[3:], before[1][3:] * _CONJUGATE)
-        return np.concatenate([relative[:3] - before[1][:3], poses.rotation_vector(turned)]) / dt
+
+def contact_points(shapes: list[Shape], now: _Instant, tips: Array) -> Array:
+    """The points ``(n_tips, 3)`` of the nearest object that the fingertips would touch."""
+    which = now.nearest()
+    if which < 0:
+        return tips.copy()
+    pose = now.objects[which]
+    back = poses.inverse(pose)
+    local = np.array([poses.transform(back, tip) for tip in tips])
+    return np.array([poses.transform(pose, p) for p in nearest_point(shapes[which], local)])
 
 
-_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+def motion(before: _Instant | None, now: _Instant) -> Array:
+    """Twist ``(6,)`` of the nearest object relative to the tool, by a finite difference, tool frame."""
+    which = now.nearest()
+    if before is None or which < 0 or which != before.nearest() or now.time <= before.time:
+        return np.zeros(6)
+    first, last = (poses.multiply(poses.inverse(i.tool), i.objects[which]) for i in (before, now))
+    turned = poses.quat_multiply(last[3:], poses.quat_conjugate(first[3:]))
+    twist = np.concatenate([last[:3] - first[:3], poses.rotation_vector(turned)])
+    return twist / (now.time - before.time)
+
+
+class LazyObservation(Observation):
+    """An observation whose visual features are computed when they are looked at: most ticks never do."""
+
+    __slots__ = ("_contact_points", "_motion", "_source")
+    _source: tuple[list[Shape], _Instant | None, _Instant]
+    _contact_points: Array | None
+    _motion: Array | None
+
+    @classmethod
+    def of(
+        cls, known: tuple[Array, ...], source: tuple[list[Shape], _Instant | None, _Instant]
+    ) -> LazyObservation:
+        """An observation of fields in their order, without the visual ones, and what those are made of."""
+        self: LazyObservation = object.__new__(cls)
+        for name, value in zip(_KNOWN, known, strict=True):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_source", source)
+        object.__setattr__(self, "_contact_points", None)
+        object.__setattr__(self, "_motion", None)
+        return self
+
+    @property
+    def contact_points(self) -> Array:
+        """See `Observation`."""
+        if self._contact_points is None:
+            shapes, _, now = self._source
+            object.__setattr__(self, "_contact_points", contact_points(shapes, now, self.tips))
+        return self._contact_points
+
+    @contact_points.setter
+    def contact_points(self, value: Array) -> None:
+        object.__setattr__(self, "_contact_points", value)
+
+    @property
+    def motion(self) -> Array:
+        """See `Observation`."""
+        if self._motion is None:
+            _, before, now = self._source
+            object.__setattr__(self, "_motion", motion(before, now))
+        return self._motion
+
+    @motion.setter
+    def motion(self, value: Array) -> None:
+        object.__setattr__(self, "_motion", value)
+
+
+_KNOWN = tuple(f.name for f in fields(Observation) if f.name not in ("contact_points", "motion"))

@@ -12,7 +12,7 @@ from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.errors import MachineError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration, Disturbance
+from bt_tasksim.scene import ActorConfiguration
 from bt_tasksim.shapes import BoxPiece
 from bt_tasksim.world import Hidden, JointTarget, WorldState
 
@@ -52,7 +52,8 @@ class SapienPhysics:
             import sapien.physx as physx
         except ImportError as error:
             raise MachineError(
-                f"SAPIEN physics cannot start: {error}; install the simulation extra: pip install 'bt-tasksim[sim]'"
+                f"SAPIEN physics cannot start: {error}; "
+                "install the simulation extra: pip install 'bt-tasksim[sim]'"
             ) from error
         self._sapien = sapien
         self._physx = physx
@@ -289,8 +290,8 @@ class SapienPhysics:
     def _wrench(self) -> Array:
         """External wrench at the tool, from the wrist joint's incoming force.
 
-        SAPIEN reports the force that the wrist's parent exerts on it in the joint's frame, which may be turned
-        against the link's; at rest the world's force on the hand is its opposite. Moments are moved to the
+        SAPIEN reports the force that the wrist's parent exerts on it in the joint's frame, which may be
+        turned against the link's; at rest the world's force on the hand is its opposite. Moments are moved to the
         tool origin: t' = t - r x f.
         """
         incoming = -self._articulation.get_link_incoming_joint_forces()[self._wrist].astype(np.float64)

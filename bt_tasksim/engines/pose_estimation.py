@@ -8,7 +8,7 @@ motions are looked for, from every side that it may lie on.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,11 +81,18 @@ def estimate_pose(
     return best if best.cost < POOR else None
 
 
-def follow(target: Target, view: View, start: Array) -> Fit:
-    """The pose near ``start (7,)``, all motions free: for an object in the hand, of which little is seen."""
+def follow(target: Target, view: View, start: Array, places: Iterable[PlaceModel] = ()) -> Fit:
+    """The pose near ``start (7,)``: for an object in the hand, of which little is seen.
+
+    While it still stands on one of the places it only slides and turns there; else all motions are free.
+    """
     points = sample_surface(target.shape)
+    half = np.array([0.0, 0.0, -target.model.extent[2] / 2])
+    foot, up = poses.transform(start, half), poses.rotate(start[3:], np.array([0.0, 0.0, 1.0]))
+    stands = up[2] > 0.999 and any(abs(float(foot[2] - place.pose[2])) < 0.003 for place in places)
+    free = UPRIGHT if stands else FREE
     pose = register(
-        points.thinned(_FINE[1]), view.thinned(_FINE[0]), start, FREE, steps=15, reach=(0.006, 0.003)
+        points.thinned(_FINE[1]), view.thinned(_FINE[0]), start, free, steps=15, reach=(0.006, 0.003)
     )
     return judge_fit(points, view, pose)
 

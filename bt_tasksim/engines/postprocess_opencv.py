@@ -1,8 +1,8 @@
 """Post-process with images: where the objects are, as an RGB-D camera sees them and the hand feels them.
 
-Images are few, because they are dear: one at the beginning, one when a concept asks for it, and some after
-the hand has let go of something, until it lies still. In between, an object that the fingers hold moves with
-the tool, and everything else stays where it was seen.
+Images are few, because they are dear: one at the beginning, one when a concept asks for it, one a second
+while the hand holds something, and some after it has let go, until the thing lies still. In between, an
+object that the fingers hold moves with the tool, and everything else stays where it was seen.
 
 Nothing here knows where objects truly are. What is used of the configuration is what a robot is told: the
 objects' shapes and colours by category, the calibrated fixtures and places.
@@ -34,6 +34,8 @@ APART = 3
 """Ticks in a row without contact after which the hand has let go (contacts flicker)."""
 WAIT = 0.25
 """Seconds from the end of contact to a look, and from that to the next one."""
+HELD = (0.2, 1.0)
+"""Seconds from the beginning of a hold to a look, and from that to the next one: things slip in a hand."""
 LOOKS = 8
 """Looks after the end of contact, at most."""
 SAME = (0.006, np.deg2rad(6.0))
@@ -141,7 +143,7 @@ class CameraPostProcess:
                     self._look_later(track, float(state.time))
             elif i == near and opposed and not any(t.grip is not None for t in self._tracks):
                 track.grip = poses.multiply(poses.inverse(state.tool_pose), self._estimate[i])
-                track.touched, track.apart, track.due = True, 0, np.inf
+                track.touched, track.apart, track.due = True, 0, float(state.time) + HELD[0]
             elif i == near and np.any(touching):
                 track.touched, track.apart, track.due = True, 0, np.inf
             elif track.touched and not np.isfinite(track.due):
@@ -153,7 +155,7 @@ class CameraPostProcess:
         track.touched, track.apart, track.due, track.looks = False, 0, time + WAIT, LOOKS
 
     def _in_reach(self, tool: Array) -> int:
-        """Index of the object whose nominal box is nearest to the tool, within reach of the fingers; or -1."""
+        """Index of the object nearest to the tool, its nominal box within the fingers' reach; or -1."""
         best, found = REACH, -1
         for i, target in enumerate(self._targets):
             if np.isfinite(self._estimate[i, 0]):
@@ -197,7 +199,7 @@ class CameraPostProcess:
         """The fit of object ``i`` to what may be it, or None."""
         target, before = self._targets[i], self._estimate[i]
         if self._tracks[i].grip is not None:
-            fit = follow(target, view, before)
+            fit = follow(target, view, before, self._model.places.values())
             moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
             turned = float(poses.angle_between(fit.pose[3:], before[3:]))
             return fit if fit.cost < 0.3 and moved < 0.02 and turned < 0.35 else None
@@ -227,6 +229,7 @@ class CameraPostProcess:
             # What holds is the tool: its pose is known far better than the object's.
             back = poses.multiply(poses.inverse(before), fit.pose)
             track.grip = poses.multiply(track.grip, back)
+            self._again(track, time, settled=False)
             return
         moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
         up = np.array([0.0, 0.0, 1.0])
@@ -235,6 +238,8 @@ class CameraPostProcess:
 
     def _again(self, track: Track, time: float, settled: bool) -> None:
         """Whether to look once more at something that the hand has let go."""
-        if np.isfinite(track.due) and track.due <= time + 1e-6:
+        if track.grip is not None:
+            track.due = time + HELD[1]
+        elif np.isfinite(track.due) and track.due <= time + 1e-6:
             track.looks -= 1
             track.due = np.inf if settled or track.looks <= 0 else time + WAIT

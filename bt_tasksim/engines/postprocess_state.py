@@ -45,7 +45,7 @@ class StatePostProcess:
     def observe(self, state: WorldState, images: Mapping[str, Image]) -> Observation:
         """See `PostProcessEngine.observe`."""
         if state.objects is None:
-            raise MachineError("the estimate cannot be made from the state: the physics engine knows no objects")
+            raise MachineError("no estimate from the state: this physics engine knows no objects")
         if self._local is None:  # the error is fixed to each object as it first was seen
             self._local = _error_in_object(state.objects, self._error)
         estimate = np.empty_like(state.objects)

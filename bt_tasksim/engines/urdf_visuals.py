@@ -46,6 +46,7 @@ def load_visuals(urdf: Path) -> tuple[LinkVisual, ...]:
     """
     try:
         root = parse(urdf).getroot()
+        assert root is not None
     except (ElementTree.ParseError, OSError, ValueError) as error:
         raise InputError(f"URDF '{urdf}' cannot be read: {error}") from error
     named = {m.get("name", ""): _colour(m) for m in root.findall("material")}
@@ -65,13 +66,14 @@ def _visual(
     link: str, visual: ElementTree.Element, named: dict[str, Colour | None], urdf: Path
 ) -> LinkVisual:
     origin = visual.find("origin")
-    xyz = _floats(origin.get("xyz", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
-    rpy = _floats(origin.get("rpy", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
+    xyz: tuple[float, ...] = _floats(origin.get("xyz", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
+    rpy: tuple[float, ...] = _floats(origin.get("rpy", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
     geometry = visual.find("geometry")
     if geometry is None or len(geometry) == 0:
         raise ValueError("it has no geometry")
     form = geometry[0]
-    kind, mesh, size = form.tag, None, (1.0, 1.0, 1.0)
+    kind, mesh = form.tag, None
+    size: tuple[float, ...] = (1.0, 1.0, 1.0)
     match kind:
         case "mesh":
             size = _floats(form.get("scale", "1 1 1"))

@@ -12,7 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from py_trees.common import Status
@@ -32,13 +32,12 @@ class Job:
         scene: Name or file of the scene, or None for the tree's own.
         robot: Name or file of the robot, or None for the scene's own.
         options: Which engines.
-        policies: Policy by concept, instead of the pinned ones.
     """
 
     tree: str
     scene: str | None = None
     robot: str | None = None
-    options: EngineOptions = EngineOptions()
+    options: EngineOptions = field(default_factory=EngineOptions)
 
 
 @dataclass(frozen=True)
@@ -236,7 +235,9 @@ def _name(job: Job) -> str:
 def _policies(runner: Any) -> dict[str, str]:
     from bt_tasksim.concept import ConceptNode
 
-    return {leaf.name: leaf.policy_in_use.name for leaf in runner.tree.iterate() if isinstance(leaf, ConceptNode)}
+    return {
+        leaf.name: leaf.policy_in_use.name for leaf in runner.tree.iterate() if isinstance(leaf, ConceptNode)
+    }
 
 
 @contextmanager

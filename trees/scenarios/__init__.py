@@ -1,0 +1,1 @@
+"""Ready-made trees, each with its scene."""
