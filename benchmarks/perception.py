@@ -160,7 +160,7 @@ def picture(measure: Measurement, path: str) -> None:
         row = int(np.clip(middle[0] - half_height, 0, seen.camera.height - 2 * half_height))
         column = int(np.clip(middle[1] - half_width, 0, seen.camera.width - 2 * half_width))
         crop = shown[row : row + 2 * half_height, column : column + 2 * half_width].astype(np.uint8)
-        scale = 4
+        scale = 3
         crop = cv2.resize(crop, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
         if pose is not None:
             _outline(crop, seen.camera, actor, pose, np.array([column, row]), scale)
