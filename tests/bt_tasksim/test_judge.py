@@ -89,7 +89,7 @@ def test_three_centimetres(table, axis, millimetres, success):
     assert found.success is success and found.reason == ("" if success else "not in place")
     assert found.position_error == pytest.approx(millimetres / 1000)
     if not success:
-        assert found.why == "target is not on goal, 31 mm and 0.0 degrees off"
+        assert found.why == "target does not stand on goal: 31 mm and 0.0 degrees off"
 
 
 @pytest.mark.parametrize(("degrees", "success"), [(9.0, True), (11.0, False)])

@@ -80,7 +80,7 @@ def test_out_of_reach_ends_the_run_with_the_distance(toy, act):
 
     stage.world.step = far
     result = finished(stage)
-    assert result.reason == "out of reach" and result.why == "the nearest pose misses by 120.0 mm"
+    assert result.reason == "out of reach" and result.why == "move: the nearest pose misses by 120.0 mm"
     assert not result.success and all(n.status != Status.RUNNING for n in stage.tree.iterate())
 
 

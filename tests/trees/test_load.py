@@ -1,0 +1,199 @@
+"""Trees by name: scenarios, Python files and XML files, and one sentence for whatever is wrong in them."""
+
+import textwrap
+
+import pytest
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.errors import InputError
+from concept_nodes import Grasp, Pick
+from trees import save_tree, sequence
+from trees.load import load_source, names_in, scenarios
+
+GOOD = """
+from bt_tasksim import Scene
+from concept_nodes import Grasp, Pick
+from trees import sequence
+
+def scene(robot="panda"):
+    return Scene(robot, objects={"cup": "on table"}, name="mine")
+
+def build():
+    return sequence("lift", Grasp("cup"), Pick("cup"))
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to(name, text):
+        path = tmp_path / name
+        path.write_text(textwrap.dedent(text))
+        return str(path)
+
+    return to
+
+
+def refused(*arguments):
+    with pytest.raises(InputError) as error:
+        load_source(*arguments)
+    sentence = str(error.value)
+    assert "\n" not in sentence
+    return sentence
+
+
+# ---- scenarios --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", scenarios())
+def test_each_scenario_builds_a_fresh_tree_every_time(name):
+    source = load_source(name)
+    a, b = source.build(), source.build()
+    assert source.name == source.scene.name == name
+    assert {id(n) for n in a.iterate()}.isdisjoint(id(n) for n in b.iterate())
+    assert names_in(a)[0] <= set(source.scene.objects)
+
+
+def test_the_scenarios_of_the_design_are_there():
+    assert {"pick_and_place", "shelf_to_shelf", "pick_and_throw", "pick_and_place_recovering"} <= set(
+        scenarios()
+    )
+
+
+def test_robot_and_scene_can_be_named():
+    assert load_source("pick_and_place", "xarm7_ability").scene.robot == "xarm7_ability"
+    other = load_source("pick_and_throw", None, "pick_and_throw")
+    assert other.scene.robot == "panda"
+
+
+def test_unknown_names_come_with_the_nearest():
+    assert refused("pick_and_plce").startswith("no scenario 'pick_and_plce'; did you mean 'pick_and_place'")
+    assert "(or give a .py or .xml file)" in refused("xyz")
+    assert "no scene 'shelf_to_shelv'; did you mean 'shelf_to_shelf'?" in refused(
+        "pick_and_place", None, "shelf_to_shelv"
+    )
+    sentence = refused("pick_and_throw", None, "shelf_to_shelf")
+    assert sentence.startswith(
+        "leaf 'bring cup': no place 'trash_bin' in the scene 'shelf_to_shelf'; known: "
+    )
+    assert "leaf 'grasp target': no object 'target' in the scene" in refused(
+        "pick_and_place", None, "pick_and_throw"
+    )
+
+
+# ---- Python files -----------------------------------------------------------------------------------------
+
+
+def test_a_python_file_with_its_own_scene(write):
+    source = load_source(write("lift.py", GOOD), "xarm7_ability")
+    assert source.name == "lift" and source.scene.name == "mine" and source.scene.robot == "xarm7_ability"
+    assert [n.name for n in source.build().children] == ["grasp cup", "pick cup"]
+
+
+def test_a_python_file_with_a_named_scene(write):
+    path = write("lift.py", GOOD.replace("def scene", "def other"))
+    assert load_source(path, None, "pick_and_throw").scene.name == "pick_and_throw"
+    assert "has no scene() and none was named: add one, or use --scene" in refused(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("x = 1", "has no function build(): define one that returns the tree's root"),
+        ("build = 3", "has no function build()"),
+        ("def build(:\n    pass", "line 1: SyntaxError: invalid syntax"),
+        ("x = 1\ny = 1 / 0", "line 2: ZeroDivisionError: division by zero"),
+        (
+            "import nothing_of_that_name",
+            "line 1: ModuleNotFoundError: No module named 'nothing_of_that_name'",
+        ),
+        ("import sys\nsys.exit(3)", "line 2: SystemExit: 3"),
+        ("def scene():\n    raise KeyError('cup')\ndef build(): ...", "line 2: KeyError: 'cup'"),
+        ("def scene():\n    return 'shelf'\ndef build(): ...", "scene() should return a Scene, found str"),
+    ],
+)
+def test_faulty_python_files(write, text, sentence):
+    found = refused(write("tree.py", text))
+    assert "tree.py'" in found and sentence in found
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ("return 3", "build() should return a py_trees behaviour, found int"),
+        ("raise ValueError('no')", "line 7: ValueError: no"),
+        ("return Grasp('cup', speeed=1)", "grasp has no parameter 'speeed'; did you mean 'speed'?"),
+        ("return Pick('cup', distance='far')", "'distance' should be a number in m, found 'far'"),
+        ("return Grasp('cop')", "leaf 'grasp cop': no object 'cop' in the scene 'mine'; did you mean 'cup'?"),
+        ("return sequence('root')", "sequence 'root' has no children"),
+        ("a = Grasp('cup'); return sequence('root', a, a)", "node 'grasp cup' already stands under 'root'"),
+    ],
+)
+def test_faulty_build_functions(write, body, sentence):
+    head = GOOD.split("def build")[0].lstrip().replace("\n\n", "\n").rstrip()
+    assert sentence in refused(write("tree.py", f"{head}\ndef build():\n    {body}\n"))
+
+
+def test_a_missing_file():
+    assert refused("gone.py") == "there is no tree file 'gone.py'"
+    assert refused("gone.xml") == "there is no tree file 'gone.xml'"
+
+
+# ---- XML files --------------------------------------------------------------------------------------------
+
+
+def lift(name="cup"):
+    return sequence("lift", Grasp(name), Pick(name))
+
+
+def test_the_scene_of_an_xml_file(tmp_path):
+    named, unnamed = tmp_path / "named.xml", tmp_path / "unnamed.xml"
+    save_tree(lift(), named, scene="shelf_to_shelf")
+    save_tree(lift(), unnamed)
+    assert load_source(str(named)).scene.name == "shelf_to_shelf"
+    assert load_source(str(named), None, "pick_and_throw").scene.name == "pick_and_throw"
+    assert "cup" in load_source(str(unnamed)).scene.objects, "the first ready-made scene that fits"
+
+
+def test_a_scene_file_beside_the_tree(tmp_path):
+    (tmp_path / "room.yaml").write_text("name: room\nobjects:\n  cup: {kind: cup, on: table}\n")
+    save_tree(lift(), tmp_path / "lift.xml", scene="room.yaml")
+    source = load_source(str(tmp_path / "lift.xml"))
+    assert source.scene.name == "room" and isinstance(source.build(), Behaviour)
+
+
+def test_a_tree_that_fits_no_scene(tmp_path):
+    save_tree(lift("teapot"), tmp_path / "tea.xml")
+    sentence = refused(str(tmp_path / "tea.xml"))
+    assert (
+        "does not say in which scene it runs, and no ready-made one has teapot: name one with --scene"
+        in sentence
+    )
+
+
+LEAF = '<root BTCPP_format="4"><BehaviorTree ID="main">{}</BehaviorTree></root>'
+
+
+@pytest.mark.parametrize(
+    ("inside", "sentence"),
+    [
+        ('<Graps target="cup"/>', "line 1: unknown node 'Graps'; did you mean 'Grasp'"),
+        ("<Grasp/>", "line 1: .*target.* missing|line 1: .*'target'"),
+        ('<Pick target="cup" distance="far"/>', "line 1: .*'distance' should be a number in m, found 'far'"),
+        ('<Pick target="cup" distanse="0.1"/>', "line 1: .*'distanse'.*did you mean 'distance'"),
+        ('<SubTree ID="main"/>', "line 1: subtrees go round in a circle: main -> main"),
+        ("<Sequence/>", "line 1: "),
+        ('<Grasp target="cup"/><Grasp target="cup"/>', "should hold one node, found 2"),
+    ],
+)
+def test_faulty_xml(write, inside, sentence):
+    import re
+
+    found = refused(write("tree.xml", LEAF.format(inside)))
+    assert "tree.xml" in found and re.search(sentence, found), found
+
+
+@pytest.mark.parametrize(
+    "text", ["", "<root", "no xml", "<!DOCTYPE x [<!ENTITY a 'b'>]><root>&a;</root>", "\x00\x01"]
+)
+def test_what_is_no_xml(write, text):
+    assert "tree.xml" in refused(write("tree.xml", text))
