@@ -55,7 +55,7 @@ def plan(
         blend: A corner is rounded from this distance before to this distance after it, metres; never more
             than half of a segment.
         shortest: Least duration, s.
-        samples: Rows of the table.
+        samples: Rows of the table; two are exact for a straight path.
 
     Returns:
         A path whose time law is minimum jerk over the path's length.

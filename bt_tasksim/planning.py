@@ -9,6 +9,7 @@ minimum cost paths", 1968, by networkx). Everything is deterministic.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -100,25 +101,26 @@ class _Checker:
             (
                 coal.Box(*(float(s) + 2 * MARGIN for s in o.size)),
                 coal.Transform3s(poses.to_matrix(o.pose[3:]), o.pose[:3]),
-                o.pose[:3],
+                o.pose[:3].tolist(),
                 float(np.linalg.norm(o.size)) / 2 + MARGIN,
             )
             for o in obstacles
         ]
         self._radius = [float(np.linalg.norm(size)) / 2 for _, size in boxes]
-        self._request = coal.CollisionRequest()
+        self._request, self._result = coal.CollisionRequest(), coal.CollisionResult()
 
     def free(self, tool: Array) -> bool:
         coal = self._coal
         for (local, box), radius in zip(self._moving, self._radius, strict=True):
             p = poses.multiply(tool, local)
-            frame = None
+            frame, at_point = None, p[:3].tolist()
             for other, at, centre, reach in self._fixed:
-                if float(np.linalg.norm(p[:3] - centre)) > radius + reach:
+                if math.dist(at_point, centre) > radius + reach:
                     continue
                 if frame is None:
                     frame = coal.Transform3s(poses.to_matrix(p[3:]), p[:3])
-                if coal.collide(box, frame, other, at, self._request, coal.CollisionResult()):
+                self._result.clear()
+                if coal.collide(box, frame, other, at, self._request, self._result):
                     return False
         return True
 

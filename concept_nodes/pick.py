@@ -50,7 +50,7 @@ class Pick(ConceptModel):
         """A straight path."""
         goal = seen.tool.copy()
         goal[:3] += self.distance * np.asarray(self.direction)
-        return MoveMemory(plan([seen.tool, goal], self.speed))
+        return MoveMemory(plan([seen.tool, goal], self.speed, samples=2))
 
     def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
         """Follow the path; the hand keeps its grip."""

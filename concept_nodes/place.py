@@ -79,7 +79,7 @@ class Place(ConceptModel):
             along = float((goal[:3] - now[:3]) @ d)
             goal[:3] += min(0.0, self.distance + self.overshoot - along) * d
         tool_goal = poses.multiply(goal, poses.multiply(poses.inverse(now), seen.tool))
-        return PlaceMemory(plan([seen.tool, tool_goal], self.speed), self._force(seen), np.int64(0))
+        return PlaceMemory(plan([seen.tool, tool_goal], self.speed, samples=2), self._force(seen), np.int64(0))
 
     def command(self, action: Array, seen: Seen, memory: PlaceMemory) -> Command:
         """Follow the path; the hand keeps its grip."""

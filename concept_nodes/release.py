@@ -56,7 +56,7 @@ class Release(ConceptModel):
         """A straight path back."""
         back = seen.tool.copy()
         back[:3] -= self.retreat * poses.rotate(back[3:], np.array([0.0, 0.0, 1.0]))
-        return ReleaseMemory(plan([seen.tool, back], self.speed), seen.closure, np.float64(-1.0))
+        return ReleaseMemory(plan([seen.tool, back], self.speed, samples=2), seen.closure, np.float64(-1.0))
 
     def command(self, action: Array, seen: Seen, memory: ReleaseMemory) -> Command:
         """Open, then draw back."""

@@ -265,14 +265,13 @@ class SapienPhysics:
                 for link, point in zip(self._tip_links, self._tip_points, strict=True)
             ]
         )
-        objects = np.array([_array(body.entity_pose) for body in self._objects]).reshape(-1, 7)
-        velocities = np.array(
-            [[*body.linear_velocity.tolist(), *body.angular_velocity.tolist()] for body in self._objects]
-        ).reshape(-1, 6)
+        objects = np.array([_list(body.entity_pose) for body in self._objects]).reshape(-1, 7)
+        moving = [[*b.linear_velocity.tolist(), *b.angular_velocity.tolist()] for b in self._objects]
+        velocities = np.array(moving).reshape(-1, 6)
         self._read_contacts()
         self._falling = any(
             force == 0.0 and (math.hypot(*v[:3]) > FALLING[0] or math.hypot(*v[3:]) > FALLING[1])
-            for force, v in zip(self._hand_force, velocities.tolist(), strict=True)
+            for force, v in zip(self._hand_force, moving, strict=True)
         )
         return WorldState(
             time=np.float64(self._time),
@@ -291,8 +290,8 @@ class SapienPhysics:
         """External wrench at the tool, from the wrist joint's incoming force.
 
         SAPIEN reports the force that the wrist's parent exerts on it in the joint's frame, which may be
-        turned against the link's; at rest the world's force on the hand is its opposite. Moments are moved to the
-        tool origin: t' = t - r x f.
+        turned against the link's; at rest the world's force on the hand is its opposite. Moments are moved
+        to the tool origin: t' = t - r x f.
         """
         incoming = -self._articulation.get_link_incoming_joint_forces()[self._wrist].astype(np.float64)
         force = incoming[:3]
@@ -408,8 +407,12 @@ _DISTURBANCE_WAITING, _DISTURBANCE_PUSHING, _DISTURBANCE_OVER = range(3)
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
+def _list(pose: Any) -> list[float]:
+    return [*pose.p.tolist(), *pose.q.tolist()]
+
+
 def _array(pose: Any) -> Array:
-    return np.array([*pose.p.tolist(), *pose.q.tolist()])
+    return np.array(_list(pose))
 
 
 def _links_below(articulation: Any, root: Any) -> set[str]:

@@ -21,7 +21,7 @@ from bt_tasksim.engines.features import TOUCH, ObservationBuilder
 from bt_tasksim.engines.pipeline import Image
 from bt_tasksim.engines.pose_estimation import Target, estimate_pose, follow
 from bt_tasksim.engines.registration import Fit, View
-from bt_tasksim.engines.segmentation import NEUTRAL, classify, find_segments
+from bt_tasksim.engines.segmentation import NEUTRAL, SMALLEST, classify, find_segments
 from bt_tasksim.errors import MachineError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
@@ -185,9 +185,10 @@ class CameraPostProcess:
                 if found is not None and (fit is None or found.cost < fit.cost):
                     fit, segment = found, candidate
             if fit is None or segment is None:
+                amount = f"{pixels} pixels" if pixels else f"fewer than {SMALLEST} pixels"
                 track.note = (
-                    f"{target.model.name} is not seen: camera '{image.camera.name}' shows {pixels} pixels "
-                    f"of its colour that could be it"
+                    f"{target.model.name} is not seen: camera '{image.camera.name}' shows {amount} "
+                    f"of its colour{' but not its shape' if pixels else ''}"
                 )
                 self._again(track, time, settled=False)
             else:

@@ -22,6 +22,8 @@ NEUTRAL = (1.0, 1.0, 1.0)
 """The colour of robots, walls and highlights: any grey."""
 WIDEST_ANGLE = np.deg2rad(16.0)
 """Angle between a pixel's colour and an object's beyond which the pixel is never the object's."""
+SMALLEST = 30
+"""Pixels that an object must show to be seen."""
 DARKEST = 0.004
 """Linear brightness below which a pixel has no colour to speak of."""
 
@@ -104,7 +106,7 @@ def find_segments(
     *,
     size: float,
     margin: float = 0.006,
-    smallest: int = 30,
+    smallest: int = SMALLEST,
 ) -> list[Segment]:
     """Candidate segments of one object, largest first.
 
