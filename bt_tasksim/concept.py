@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from array_api_compat import array_namespace
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
@@ -19,7 +18,7 @@ from bt_tasksim.context import Context, Known, Seen
 from bt_tasksim.errors import InputError, NoWayError, nearest
 from bt_tasksim.parameters import Parameter, bind_arguments, declared_parameters
 from bt_tasksim.policy import Policy, resolve_policy
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command
 
 LOST_TICKS = 3

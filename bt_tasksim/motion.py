@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from array_api_compat import array_namespace
 
 from bt_tasksim import poses
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, array_namespace
 
 _SAMPLES = 33
 

@@ -13,13 +13,29 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import array_api_compat
+import array_api_compat.numpy
 import numpy as np
-from array_api_compat import array_namespace
 
 Array = Any
 """An array of the Python array API standard, such as ``numpy.ndarray`` or ``torch.Tensor``."""
 
 _EPS = 1e-12
+
+
+def array_namespace(*arrays: Array) -> Any:
+    """The functions that arrays come with, as `array_api_compat.array_namespace`; quick for NumPy's.
+
+    Raises:
+        TypeError: The arrays are of different libraries, or one is none.
+    """
+    for array in arrays:
+        if not isinstance(array, _NUMPY):
+            return array_api_compat.array_namespace(*arrays)
+    return array_api_compat.numpy
+
+
+_NUMPY = (np.ndarray, np.generic)
 
 
 def _single(a: Array) -> bool:

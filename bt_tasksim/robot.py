@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 import yaml
-from array_api_compat import array_namespace
 
 from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.resources import asset
 
 

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from array_api_compat import array_namespace
 
 from bt_tasksim.meshes import superellipsoid_scale
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, array_namespace
 
 _FEW = 16
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from array_api_compat import array_namespace
 
 from bt_tasksim import poses
 from bt_tasksim.concept import ConceptModel
@@ -12,7 +11,7 @@ from bt_tasksim.errors import InputError
 from bt_tasksim.motion import plan, sample
 from bt_tasksim.parameters import Metres, MetresPerSecond, ObjectName, PlaceName, Points, Position
 from bt_tasksim.planning import Carried, clear_path
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command, ObjectModel, PlaceModel
 from concept_nodes.grasp import neutral_rotation, resting_place
 from concept_nodes.holding import HOLDING, holding, not_held, tool_distance

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 
-from array_api_compat import array_namespace
-
 from bt_tasksim import poses
 from bt_tasksim.concept import Condition
 from bt_tasksim.context import Seen
 from bt_tasksim.parameters import Metres, ObjectName, PlaceName, Radians, Seconds
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, array_namespace
 from concept_nodes.bring import destination, standing_pose
 from concept_nodes.holding import holding, tool_distance
 

@@ -6,14 +6,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from array_api_compat import array_namespace
 
 from bt_tasksim import poses
 from bt_tasksim.concept import ConceptModel
 from bt_tasksim.context import Known, Seen
 from bt_tasksim.motion import Path, plan, sample
 from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, ObjectName, Ratio
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command, ObjectModel, PlaceModel
 from concept_nodes.holding import HOLDING, tool_distance
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from array_api_compat import array_namespace
 
 from bt_tasksim.context import Seen
-from bt_tasksim.poses import Array, constant, inverse, transform
+from bt_tasksim.poses import Array, array_namespace, constant, inverse, transform
 
 HOLDING = "holding"
 """Name of the goal that `Grasp` reaches, `Pick`, `Bring` and `Place` maintain, and `Release` ends."""

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from array_api_compat import array_namespace
 
 from bt_tasksim.concept import ConceptModel
 from bt_tasksim.context import Known, Seen
 from bt_tasksim.motion import Path, plan, sample
 from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, ObjectName
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command
 from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
 

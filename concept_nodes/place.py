@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from array_api_compat import array_namespace
 
 from bt_tasksim import poses
 from bt_tasksim.concept import ConceptModel
 from bt_tasksim.context import Known, Seen
 from bt_tasksim.motion import Path, plan, sample
 from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
-from bt_tasksim.poses import Array
+from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command
 from concept_nodes.bring import destination, standing_pose
 from concept_nodes.holding import HOLDING, holding, not_held
@@ -79,7 +78,9 @@ class Place(ConceptModel):
             along = float((goal[:3] - now[:3]) @ d)
             goal[:3] += min(0.0, self.distance + self.overshoot - along) * d
         tool_goal = poses.multiply(goal, poses.multiply(poses.inverse(now), seen.tool))
-        return PlaceMemory(plan([seen.tool, tool_goal], self.speed, samples=2), self._force(seen), np.int64(0))
+        return PlaceMemory(
+            plan([seen.tool, tool_goal], self.speed, samples=2), self._force(seen), np.int64(0)
+        )
 
     def command(self, action: Array, seen: Seen, memory: PlaceMemory) -> Command:
         """Follow the path; the hand keeps its grip."""
