@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -129,16 +129,21 @@ class Shape:
     Attributes:
         extent: Full size ``(3,)`` of the bounding box, metres.
         collision: Convex pieces that together are the solid.
-        visual: What is seen; a cup really is hollow.
+        draw: Makes the mesh that is seen; physics alone never does.
         mass: Volume, centre of mass and inertia for 1 kg.
         surface: Outer surface without hollows.
     """
 
     extent: Size
     collision: tuple[Piece, ...]
-    visual: TriangleMesh
+    draw: Callable[[], TriangleMesh]
     mass: MassProperties
     surface: Surface
+
+    @cached_property
+    def visual(self) -> TriangleMesh:
+        """What is seen; a cup really is hollow."""
+        return self.draw()
 
     @property
     def volume(self) -> float:
@@ -295,7 +300,7 @@ def _prism(
     return Shape(
         extent=extent,
         collision=collision,
-        visual=meshes.prism(seen, height, bevel=min(0.0015, 0.1 * min(extent))),
+        draw=lambda: meshes.prism(seen, height, bevel=min(0.0015, 0.1 * min(extent))),
         mass=meshes.mass_properties(meshes.prism(solid, height)),
         surface=PrismSurface(footprint, height / 2),
     )
@@ -317,7 +322,7 @@ def _cup(size: Size) -> Shape:
     return Shape(
         extent=(2 * radius, 2 * radius, height),
         collision=tuple(pieces),
-        visual=visual,
+        draw=lambda: visual,
         mass=meshes.mass_properties(visual),
         surface=PrismSurface(Ellipse(radius, radius), h),
     )
@@ -334,7 +339,7 @@ def _superellipsoid(size: ShapeSize) -> Shape:
     return Shape(
         extent=size.size,
         collision=(ConvexPiece(hull),),
-        visual=visual,
+        draw=lambda: visual,
         mass=meshes.mass_properties(visual),
         surface=SuperellipsoidSurface((float(half[0]), float(half[1]), float(half[2])), (e1, e2)),
     )
