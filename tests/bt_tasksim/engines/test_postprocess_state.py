@@ -84,7 +84,7 @@ def test_a_new_episode_has_a_new_error():
 
 def test_a_real_robot_has_no_such_state():
     made, now, _ = engine("fine")
-    with pytest.raises(MachineError, match="the physics engine knows no objects"):
+    with pytest.raises(MachineError, match="physics engine knows no objects"):
         made.observe(dataclasses.replace(now, objects=None), {})
 
 
