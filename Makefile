@@ -5,7 +5,7 @@
 SHELL := /bin/bash
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
-EXTRAS := sim,train,plan,report,ros,remote,mujoco,dev
+EXTRAS := sim,train,report,ros,remote,mujoco,dev
 PYTEST_FLAGS ?= -n logical --maxprocesses 4
 
 .PHONY: demo test bench lint format style types imports setup clean

@@ -1,9 +1,9 @@
 """How often: every success rate that the documentation quotes, on seeds that were not used while building.
 
-    python -m benchmarks.success                 # everything; about 15 minutes on 2 cores, an hour with cameras
+    python -m benchmarks.success        # everything: minutes, and an hour for the cameras
     python -m benchmarks.success --only shelf_to_shelf-panda
 
-Writes ``benchmarks/results/<scenario>-<robot>[-camera][-fromlogs].json``, each as ``bt-tasksim evaluate --json``
+Writes ``benchmarks/results/<scenario>-<robot>[-camera][-fromlogs].json``, as ``bt-tasksim evaluate --json``
 would. For ``-fromlogs`` the ten shipped logs of a scenario become ten trees, and each runs on thirty of the
 three hundred seeds on which the authored tree runs: the two files are paired seed by seed.
 """

@@ -7,6 +7,7 @@ heavy is imported by the command that needs it.
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -295,7 +296,7 @@ def _evaluate(options: argparse.Namespace) -> int:
 
 def _bench(options: argparse.Namespace) -> int:
     try:
-        from benchmarks.speed import main as measure
+        measure = importlib.import_module("benchmarks.speed").main
     except ImportError as error:
         raise InputError(f"the benchmarks stand beside the packages in a checkout: {error}") from None
     return int(measure(quick=options.quick, json_path=options.json))

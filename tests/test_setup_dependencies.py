@@ -36,7 +36,13 @@ def imported(tree: ast.AST) -> set[str]:
     return names - set(sys.stdlib_module_names) - set(PACKAGES)
 
 
+BROUGHT = {"pinocchio": {"pin"}, "eigenpy": {"pin"}}
+"""Modules that a distribution brings from a place of its own, where its metadata does not name them."""
+
+
 def distributions(module: str) -> set[str]:
+    if module in BROUGHT:
+        return BROUGHT[module]
     return {normalised(name) for name in packages_distributions().get(module, [module])}
 
 
