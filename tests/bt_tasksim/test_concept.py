@@ -111,6 +111,15 @@ def test_a_goal_that_flickers_is_not_lost_and_one_that_stays_away_is(toy, carefu
     assert not stage.context.reached("holding", "cup")
 
 
+def test_ticks_without_a_goal_are_counted_anew_at_each_activation(toy, careful):
+    stage = toy(careful)
+    for _ in range(2):
+        stage.context.reach("holding", "cup")
+        Careful.held = False
+        assert stage.tick(LOST_TICKS - 1) == Status.RUNNING
+        stage.runner.begin(0)
+
+
 def test_a_goal_that_nobody_reached_is_not_maintained(toy, careful):
     Careful.held = False
     stage = toy(careful)

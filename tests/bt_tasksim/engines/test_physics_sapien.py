@@ -194,15 +194,19 @@ def test_effort_is_the_drives_own_law():
     runner = holding("box", 0.2)
     robot, state = runner.robot, runner.pipeline.state
     k, d, limit = (robot.drive_array(n) for n in ("stiffness", "damping", "force_limit"))
-    target = JointTarget(state.joint_position + 0.01, np.full_like(state.joint_position, 0.02))
-    state = runner.pipeline.physics.step(target)
-    law = k * (target.position - state.joint_position) + d * (target.velocity - state.joint_velocity)
-    assert np.allclose(state.joint_effort, np.clip(law, -limit, limit))
-    assert np.all(np.abs(state.joint_effort) <= limit)
-    fingers = runner.pipeline.step(Command(hand=np.array([1.0]))).hand_effort
+    for offset, limited in ((0.01, False), (0.8, True)):
+        target = JointTarget(state.joint_position + offset, np.full_like(state.joint_position, 0.02))
+        state = runner.pipeline.physics.step(target)
+        law = k * (target.position - state.joint_position) + d * (target.velocity - state.joint_velocity)
+        assert np.any(np.abs(law) > limit) == limited
+        assert np.allclose(state.joint_effort, np.clip(law, -limit, limit))
+
+
+def test_fingers_that_press_shut_feel_it():
+    runner = holding("box", 0.2)
     for _ in range(5):
-        fingers = runner.pipeline.step(Command()).hand_effort
-    assert np.all(fingers < -0.3), "fingers that press shut"
+        effort = runner.pipeline.step(Command()).hand_effort
+    assert np.all(effort < -0.3) and np.all(effort >= -1.0)
 
 
 # ---- pushing ----------------------------------------------------------------------------------------------
