@@ -1,0 +1,29 @@
+"""Wait: time passes, nothing is commanded."""
+
+import pytest
+from py_trees.common import Status
+
+from bt_tasksim.errors import InputError
+from bt_tasksim.world import Command
+from concept_nodes import Wait
+
+
+def test_it_waits_and_commands_nothing(toy):
+    stage = toy(Wait(0.32))
+    assert stage.tick(100) == Status.SUCCESS
+    assert stage.context.now == pytest.approx(0.35)
+    assert all(command == Command() for command in stage.world.steps)
+    assert stage.tree.feedback_message == "done after 0.35 s: waited 0.35 of 0.32 s"
+
+
+def test_time_does_not_run_backwards():
+    with pytest.raises(InputError, match="wait: parameter 'duration' should be a number in s, found -1"):
+        Wait(-1)
+
+
+def test_one_by_one_and_in_batches_are_the_same(situations, functions):
+    from concept_nodes import Pick
+
+    for name in functions:
+        if name not in ("maintained", "command", "act", "advance"):
+            situations(Pick).check(name, Wait(0.5))
