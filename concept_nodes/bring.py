@@ -9,12 +9,13 @@ from bt_tasksim.concept import ConceptModel
 from bt_tasksim.context import Known, Seen
 from bt_tasksim.errors import InputError
 from bt_tasksim.motion import plan, sample
-from bt_tasksim.parameters import Metres, MetresPerSecond, ObjectName, PlaceName, Points, Position
+from bt_tasksim.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Points, Position
 from bt_tasksim.planning import Carried, clear_path
 from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command, ObjectModel, PlaceModel
 from concept_nodes.grasp import neutral_rotation, resting_place
 from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
+from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 from concept_nodes.pick import MoveMemory, arrived, miss
 
 
@@ -32,6 +33,7 @@ class Bring(ConceptModel):
         via: Positions of the object's centre on the way, relative to the destination, base-frame axes.
         hover: Free height that remains under the object.
         speed: Peak speed of the tool.
+        force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
@@ -40,6 +42,7 @@ class Bring(ConceptModel):
     via: Points = ()
     hover: Metres = 0.06
     speed: MetresPerSecond = 0.5
+    force_limit: Newtons = FORCE_LIMIT
 
     maintains = (HOLDING,)
     default_timeout = 15.0
@@ -77,6 +80,10 @@ class Bring(ConceptModel):
         """Follow the path; the hand keeps its grip."""
         return Command(tool=sample(memory.path, seen.elapsed))
 
+    def violated(self, seen: Seen, memory: MoveMemory) -> Array:
+        """The wrist is strained beyond the limit: the hand or the object presses against something."""
+        return strained(seen, self.force_limit)
+
     def done(self, seen: Seen, memory: MoveMemory) -> Array:
         """The tool has come to the end of the path."""
         return arrived(seen, memory.path, self.tolerance)
@@ -99,7 +106,8 @@ class Bring(ConceptModel):
         """How far the tool still is from its goal, and the object from the tool."""
         return (
             f"tool {1000 * float(miss(seen, memory.path)):.0f} mm from its goal, "
-            f"{self.target} {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool"
+            f"{self.target} {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool, "
+            f"{float(force_at_wrist(seen)):.0f} N at the wrist"
         )
 
     def _goal(self, seen: Seen, now: Array, model: ObjectModel) -> tuple[Array, Array]:

@@ -9,10 +9,11 @@ import numpy as np
 from bt_tasksim.concept import ConceptModel
 from bt_tasksim.context import Known, Seen
 from bt_tasksim.motion import Path, plan, sample
-from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, ObjectName
+from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName
 from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command
 from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
+from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 
 
 class MoveMemory(NamedTuple):
@@ -29,12 +30,14 @@ class Pick(ConceptModel):
         direction: Direction away from the support, robot base frame.
         distance: How far.
         speed: Peak speed of the tool.
+        force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
     direction: Direction = (0.0, 0.0, 1.0)
     distance: Metres = 0.10
     speed: MetresPerSecond = 0.3
+    force_limit: Newtons = FORCE_LIMIT
 
     maintains = (HOLDING,)
     default_timeout = 8.0
@@ -54,6 +57,10 @@ class Pick(ConceptModel):
     def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
         """Follow the path; the hand keeps its grip."""
         return Command(tool=sample(memory.path, seen.elapsed))
+
+    def violated(self, seen: Seen, memory: MoveMemory) -> Array:
+        """The wrist is strained beyond the limit: the hand or the object presses against something."""
+        return strained(seen, self.force_limit)
 
     def done(self, seen: Seen, memory: MoveMemory) -> Array:
         """The tool has come to the end of the path."""
@@ -77,7 +84,8 @@ class Pick(ConceptModel):
         """How far the tool still is from its goal, and the object from the tool."""
         return (
             f"tool {1000 * float(miss(seen, memory.path)):.0f} mm from its goal, "
-            f"{self.target} {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool"
+            f"{self.target} {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool, "
+            f"{float(force_at_wrist(seen)):.0f} N at the wrist"
         )
 
 

@@ -15,6 +15,7 @@ from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command
 from concept_nodes.bring import destination, standing_pose
 from concept_nodes.holding import HOLDING, holding, not_held
+from concept_nodes.limits import FORCE_LIMIT, strained
 
 FELT = 2
 """Ticks in a row for which the support must be felt."""
@@ -48,6 +49,7 @@ class Place(ConceptModel):
         overshoot: How much deeper is tried.
         press: Force that counts as support.
         speed: Peak speed of the tool.
+        force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
@@ -57,6 +59,7 @@ class Place(ConceptModel):
     overshoot: Metres = 0.006
     press: Newtons = 3.0
     speed: MetresPerSecond = 0.12
+    force_limit: Newtons = FORCE_LIMIT
 
     maintains = (HOLDING,)
     default_timeout = 10.0
@@ -90,6 +93,10 @@ class Place(ConceptModel):
         """Count the ticks at which the support is felt."""
         xp = array_namespace(seen.tool)
         return memory._replace(felt=xp.where(self._supported(seen, memory), memory.felt + 1, 0))
+
+    def violated(self, seen: Seen, memory: PlaceMemory) -> Array:
+        """The wrist is strained beyond the limit: the hand or the object presses against something."""
+        return strained(seen, self.force_limit)
 
     def done(self, seen: Seen, memory: PlaceMemory) -> Array:
         """The support is felt, or the object is where it should stand."""

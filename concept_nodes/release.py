@@ -10,10 +10,11 @@ from bt_tasksim import poses
 from bt_tasksim.concept import ConceptModel
 from bt_tasksim.context import Known, Seen
 from bt_tasksim.motion import Path, plan, sample
-from bt_tasksim.parameters import Metres, MetresPerSecond, ObjectName, PlaceName, Seconds
+from bt_tasksim.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Seconds
 from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command
 from concept_nodes.holding import HOLDING
+from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 
 
 class ReleaseMemory(NamedTuple):
@@ -39,6 +40,7 @@ class Release(ConceptModel):
         retreat: How far the tool draws back, against its approach.
         opening: Time in which the hand opens.
         speed: Peak speed of the tool.
+        force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
@@ -46,6 +48,7 @@ class Release(ConceptModel):
     retreat: Metres = 0.12
     opening: Seconds = 0.4
     speed: MetresPerSecond = 0.3
+    force_limit: Newtons = FORCE_LIMIT
 
     ends = (HOLDING,)
     default_timeout = 8.0
@@ -77,6 +80,10 @@ class Release(ConceptModel):
         )
         return memory._replace(opened=opened)
 
+    def violated(self, seen: Seen, memory: ReleaseMemory) -> Array:
+        """The wrist is strained beyond the limit: the hand or the object presses against something."""
+        return strained(seen, self.force_limit)
+
     def done(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """The hand is open, touches nothing, and has drawn back."""
         gap = seen.tool[..., :3] - memory.path.table[..., -1, :3]
@@ -98,4 +105,7 @@ class Release(ConceptModel):
     def explain(self, seen: Seen, memory: ReleaseMemory) -> str:
         """How far the hand is open and what it touches."""
         n = int(np.count_nonzero(seen.contacts))
-        return f"hand {100 * (1 - float(seen.closure)):.0f} % open, {n} fingertips in contact"
+        return (
+            f"hand {100 * (1 - float(seen.closure)):.0f} % open, {n} fingertips in contact, "
+            f"{float(force_at_wrist(seen)):.0f} N at the wrist"
+        )
