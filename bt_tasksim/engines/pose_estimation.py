@@ -28,7 +28,7 @@ from bt_tasksim.poses import Array
 from bt_tasksim.shapes import Shape
 from bt_tasksim.world import ObjectModel, PlaceModel
 
-GOOD = 0.26
+GOOD = 0.21
 """Cost of a fit, see `Fit`, up to which a standing pose is taken without looking for others."""
 POOR = 0.5
 """Cost beyond which no pose is believed."""
@@ -75,8 +75,7 @@ def estimate_pose(
     standing = stand_on(target, view, places, points, before)
     if standing is not None and standing.cost < GOOD:
         return standing
-    free = lie_about(target, view, points, before)
-    free = _settled(free, target, view, places, points)
+    free = lie_about(target, view, places, points, before)
     best = free if standing is None or free.cost < standing.cost - 0.02 else standing
     return best if best.cost < POOR else None
 
@@ -124,41 +123,65 @@ def stand_on(
         if before is not None:
             heading = 2 * math.atan2(float(before[6]), float(before[3]))
             starts.append(poses.pose([*before[:2], level + height / 2], poses.yaw(heading)))
-        fit = _best(points, view, starts, UPRIGHT, keep=2)
+        fit = _best(target, points, view, starts, UPRIGHT, keep=2)
         if best is None or fit.cost < best.cost:
             best = fit
     return best
 
 
-def lie_about(target: Target, view: View, points: ModelPoints, before: Array | None = None) -> Fit:
-    """The best pose with all motions free."""
+def lie_about(
+    target: Target,
+    view: View,
+    places: Sequence[PlaceModel],
+    points: ModelPoints,
+    before: Array | None = None,
+) -> Fit:
+    """The best pose with all motions free, but on the surface below where it nearly touches it."""
     position = _behind(np.median(view.points, axis=0), view, target)
     starts = [poses.pose(position, q) for q in _orientations(target)]
     if before is not None:
         starts.append(np.concatenate([position, before[3:]]))
         starts.append(np.array(before, float))
-    return _best(points, view, starts, FREE, keep=4)
+    return _best(target, points, view, starts, FREE, keep=6, places=places)
 
 
-def _best(points: ModelPoints, view: View, starts: Sequence[Array], free: Sequence[int], keep: int) -> Fit:
+def _best(
+    target: Target,
+    points: ModelPoints,
+    view: View,
+    starts: Sequence[Array],
+    free: Sequence[int],
+    keep: int,
+    places: Sequence[PlaceModel] = (),
+) -> Fit:
     """Fit from every start with few points, then the best ``keep`` of them with many."""
     few, coarse = view.thinned(_COARSE[0]), points.thinned(_COARSE[1])
     if len(starts) > keep:
         tried = [judge_fit(coarse, few, register(coarse, few, s, free, steps=8)) for s in starts]
-        starts = _distinct(sorted(tried, key=lambda f: f.cost), keep)
+        starts = _distinct(sorted(tried, key=lambda f: f.cost), keep, target.model)
     many, fine = view.thinned(_FINE[0]), points.thinned(_FINE[1])
-    return min((judge_fit(points, view, register(fine, many, s, free)) for s in starts), key=lambda f: f.cost)
+    found = [_settled(register(fine, many, s, free), target, places) for s in starts]
+    return min((judge_fit(points, view, pose) for pose in found), key=lambda f: f.cost)
 
 
-def _distinct(fits: Sequence[Fit], n: int) -> list[Array]:
-    """The first ``n`` poses that are more than some degrees apart."""
+def _distinct(fits: Sequence[Fit], n: int, model: ObjectModel) -> list[Array]:
+    """The first ``n`` poses that are more than some degrees apart, up to the symmetry about z."""
     kept: list[Array] = []
     for fit in fits:
-        if all(float(poses.angle_between(fit.pose[3:], other[3:])) > math.radians(12.0) for other in kept):
+        if all(_apart(fit.pose[3:], other[3:], model) > math.radians(12.0) for other in kept):
             kept.append(fit.pose)
         if len(kept) == n:
             break
     return kept
+
+
+def _apart(a: Array, b: Array, model: ObjectModel) -> float:
+    """Radians between two rotations ``(4,)`` of an object, up to its symmetry about z."""
+    if model.symmetry == 0:
+        axis = np.array([0.0, 0.0, 1.0])
+        return math.acos(min(1.0, max(-1.0, float(poses.rotate(a, axis) @ poses.rotate(b, axis)))))
+    turns = [poses.yaw(2 * math.pi * k / model.symmetry) for k in range(model.symmetry)]
+    return min(float(poses.angle_between(a, poses.quat_multiply(b, turn))) for turn in turns)
 
 
 def _behind(middle: Array, view: View, target: Target) -> Array:
@@ -193,15 +216,13 @@ def _turning(a: Array, b: Array) -> Array:
     return poses.normalise(np.array([1.0 + cosine, *axis]))
 
 
-def _settled(fit: Fit, target: Target, view: View, places: Sequence[PlaceModel], points: ModelPoints) -> Fit:
+def _settled(pose: Array, target: Target, places: Sequence[PlaceModel]) -> Array:
     """The same pose, moved up or down to touch the surface below where it nearly does."""
-    lowest = float(np.min(poses.transform(fit.pose, target.shape.visual.vertices)[:, 2]))
+    lowest = float(np.min(poses.transform(pose, target.shape.visual.vertices)[:, 2]))
     for place in places:
-        local = poses.transform(poses.inverse(place.pose), fit.pose[:3])
+        local = poses.transform(poses.inverse(place.pose), pose[:3])
         inside = all(abs(local[i] - place.centre[i]) < place.extent[i] / 2 for i in range(2))
         gap = lowest - float(place.pose[2])
         if inside and abs(gap) < 0.008:
-            pose = fit.pose.copy()
-            pose[2] -= gap
-            return judge_fit(points, view, pose)
-    return fit
+            return pose - np.array([0.0, 0.0, gap, 0.0, 0.0, 0.0, 0.0])
+    return pose

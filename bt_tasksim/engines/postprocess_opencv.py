@@ -21,7 +21,7 @@ from bt_tasksim.engines.features import TOUCH, ObservationBuilder
 from bt_tasksim.engines.pipeline import Image
 from bt_tasksim.engines.pose_estimation import Target, estimate_pose, follow
 from bt_tasksim.engines.registration import Fit, View
-from bt_tasksim.engines.segmentation import NEUTRAL, SMALLEST, classify, find_segments
+from bt_tasksim.engines.segmentation import NEUTRAL, SMALLEST, Segment, classify, find_segments
 from bt_tasksim.errors import MachineError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
@@ -172,29 +172,39 @@ class CameraPostProcess:
         camera = as_calibrated(image.camera, self._calibration)
         depth = self.errors.depth(image.depth, self._rng)
         masks = classify(image.colour, self._colours, self._others)
-        taken = np.zeros(depth.shape, bool)
+        fits: list[tuple[Fit, int, Segment]] = []
         for i, (target, track) in enumerate(zip(self._targets, self._tracks, strict=True)):
+            alike = [k for k, colour in enumerate(self._colours) if colour == self._colours[i]]
             segments = find_segments(
-                camera, depth, masks[i] & ~taken, self._model.obstacles, size=target.diameter
+                camera,
+                depth,
+                masks[i],
+                self._model.obstacles,
+                size=target.diameter,
+                join=len(alike) == 1,
             )
-            others = np.any([m for k, m in enumerate(masks) if k != i] or [taken], axis=0)
-            fit, segment, pixels = None, None, segments[0].pixels if segments else 0
-            for candidate in segments[:3]:
-                view = View(camera, depth, self._rng.permutation(candidate.points), others)
-                found = self._estimated(i, view)
-                if found is not None and (fit is None or found.cost < fit.cost):
-                    fit, segment = found, candidate
-            if fit is None or segment is None:
-                amount = f"{pixels} pixels" if pixels else f"fewer than {SMALLEST} pixels"
-                track.note = (
-                    f"{target.model.name} is not seen: camera '{image.camera.name}' shows {amount} "
-                    f"of its colour{' but not its shape' if pixels else ''}"
-                )
-                self._again(track, time, settled=False)
-            else:
-                track.note = ""
+            others = np.any([m for k, m in enumerate(masks) if k not in alike] or [0 * masks[i]], axis=0)
+            for segment in segments[: 2 + len(alike)]:
+                fit = self._estimated(i, View(camera, depth, self._rng.permutation(segment.points), others))
+                if fit is not None:
+                    fits.append((fit, i, segment))
+            pixels = segments[0].pixels if segments else 0
+            amount = f"{pixels} pixels" if pixels else f"fewer than {SMALLEST} pixels"
+            track.note = (
+                f"{target.model.name} is not seen: camera '{image.camera.name}' shows {amount} "
+                f"of its colour{' but not its shape' if pixels else ''}"
+            )
+        found: set[int] = set()
+        taken = np.zeros(depth.shape, bool)
+        for fit, i, segment in sorted(fits, key=lambda f: f[0].cost):  # objects of one colour compete
+            if i not in found and np.count_nonzero(taken & segment.mask) < segment.pixels / 4:
+                found.add(i)
                 taken |= segment.mask
+                self._tracks[i].note = ""
                 self._accept(i, fit, time)
+        for i, track in enumerate(self._tracks):
+            if i not in found:
+                self._again(track, time, settled=False)
 
     def _estimated(self, i: int, view: View) -> Fit | None:
         """The fit of object ``i`` to what may be it, or None."""

@@ -107,6 +107,7 @@ def find_segments(
     size: float,
     margin: float = 0.006,
     smallest: int = SMALLEST,
+    join: bool = True,
 ) -> list[Segment]:
     """Candidate segments of one object, largest first.
 
@@ -119,6 +120,7 @@ def find_segments(
             is seen) count as one.
         margin: Metres around a fixture that count as the fixture.
         smallest: Pixels that a segment has at least.
+        join: Pieces near each other are one object; not so where several have its colour.
     """
     rows, columns = np.nonzero(mask & (depth > 0))
     if len(rows) < smallest:
@@ -139,7 +141,8 @@ def find_segments(
     for k in order:
         if k in used:
             continue
-        parts = [j for j in order if j not in used and np.linalg.norm(middles[j] - middles[k]) < 0.75 * size]
+        near = [j for j in order if np.linalg.norm(middles[j] - middles[k]) < 0.75 * size]
+        parts = [j for j in near if j not in used] if join else [k]
         used.update(parts)
         gap = points - middles[k]
         chosen = np.isin(label, parts) & (np.sum(gap * gap, axis=-1) < size * size)
