@@ -1,0 +1,213 @@
+"""Measured numbers into the documentation: ``python -m benchmarks.tables``.
+
+Reads ``benchmarks/results/*.json`` and writes the tables between the marker comments of README.md and
+docs/evaluation.md, so that no number is typed by hand. Results are what the measurements write:
+
+- ``<scenario>-<robot>[-camera][-fromlogs].json`` by ``python -m benchmarks.success``, in the format of
+  ``bt-tasksim evaluate --json``;
+- ``speed.json`` by ``bt-tasksim bench --json``;
+- ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
+
+``--check`` changes nothing and fails when a table is not up to date.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from benchmarks.success import FIRST_SEED, RESULTS, SCENARIOS
+from benchmarks.success import ROWS as MEASURED
+from bt_tasksim.files import write_text
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = ("README.md", "docs/evaluation.md")
+ROWS = tuple(row.name for row in MEASURED)
+"""Rows that are always there, measured or not; others follow as files are found."""
+KINDS = ("camera", "fromlogs")
+OTHER = ("speed", "decomposition")
+NOT_YET = "not measured yet"
+
+
+def load(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
+    """Results by name."""
+    return {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted(folder.glob("*.json"))}
+
+
+def names(results: dict[str, Any]) -> list[str]:
+    """Names of the rows, in order."""
+    return [*ROWS, *(n for n in results if n not in ROWS and n not in OTHER)]
+
+
+def parts(name: str) -> tuple[str, str, str]:
+    """Scenario, robot and kind of a result's name."""
+    scenario, robot, *kind = name.split("-")
+    return scenario, robot, next((k for k in kind if k in KINDS), "")
+
+
+def rate(found: dict[str, Any]) -> str:
+    """Success rate with its confidence interval."""
+    low, high = found["confidence_interval"]
+    return f"{100 * found['success_rate']:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def perceived(kind: str, found: dict[str, Any] | None) -> str:
+    """How the perception is named."""
+    if found is not None:
+        return str(found["perception"]).replace("state,", "pose,")
+    return "camera" if kind == "camera" else "pose, noise fine"
+
+
+def short(results: dict[str, Any]) -> str:
+    """README's table of successes."""
+    lines = [
+        "| scenario | robot | tree | perception | succeeded | rate (95 % interval) |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in names(results):
+        scenario, robot, kind = parts(name)
+        found = results.get(name)
+        tree = "from demonstrations" if kind == "fromlogs" else "authored"
+        numbers = f"{found['successes']} of {found['episodes']} | {rate(found)}" if found else f"{NOT_YET} |"
+        lines.append(f"| `{scenario}` | `{robot}` | {tree} | {perceived(kind, found)} | {numbers} |")
+    return "\n".join(lines)
+
+
+def full(results: dict[str, Any]) -> str:
+    """The table of evaluation.md, with failures and failed seeds."""
+    lines = [
+        "| row | seeds | succeeded | rate (95 % interval) | failures | failed seeds |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in names(results):
+        found = results.get(name)
+        if found is None:
+            lines.append(f"| `{name}` | {NOT_YET} | | | | |")
+            continue
+        failures = ", ".join(f"{count} x {reason}" for reason, count in found["failures"].items()) or "none"
+        failed = ", ".join(str(s) for s in found["failed_seeds"])
+        last = FIRST_SEED + found["episodes"] - 1
+        lines.append(
+            f"| `{name}` | {FIRST_SEED} to {last} | {found['successes']} of {found['episodes']} "
+            f"| {rate(found)} | {failures} | {failed} |"
+        )
+    return "\n".join(lines)
+
+
+def paired(results: dict[str, Any]) -> str:
+    """Trees from demonstrations against authored ones, on the same seeds."""
+    lines = [
+        "| scenario | seeds | authored | from demonstrations | difference | fail in one only |",
+        "|---|---|---|---|---|---|",
+    ]
+    for scenario in SCENARIOS:
+        ours, theirs = (results.get(f"{scenario}-panda{kind}") for kind in ("", "-fromlogs"))
+        if ours is None or theirs is None or ours["episodes"] != theirs["episodes"]:
+            lines.append(f"| `{scenario}` | {NOT_YET} | | | | |")
+            continue
+        a, b = (100 * found["success_rate"] for found in (ours, theirs))
+        only = [set(x["failed_seeds"]) - set(y["failed_seeds"]) for x, y in ((ours, theirs), (theirs, ours))]
+        lines.append(
+            f"| `{scenario}` | {ours['episodes']} | {a:.1f} % | {b:.1f} % | {b - a:+.1f} points "
+            f"| {len(only[0])} authored, {len(only[1])} from demonstrations |"
+        )
+    return "\n".join(lines)
+
+
+def commands(results: dict[str, Any]) -> str:
+    """The command that repeats each row."""
+    lines = [f"python -m benchmarks.success --only {name}" for name in names(results)]
+    return "```\n" + "\n".join(lines) + "\n```"
+
+
+def speed(results: dict[str, Any]) -> str:
+    """The table of `bt-tasksim bench`."""
+    found = results.get("speed")
+    rows = [("control steps per second, whole episodes with resets", "steps_per_s", 0, "")]
+    rows += [("ManiSkill PickCube-v1, steps alone", "maniskill_steps_per_s", 0, "")]
+    rows += [
+        ("ratio of the two", "steps_ratio", 2, ""),
+        ("time outside physics, a control step", "outside_us", 0, "us"),
+    ]
+    rows += [("time in physics, a control step", "physics_us", 0, "us")]
+    rows += [("tick without concept functions, over a plain py_trees tick", "tick_ratio", 2, "")]
+    rows += [("`bt-tasksim --help`", "help_s", 3, "s")]
+    lines = ["| measured | |", "|---|---|"]
+    for label, key, digits, unit in rows:
+        value = f"{found[key]:.{digits}f} {unit}".strip() if found and key in found else NOT_YET
+        lines.append(f"| {label} | {value} |")
+    return "\n".join(lines)
+
+
+def decomposition(results: dict[str, Any]) -> str:
+    """How many logs were decomposed rightly."""
+    found = results.get("decomposition")
+    lines = ["| logs | right task sequence |", "|---|---|"]
+    for label, (right, of) in (found or {}).items():
+        lines.append(f"| {label} | {right} of {of} |")
+    if found:
+        right, of = (sum(v[i] for v in found.values()) for i in (0, 1))
+        lines.append(f"| together | {right} of {of} |")
+    else:
+        lines.append(f"| all | {NOT_YET} |")
+    return "\n".join(lines)
+
+
+TABLES = {
+    "successes": short,
+    "evaluation": full,
+    "paired": paired,
+    "commands": commands,
+    "speed": speed,
+    "decomposition": decomposition,
+}
+MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
+
+
+def filled(text: str, results: dict[str, Any]) -> str:
+    """A page with its tables made anew."""
+    return MARKED.sub(lambda m: f"{m[1]}{TABLES[m[2]](results)}\n{m[3]}", text)
+
+
+def measure_decomposition() -> dict[str, list[int]]:
+    """Right sequences and logs, by scenario; the logs that are present on this machine."""
+    from benchmarks.decomposition import EXPECTED, logs
+    from demos_decomp.recognition import recognise
+
+    counts: dict[str, list[int]] = {}
+    for scenario, _, shown in logs():
+        tasks, _ = recognise(shown)
+        count = counts.setdefault(scenario, [0, 0])
+        count[0] += tuple(t.concept for t in tasks) == EXPECTED[scenario]
+        count[1] += 1
+    return counts
+
+
+def main() -> int:
+    """Write the tables, or check them."""
+    parser = argparse.ArgumentParser(description="Measured numbers into the documentation.")
+    parser.add_argument("--check", action="store_true", help="change nothing, fail when not up to date")
+    parser.add_argument("--decomposition", action="store_true", help="measure the decomposition first")
+    options = parser.parse_args()
+    if options.decomposition:
+        text = json.dumps(measure_decomposition(), indent=2) + "\n"
+        write_text(RESULTS / "decomposition.json", text)
+    results, stale = load(), []
+    for page in PAGES:
+        path = ROOT / page
+        old = path.read_text(encoding="utf-8")
+        new = filled(old, results)
+        if new != old:
+            stale.append(page)
+            if not options.check:
+                write_text(path, new)
+    print(f"{'out of date' if options.check else 'wrote'}: {', '.join(stale)}" if stale else "up to date")
+    return 1 if stale and options.check else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
