@@ -28,7 +28,7 @@ from bt_tasksim.poses import Array
 from bt_tasksim.shapes import Shape
 from bt_tasksim.world import ObjectModel, PlaceModel
 
-GOOD = 0.21
+GOOD = 0.25
 """Cost of a fit, see `Fit`, up to which a standing pose is taken without looking for others."""
 POOR = 0.5
 """Cost beyond which no pose is believed."""
@@ -76,7 +76,7 @@ def estimate_pose(
     if standing is not None and standing.cost < GOOD:
         return standing
     free = lie_about(target, view, places, points, before)
-    best = free if standing is None or free.cost < standing.cost - 0.02 else standing
+    best = free if standing is None or free.cost < standing.cost - 0.04 else standing
     return best if best.cost < POOR else None
 
 
