@@ -114,6 +114,17 @@ def test_pictures_are_small():
         assert picture.stat().st_size < 500_000, picture.name
 
 
+def test_concepts_page_names_every_leaf_and_its_parameters():
+    from concept_nodes import catalogue
+
+    text = (ROOT / "docs" / "concepts.md").read_text(encoding="utf-8")
+    for name, leaf in catalogue().items():
+        row = re.search(rf"^\| `{name}\(([^)]*)\)` \|([^|]*)\|", text, re.M)
+        assert row is not None, f"{name} is not on the page"
+        said = set(re.findall(r"\w+", row[1])) | set(re.findall(r"`(\w+)`", row[2]))
+        assert said == set(leaf.parameters()), name
+
+
 def test_tables_are_made_from_results():
     sys.path.insert(0, str(ROOT))
     try:
