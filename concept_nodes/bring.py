@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 
 from bt_tasksim import poses
 from bt_tasksim.concept import ConceptModel
 from bt_tasksim.context import Known, Seen
-from bt_tasksim.errors import InputError
+from bt_tasksim.errors import InputError, NoWayError
 from bt_tasksim.motion import plan, sample
 from bt_tasksim.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Points, Position
 from bt_tasksim.planning import Carried, clear_path
@@ -17,6 +19,9 @@ from concept_nodes.grasp import neutral_rotation, resting_place
 from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
 from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 from concept_nodes.pick import MoveMemory, arrived, miss
+
+LONG_TURN = 2.3
+"""Radians of turn from which it matters which way round the hand goes."""
 
 
 class Bring(ConceptModel):
@@ -71,9 +76,7 @@ class Bring(ConceptModel):
             way = [seen.tool, *middle, tool_goal]
         else:
             carried = Carried(seen.robot.envelope, model.extent, poses.inverse(grip))
-            way = clear_path(
-                seen.tool, tool_goal, carried, seen.world.obstacles, self._exits(seen, tool_goal)
-            )
+            way = self._way(seen, tool_goal, carried)
         return MoveMemory(plan(way, self.speed, blend=0.04))
 
     def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
@@ -123,6 +126,16 @@ class Bring(ConceptModel):
         easiest = poses.quat_multiply(neutral, poses.quat_conjugate(grip))
         return standing_pose(frame, now, model, rim + self.hover, easiest), frame[:3]
 
+    def _way(self, seen: Seen, goal: Array, carried: Carried) -> list[Array]:
+        """Tool poses to the goal; a hand that turns by nearly half a turn goes by its neutral orientation."""
+        start, obstacles, exits = seen.tool, seen.world.obstacles, self._exits(seen, goal)
+        middle = _by_neutral(seen, start, goal)
+        if middle is not None:
+            with contextlib.suppress(NoWayError):
+                first = clear_path(start, middle, carried, obstacles)
+                return [*first[:-1], *clear_path(middle, goal, carried, obstacles)]
+        return clear_path(start, goal, carried, obstacles, exits)
+
     def _exits(self, seen: Seen, tool_goal: Array) -> tuple[Array, Array]:
         """Displacements that take the tool out of what it starts in, and out of where it ends."""
         place = resting_place(seen, self.target) or _place_below(seen, self.target)
@@ -134,6 +147,22 @@ class Bring(ConceptModel):
             if goal.kind == "bin":
                 into = np.zeros(3)
         return out, into
+
+
+def _by_neutral(seen: Seen, start: Array, goal: Array) -> Array | None:
+    """The pose half way where the shortest turn would lead the hand round by its hindmost orientation.
+
+    Turned by nearly half a turn, the shorter way may be the one that the arm cannot go: then this is the
+    middle of the other one. None where the shortest turn is good.
+    """
+    if float(poses.angle_between(start[3:], goal[3:])) < LONG_TURN:
+        return None
+    middle = poses.interpolate(start, goal, 0.5)
+    approach = poses.rotate(middle[3:], np.array([0.0, 0.0, 1.0]))
+    neutral = neutral_rotation(seen, approach, middle[:3])
+    if float(poses.angle_between(neutral, middle[3:])) <= np.pi / 2:
+        return None
+    return poses.pose(middle[:3], poses.quat_multiply(middle[3:], np.array([0.0, 0.0, 0.0, 1.0])))
 
 
 def destination(seen: Seen, name: str) -> tuple[Array, float]:
