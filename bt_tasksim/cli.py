@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -191,7 +192,7 @@ def _decompose(options: argparse.Namespace) -> int:
         write_text(options.json, json.dumps(content, indent=2) + "\n")
         wrote.append(options.json)
     if options.xml:
-        tree = tree_from_graph(found.graph, Path(options.log).stem)
+        tree = tree_from_graph(found.graph, _scene_of_log(log) or Path(options.log).stem)
         save_tree(tree, options.xml, scene=_scene_of_log(log))
         wrote.append(options.xml)
     if options.picture:
@@ -234,7 +235,10 @@ def _run(options: argparse.Namespace) -> int:
 
     source = load_source(options.tree, options.robot, options.scene)
     engines = _options(options, rendering=options.video)
-    folder = options.out or Path("runs") / f"{source.name}-{options.seed}"
+    parts = [source.name, Path(source.scene.robot).stem, str(options.seed)]
+    if options.perception != "state":
+        parts.insert(2, options.perception)
+    folder = options.out or Path("runs") / "-".join(parts)
     result, files = _run_tree(source.build(), source.scene, options.seed, engines, folder, source.name)
     print(f"{_summary(result)}; results: {_shown(files)}")
     return 0 if result.success else 1
@@ -286,6 +290,8 @@ def _evaluate(options: argparse.Namespace) -> int:
         f"95 % interval {100 * low:.1f} to {100 * high:.1f}), "
         f"{content['control_steps'] / max(found.seconds, 1e-9):.0f} control steps/s"
     )
+    if any(o.success and math.isnan(o.position_error) for o in found.outcomes):
+        print("  (the scene has no goal: success is the tree's own word, nothing was judged)")
     for reason, count in content["failures"].items():
         worst = next(o for o in found.outcomes if o.reason == reason)
         print(f"  {count:4d} x {reason}, such as seed {worst.seed}: {worst.why}")

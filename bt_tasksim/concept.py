@@ -96,6 +96,8 @@ class ConceptNode(ContextLeaf, abc.ABC):
         model, context, policy = self._model, self._context, self._policy
         if context is None or policy is None:
             raise RuntimeError(f"leaf '{self.name}' was ticked before it was set up")
+        if context.refused is not None and context.refused[0] is self:
+            return self._fail(f"out of reach: {context.refused[1]}")
         if not self._active:
             self._started = context.now
             seen = context.seen(0.0)

@@ -132,6 +132,8 @@ class Context:
         self.look = False
         self.now = 0.0
         """Seconds since the episode began."""
+        self.refused: tuple[Behaviour | None, str] | None = None
+        """The leaf whose command of the last tick an engine could not carry out, and why."""
         self._tool: tuple[Array, Behaviour] | None = None
         self._hand: tuple[Array, Behaviour] | None = None
         self._held: set[tuple[str, str]] = set()
@@ -170,6 +172,7 @@ class Context:
         self.now = float(observation.time)
         self._tool = self._hand = None
         self.look = False
+        self.refused = None
 
     def write(self, command: Command, leaf: Behaviour) -> None:
         """Write a command, or a part of one.
@@ -185,6 +188,11 @@ class Context:
             if self._hand is not None:
                 raise _conflict("hand", self._hand[1], leaf)
             self._hand = (command.hand, leaf)
+
+    @property
+    def tool_writer(self) -> Behaviour | None:
+        """The leaf that has commanded the tool in this tick."""
+        return None if self._tool is None else self._tool[1]
 
     def withdraw(self, leaf: Behaviour) -> None:
         """Drop what a leaf has written in this tick: it was interrupted, and others may act instead."""

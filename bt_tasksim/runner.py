@@ -158,11 +158,10 @@ class Runner:
                 break
             try:
                 context.advance(pipeline.step(command, look=context.look))
-            except UnreachableError as error:
-                leaf = tree.tip()
-                tree.stop(Status.INVALID)
-                reason, why = "out of reach", f"{tree.name if leaf is None else leaf.name}: {error}"
-                break
+            except UnreachableError as error:  # the robot holds, and the leaf fails at its next tick
+                writer = context.tool_writer
+                context.advance(pipeline.step(Command()))
+                context.refused = (writer, str(error))
             steps += 1
         status = tree.status
         sim_time = context.now
@@ -173,6 +172,8 @@ class Runner:
         elif not reason:
             leaf = failed_leaf(tree)
             reason = f"{leaf.name} failed" if leaf is not None else "tree failed"
+            if leaf is not None and leaf.feedback_message.startswith("out of reach"):
+                reason = "out of reach"
             why = f"{leaf.name}: {leaf.feedback_message}" if leaf is not None else tree.feedback_message
         return Result(
             status=status,

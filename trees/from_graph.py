@@ -95,15 +95,15 @@ def _leaf(data: Mapping[str, Any], hover: float | None) -> ConceptModel:
                 arguments["approach"] = approach
         case "pick":
             arguments["direction"] = _snapped(given["direction"]) or (0.0, 0.0, 1.0)
-            arguments["distance"] = float(given["distance"])
+            arguments["distance"] = _rounded(given["distance"])
         case "bring":
             if given.get("to"):
                 arguments["to"] = given["to"]
             else:
-                arguments["position"] = tuple(float(v) for v in given["position"])
-            arguments["via"] = tuple(tuple(float(v) for v in p) for p in given.get("via", ()))
+                arguments["position"] = tuple(_rounded(v) for v in given["position"])
+            arguments["via"] = tuple(tuple(_rounded(v) for v in p) for p in given.get("via", ()))
             if hover is not None:
-                arguments["hover"] = hover
+                arguments["hover"] = _rounded(hover)
         case "place":
             if not given.get("on"):
                 raise InputError(
@@ -117,7 +117,7 @@ def _leaf(data: Mapping[str, Any], hover: float | None) -> ConceptModel:
     cls = known[concept]
     declared = cls.parameters()
     spread = {
-        key: float(np.linalg.norm(value))
+        key: _rounded(np.linalg.norm(value))
         for key, value in sigma.items()
         if key in arguments and declared[key].quantity.kind in ("number", "vector")
     }
@@ -130,4 +130,9 @@ def _snapped(direction: Any) -> tuple[float, float, float] | None:
     d = d / np.linalg.norm(d)
     if math.acos(min(1.0, abs(float(d[2])))) < SNAP:
         return None
-    return float(d[0]), float(d[1]), float(d[2])
+    return _rounded(d[0]), _rounded(d[1]), _rounded(d[2])
+
+
+def _rounded(value: Any) -> float:
+    """To tenths of a millimetre: a demonstration is no more accurate, and a person reads the file."""
+    return round(float(value), 4)

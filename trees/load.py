@@ -64,6 +64,10 @@ def load_source(tree: str, robot: str | None = None, scene: str | None = None) -
         )
     elif path.suffix == ".xml":
         source = _from_xml(path, robot, scene)
+    elif path.suffix in (".h5", ".hdf5"):
+        raise InputError(
+            f"'{tree}' is a log: make a tree of it with 'bt-tasksim decompose {tree} --xml tree.xml'"
+        )
     else:
         if tree not in scenarios():
             hint = nearest(tree, scenarios())

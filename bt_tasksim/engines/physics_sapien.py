@@ -23,6 +23,9 @@ FALLING = (0.1, 1.5)
 """Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are `FINE` times
 shorter: a tilted object that lands spins so fast that it would be millimetres deep within one step."""
 FINE = 8
+WATCHED = 10
+"""Control periods after the hand was moved or a contact came or went, in which overlaps are looked for at
+every step; at other times at the period's end."""
 TOUCH_DISTANCE = 0.002
 """Metres of separation beyond which a contact of PhysX carries no force and counts for nothing."""
 SUPPORT_DISTANCE = 5e-4
@@ -83,6 +86,9 @@ class SapienPhysics:
         self._keep: list[Any] = []
         self._penetration = 0.0
         self._falling = False
+        self._watch = 0
+        self._touched: list[bool] = []
+        self._support: set[tuple[int, int]] = set()
         self._last_dt = self._dt
         self._build_fixtures(configuration)
         self._build_objects(configuration)
@@ -229,18 +235,35 @@ class SapienPhysics:
                 joint = self._joints[i]
                 joint.set_drive_target(p[i])
                 joint.set_drive_velocity_target(v[i])
+            if changed[len(self.robot.arm_joints) :].any():
+                self._watch = WATCHED
             self._target, self._velocity_target = position, velocity
         if self._disturbed != _DISTURBANCE_OVER:
             for _ in range(self._substeps):
                 self._disturbed_step()
         elif self._falling:
             self._fine_steps(self._substeps)
+        elif self._watch > 0:
+            self._watch -= 1
+            for _ in range(self._substeps):
+                self._system.step()
+                self._read_depth()
         else:
             step = self._system.step
             for _ in range(self._substeps):
                 step()
         self._time += self._dt * self._substeps
         return self._state()
+
+    def _read_depth(self) -> None:
+        """Remember the deepest overlap, also between the ends of periods: fingers close within one."""
+        for contact in self._system.get_contacts():
+            deepest = -min([point.separation for point in contact.points])
+            if deepest > self._penetration:
+                kinds = [self._bodies.get(body, ("none", 0))[0] for body in contact.bodies]
+                if "base" not in kinds:
+                    self._penetration = deepest
+                    self.deepest_pair = (*(b.entity.name for b in contact.bodies), deepest, self._time)
 
     def _fine_steps(self, n: int) -> None:
         self._scene.set_timestep(self._dt / FINE)
@@ -249,6 +272,7 @@ class SapienPhysics:
             if self._disturbed == _DISTURBANCE_PUSHING:
                 self._push()
             self._system.step()
+            self._read_depth()
         self._scene.set_timestep(self._dt)
 
     def _state(self) -> WorldState:
@@ -347,7 +371,11 @@ class SapienPhysics:
                 hand_force[j] += math.sqrt(x * x + y * y + z * z)
                 distance[j] = min(distance[j], max(separation, 0.0))
         self._tip_force = tip_force
-        self._hand_force, self._hand_distance, self._support = hand_force, distance, support
+        touched = [force > 0.0 for force in hand_force]
+        if touched != self._touched or support != self._support:
+            self._watch = WATCHED
+        self._touched, self._support = touched, support
+        self._hand_force, self._hand_distance = hand_force, distance
         self._penetration = deepest
 
     def hidden(self) -> Hidden:

@@ -145,12 +145,13 @@ class EnginePipeline:
             look: A concept wants fresh images for the next observation.
 
         Raises:
-            UnreachableError: The tool target is out of reach.
+            UnreachableError: The tool target is out of reach; nothing has moved, and the last targets stay.
         """
         if self.state is None:
             raise RuntimeError("the pipeline was stepped before it was reset")
-        self.last = command.over(self.last)
-        target = self.kinematics.solve(self.last, self.state)
+        wanted = command.over(self.last)
+        target = self.kinematics.solve(wanted, self.state)
+        self.last = wanted
         self.state = self.physics.step(target)
         return self._observe(needed=look)
 

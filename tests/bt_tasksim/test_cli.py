@@ -144,7 +144,7 @@ def test_evaluate_counts_failures_with_a_seed_and_a_reason(call):
     name = tree_file('sequence("far", Grasp("cup"), Pick("cup", distance=2.0))')
     code, out, _ = call("evaluate", name, "--episodes", 2)
     assert code == 0 and "tree on panda" in out and "0 of 2 (0.0 %" in out
-    assert "2 x out of reach, such as seed 0: pick cup: panda cannot bring its tool to" in out
+    assert "2 x out of reach, such as seed 0: pick cup: out of reach: panda cannot bring its tool to" in out
 
 
 def test_decompose_writes_tasks_graph_tree_and_picture(call):
@@ -173,7 +173,7 @@ def test_a_goal_out_of_reach_is_a_failed_run_with_the_leaf_and_the_distance(call
     name = tree_file('sequence("far", Grasp("cup"), Pick("cup"), Bring("cup", position=(3.0, 0.0, 0.4)))')
     code, out, err = call("run", name, "--out", "far")
     assert code == 1 and err == ""
-    assert out.startswith("FAILURE (out of reach): bring cup: panda cannot bring its tool to (")
+    assert out.startswith("FAILURE (out of reach): bring cup: out of reach: panda cannot bring its tool to (")
     assert " m: the nearest pose misses by " in out and " mm and " in out and " degrees" in out
     assert json.loads(Path("far/result.json").read_text())["success"] is False
 

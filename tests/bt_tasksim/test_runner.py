@@ -12,6 +12,7 @@ from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import InputError, LeafError, UnreachableError
 from bt_tasksim.runner import Runner, failed_leaf
 from bt_tasksim.world import Command
+from concept_nodes import Wait
 from trees import fallback, parallel, retry, sequence, timeout
 from trees.load import load_source
 
@@ -72,16 +73,31 @@ def test_an_episode_has_an_end(toy):
     assert result.control_steps == 20 and result.status == Status.INVALID
 
 
-def test_out_of_reach_ends_the_run_with_the_distance(toy, act):
-    stage = toy(act("move", ticks=10))
+def unreachable(stage):
+    """A stage whose arm reaches nothing, and holds when nothing is asked of it."""
+    step = stage.world.step
 
     def far(command, look=False):
-        raise UnreachableError("the nearest pose misses by 120.0 mm", 0.12, 0.0)
+        if command.tool is not None:
+            raise UnreachableError("the nearest pose misses by 120.0 mm", 0.12, 0.0)
+        return step(command)
 
     stage.world.step = far
+    return stage
+
+
+def test_out_of_reach_fails_the_leaf_with_the_distance(toy, act):
+    stage = unreachable(toy(act("move", ticks=10)))
     result = finished(stage)
-    assert result.reason == "out of reach" and result.why == "move: the nearest pose misses by 120.0 mm"
-    assert not result.success and all(n.status != Status.RUNNING for n in stage.tree.iterate())
+    assert result.reason == "out of reach"
+    assert result.why == "move: out of reach: the nearest pose misses by 120.0 mm"
+    assert not result.success and result.status == Status.FAILURE
+
+
+def test_a_fallback_takes_over_when_a_leaf_is_out_of_reach(toy, act):
+    stage = unreachable(toy(fallback("either", act("move", ticks=10), Wait(0.2))))
+    result = finished(stage)
+    assert result.status == Status.SUCCESS
 
 
 def test_records_hold_every_tick(toy, act):
