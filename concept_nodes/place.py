@@ -28,11 +28,13 @@ class PlaceMemory(NamedTuple):
         path: Tool path to the deepest pose that is tried.
         baseline: Force ``(...)`` against the direction of placing when it began, N.
         felt: Ticks in a row with the support's force.
+        progress: Seconds of the path that have been commanded.
     """
 
     path: Path
     baseline: Array
     felt: Array
+    progress: Array
 
 
 class Place(ConceptModel):
@@ -81,18 +83,18 @@ class Place(ConceptModel):
             along = float((goal[:3] - now[:3]) @ d)
             goal[:3] += min(0.0, self.distance + self.overshoot - along) * d
         tool_goal = poses.multiply(goal, poses.multiply(poses.inverse(now), seen.tool))
-        return PlaceMemory(
-            plan([seen.tool, tool_goal], self.speed, samples=2), self._force(seen), np.int64(0)
-        )
+        path = plan([seen.tool, tool_goal], self.speed, samples=2)
+        return PlaceMemory(path, self._force(seen), np.int64(0), np.float64(-seen.world.control_period))
 
     def command(self, action: Array, seen: Seen, memory: PlaceMemory) -> Command:
-        """Follow the path; the hand keeps its grip."""
-        return Command(tool=sample(memory.path, seen.elapsed))
+        """Follow the path, and stop on it as long as the support is felt; the hand keeps its grip."""
+        return Command(tool=sample(memory.path, self._progress(seen, memory)))
 
     def advance(self, seen: Seen, memory: PlaceMemory) -> PlaceMemory:
         """Count the ticks at which the support is felt."""
         xp = array_namespace(seen.tool)
-        return memory._replace(felt=xp.where(self._supported(seen, memory), memory.felt + 1, 0))
+        felt = xp.where(self._supported(seen, memory), memory.felt + 1, 0)
+        return memory._replace(felt=felt, progress=self._progress(seen, memory))
 
     def violated(self, seen: Seen, memory: PlaceMemory) -> Array:
         """The wrist is strained beyond the limit: the hand or the object presses against something."""
@@ -100,7 +102,7 @@ class Place(ConceptModel):
 
     def done(self, seen: Seen, memory: PlaceMemory) -> Array:
         """The support is felt, or the object is where it should stand."""
-        return (memory.felt >= FELT) | (seen.elapsed >= memory.path.duration + 0.2)
+        return (memory.felt >= FELT) | (memory.progress >= memory.path.duration + 0.2)
 
     def maintained(self, goal: str, seen: Seen, memory: PlaceMemory) -> Array:
         """The object is still in the hand."""
@@ -132,6 +134,11 @@ class Place(ConceptModel):
         f = poses.rotate(seen.tool[..., 3:], seen.wrench[..., :3])
         xp = array_namespace(f)
         return xp.sum(f * poses.constant(d, f), axis=-1)
+
+    def _progress(self, seen: Seen, memory: PlaceMemory) -> Array:
+        xp = array_namespace(seen.tool)
+        on = memory.progress + seen.world.control_period
+        return xp.where(self._supported(seen, memory), memory.progress, on)
 
     def _supported(self, seen: Seen, memory: PlaceMemory) -> Array:
         return (self._force(seen) - memory.baseline > self.press) & (seen.elapsed > 0.25)
