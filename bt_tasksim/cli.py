@@ -108,6 +108,11 @@ def _tree_arguments(parser: argparse.ArgumentParser, seed: bool = True) -> None:
     parser.add_argument(
         "--scene", metavar="S", help="a scenario's scene or a .yaml file, if not the tree's own"
     )
+    parser.add_argument(
+        "--nodes",
+        metavar="F.py",
+        help="a Python file with concepts and conditions of one's own, for an XML tree",
+    )
     parser.add_argument("--robot", metavar="R", help="panda, xarm7_ability, ... or a .yaml file")
     if seed:
         parser.add_argument("--seed", type=_seed, default=0, metavar="S", help="(first) seed, default 0")
@@ -182,7 +187,8 @@ def _decompose(options: argparse.Namespace) -> int:
     from trees.from_graph import tree_from_graph
     from trees.xml_writer import save_tree
 
-    log = open_log(options.log)
+    logged = Path(options.log) / "run.h5"
+    log = open_log(logged if logged.is_file() else options.log)
     with _progress("decomposing", None):
         found = decompose_log(log, options.episode)
     print(text_table(found.tasks))
@@ -215,17 +221,18 @@ def _scene_of_log(log: Any) -> str | None:
 def _show(options: argparse.Namespace) -> int:
     from bt_tasksim.files import write_text
     from bt_tasksim.report.tree_picture import tree_svg, tree_text
-    from trees.load import load_source
+    from trees.load import load_source, scenarios
     from trees.xml_writer import save_tree
 
-    source = load_source(options.tree, options.robot, options.scene)
+    source = load_source(options.tree, options.robot, options.scene, options.nodes)
     tree = source.build()
     print(tree_text(tree))
     if options.picture:
         write_text(options.picture, tree_svg(tree))
         print(f"wrote {options.picture}")
     if options.xml:
-        save_tree(tree, options.xml, scene=source.scene.name if options.scene is None else options.scene)
+        named = options.scene or (source.scene.name if source.scene.name in scenarios() else None)
+        save_tree(tree, options.xml, scene=named)
         print(f"wrote {options.xml}")
     return 0
 
@@ -233,7 +240,7 @@ def _show(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     from trees.load import load_source
 
-    source = load_source(options.tree, options.robot, options.scene)
+    source = load_source(options.tree, options.robot, options.scene, options.nodes)
     engines = _options(options, rendering=options.video)
     parts = [source.name, Path(source.scene.robot).stem, str(options.seed)]
     if options.perception != "state":
@@ -276,7 +283,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     from bt_tasksim.files import write_text
     from bt_tasksim.training.evaluation import Job, evaluate
 
-    job = Job(options.tree, options.scene, options.robot, _options(options))
+    job = Job(options.tree, options.scene, options.robot, _options(options), options.nodes)
     seeds = range(options.seed, options.seed + options.episodes)
     with _progress("episodes", options.episodes) as advance:
         found = evaluate(job, seeds, options.workers, lambda outcome: advance(outcome.success))

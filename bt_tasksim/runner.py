@@ -167,6 +167,7 @@ class Runner:
         sim_time = context.now
         verdict = self._settle_and_judge(configuration, world, record)
         if status == Status.SUCCESS:
+            why = "the tree succeeded; there is no ground truth to judge it by"
             if verdict is not None:
                 reason, why = verdict.reason, verdict.why
         elif not reason:

@@ -19,6 +19,9 @@ from bt_tasksim.errors import InputError, nearest
 from bt_tasksim.scene import Scene
 from trees.authoring import check_tree
 
+Leaves = dict[str, type[ConceptModel] | type[Condition]]
+"""Concepts and conditions by name."""
+
 
 @dataclass(frozen=True)
 class TreeSource:
@@ -42,13 +45,16 @@ def scenarios() -> list[str]:
     return sorted(m.name for m in pkgutil.iter_modules(trees.scenarios.__path__))
 
 
-def load_source(tree: str, robot: str | None = None, scene: str | None = None) -> TreeSource:
+def load_source(
+    tree: str, robot: str | None = None, scene: str | None = None, nodes: str | None = None
+) -> TreeSource:
     """The tree and scene that a name stands for.
 
     Args:
         tree: Name of a scenario, or path of a ``.py`` or ``.xml`` file.
         robot: Name or file of the robot; by default the scene's own.
         scene: Name of a scenario whose scene is taken, or path of a scene file; by default the tree's own.
+        nodes: Path of a ``.py`` file with concepts and conditions of one's own, for an ``.xml`` file.
 
     Raises:
         InputError: There is no such tree or scene, or the file is no good.
@@ -63,7 +69,7 @@ def load_source(tree: str, robot: str | None = None, scene: str | None = None) -
             path.stem, build, _scene(scene, robot) if scene or own is None else _made(own, robot, path)
         )
     elif path.suffix == ".xml":
-        source = _from_xml(path, robot, scene)
+        source = _from_xml(path, robot, scene, own_nodes(nodes) if nodes else {})
     elif path.suffix in (".h5", ".hdf5"):
         raise InputError(
             f"'{tree}' is a log: make a tree of it with 'bt-tasksim decompose {tree} --xml tree.xml'"
@@ -111,6 +117,25 @@ def check_names(root: Behaviour, scene: Scene) -> None:
                 )
 
 
+def own_nodes(file: str) -> Leaves:
+    """The concepts and conditions that a Python file defines, by name.
+
+    Raises:
+        InputError: The file is missing, fails, or defines none.
+    """
+    module = _module(Path(file))
+    found: Leaves = {
+        name: value
+        for name, value in vars(module).items()
+        if isinstance(value, type)
+        and issubclass(value, ConceptModel | Condition)
+        and value.__module__ == module.__name__
+    }
+    if not found:
+        raise InputError(f"'{file}' defines no concept and no condition")
+    return found
+
+
 def names_in(root: Behaviour) -> tuple[set[str], set[str]]:
     """Objects and places that a tree names."""
     objects: set[str] = set()
@@ -125,10 +150,10 @@ def names_in(root: Behaviour) -> tuple[set[str], set[str]]:
     return objects, places
 
 
-def _from_xml(path: Path, robot: str | None, scene: str | None) -> TreeSource:
+def _from_xml(path: Path, robot: str | None, scene: str | None, nodes: Leaves) -> TreeSource:
     from trees.xml_reader import load_tree, scene_of_tree
 
-    root = load_tree(path)
+    root = load_tree(path, nodes)
     named = scene or scene_of_tree(path)
     if named is None:
         fitting = [name for name in scenarios() if _fits(root, _scene(name, robot))]
@@ -141,7 +166,7 @@ def _from_xml(path: Path, robot: str | None, scene: str | None) -> TreeSource:
         named = fitting[0]
     elif named.endswith((".yaml", ".yml")) and scene is None:
         named = str(path.parent / named)
-    return TreeSource(path.stem, lambda: load_tree(path), _scene(named, robot))
+    return TreeSource(path.stem, lambda: load_tree(path, nodes), _scene(named, robot))
 
 
 def _fits(root: Behaviour, scene: Scene) -> bool:

@@ -246,7 +246,8 @@ class _Reader:
                 raise self._wrong(element, f"<{name}> of BehaviorTree.CPP is outside the subset that is read")
             known = (*KINDS, *self.nodes, "SubTree")
             hint = f'; to use the tree, write <SubTree ID="{name}"/>' if name in self.trees else None
-            raise self._wrong(element, f"unknown node '{name}'{hint or nearest(name, known)}")
+            own = "; a node of your own comes with --nodes FILE.py"
+            raise self._wrong(element, f"unknown node '{name}'{hint or nearest(name, known) + own}")
         if explicit and tag != category:
             raise self._wrong(element, f"'{name}' is no {tag}; write <{category} ID=\"{name}\"> or <{name}>")
         return name, category

@@ -32,12 +32,14 @@ class Job:
         scene: Name or file of the scene, or None for the tree's own.
         robot: Name or file of the robot, or None for the scene's own.
         options: Which engines.
+        nodes: A Python file with concepts and conditions of one's own, for an XML tree.
     """
 
     tree: str
     scene: str | None = None
     robot: str | None = None
     options: EngineOptions = field(default_factory=EngineOptions)
+    nodes: str | None = None
 
 
 @dataclass(frozen=True)
@@ -222,7 +224,7 @@ def _runner(job: Job) -> Any:
     from bt_tasksim.runner import Runner
     from trees.load import load_source
 
-    source = load_source(job.tree, job.robot, job.scene)
+    source = load_source(job.tree, job.robot, job.scene, job.nodes)
     return Runner(source.build(), source.scene, job.options)
 
 

@@ -197,3 +197,40 @@ def test_faulty_xml(write, inside, sentence):
 )
 def test_what_is_no_xml(write, text):
     assert "tree.xml" in refused(write("tree.xml", text))
+
+
+OWN = '''
+from bt_tasksim.concept import Condition
+from bt_tasksim.parameters import ObjectName
+
+
+class Shiny(Condition):
+    """Does it shine?"""
+
+    target: ObjectName
+
+    def holds(self, seen):
+        """It does."""
+        return True
+'''
+
+
+def test_nodes_of_ones_own_come_from_a_file(tmp_path):
+    file, tree = tmp_path / "own.py", tmp_path / "tree.xml"
+    file.write_text(OWN)
+    tree.write_text(
+        '<root BTCPP_format="4" scene="shelf_to_shelf">'
+        '<BehaviorTree ID="a"><Shiny target="cup"/></BehaviorTree></root>'
+    )
+    root = load_source(str(tree), nodes=str(file)).build()
+    assert type(root).__name__ == "Shiny" and root.target == "cup"
+    with pytest.raises(InputError, match=r"unknown node 'Shiny'.*--nodes FILE\.py"):
+        load_source(str(tree))
+    file.write_text("from concept_nodes import Grasp\n")
+    with pytest.raises(InputError, match="defines no concept and no condition"):
+        load_source(str(tree), nodes=str(file))
+
+
+def test_a_log_is_no_tree(tmp_path):
+    with pytest.raises(InputError, match="is a log: make a tree of it with 'bt-tasksim decompose"):
+        load_source("kitchen.h5")
