@@ -60,7 +60,7 @@ class Place(ConceptModel):
     distance: Metres | None = None
     overshoot: Metres = 0.006
     press: Newtons = 3.0
-    speed: MetresPerSecond = 0.12
+    speed: MetresPerSecond = 0.08
     force_limit: Newtons = FORCE_LIMIT
 
     maintains = (HOLDING,)
