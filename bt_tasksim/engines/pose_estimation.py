@@ -28,7 +28,7 @@ from bt_tasksim.poses import Array
 from bt_tasksim.shapes import Shape
 from bt_tasksim.world import ObjectModel, PlaceModel
 
-GOOD = 0.25
+GOOD = 0.2
 """Cost of a fit, see `Fit`, up to which a standing pose is taken without looking for others."""
 POOR = 0.5
 """Cost beyond which no pose is believed."""

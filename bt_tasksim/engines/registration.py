@@ -170,6 +170,8 @@ def judge_fit(model: ModelPoints, view: View, pose: Array) -> Fit:
     # Beside a sample of the surface is still on the surface, as far as the next sample.
     along = np.maximum(np.sqrt(np.maximum(distance2 - across2, 0.0)) - model.spacing, 0.0)
     distance = float(np.mean(np.minimum(np.sqrt(across2 + along * along), FAR)))
+    # Near the outline a small error of the camera shows what is behind: only what faces it well is judged.
+    surface, _ = _facing(model, pose, view.camera.pose[:3], 0.35)
     return Fit(pose, distance, _missing(surface, view))
 
 
@@ -188,13 +190,16 @@ def _missing(surface: Array, view: View) -> float:
     return float(np.count_nonzero(through)) / max(len(surface), 1)
 
 
-def _facing(model: ModelPoints, pose: Array, eye: Array) -> tuple[Array, Array]:
-    """The model's points and normals, base frame, that face a camera at ``eye (3,)``."""
+def _facing(model: ModelPoints, pose: Array, eye: Array, least: float = 0.08) -> tuple[Array, Array]:
+    """The model's points and normals, base frame, that face a camera at ``eye (3,)``.
+
+    ``least`` is the cosine that the angle between normal and line of sight has at least.
+    """
     matrix = poses.to_matrix(pose[3:])
     local_eye = matrix.T @ (eye - pose[:3])
     to_eye = local_eye - model.points
     cosine = np.sum(to_eye * model.normals, axis=-1) / np.sqrt(np.sum(to_eye * to_eye, axis=-1))
-    facing = cosine > 0.08
+    facing = cosine > least
     return model.points[facing] @ matrix.T + pose[:3], model.normals[facing] @ matrix.T
 
 
