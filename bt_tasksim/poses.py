@@ -95,6 +95,20 @@ def quat_conjugate(q: Array) -> Array:
     return xp.concat([q[..., :1], -q[..., 1:]], axis=-1)
 
 
+def norm(v: Array) -> Array:
+    """Length ``(...)`` of vectors ``(..., n)``."""
+    if _single(v):
+        return np.float64(math.sqrt(v @ v))
+    xp = array_namespace(v)
+    return xp.sqrt(xp.sum(v * v, axis=-1))
+
+
+def point(pose: list[float], local: list[float]) -> list[float]:
+    """A point given in the frame of one pose, in its parent, all in plain floats."""
+    x, y, z = _rot(pose[3:], local)
+    return [pose[0] + x, pose[1] + y, pose[2] + z]
+
+
 def rotate(q: Array, v: Array) -> Array:
     """Vectors ``v (..., 3)`` rotated by unit quaternions ``q (..., 4)``; batch dimensions broadcast."""
     if _single(q) and _single(v):

@@ -9,7 +9,7 @@ stand in `WorldModel`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from bt_tasksim.errors import InputError, nearest
 from bt_tasksim.poses import Array
@@ -220,10 +220,8 @@ class Command:
 
     def over(self, other: Command) -> Command:
         """This command, with the parts that it lacks taken from ``other``."""
-        return replace(
-            self,
-            tool=other.tool if self.tool is None else self.tool,
-            hand=other.hand if self.hand is None else self.hand,
+        return Command(
+            other.tool if self.tool is None else self.tool, other.hand if self.hand is None else self.hand
         )
 
 

@@ -62,8 +62,7 @@ class AtPose(Condition):
         frame, _ = destination(seen, self.on)
         goal = standing_pose(frame, now, seen.model(self.target), 0.0)
         gap = now[..., :3] - goal[..., :3]
-        xp = array_namespace(gap)
-        return xp.sqrt(xp.sum(gap * gap, axis=-1)), poses.angle_between(now[..., 3:], goal[..., 3:])
+        return poses.norm(gap), poses.angle_between(now[..., 3:], goal[..., 3:])
 
 
 class Upright(Condition):

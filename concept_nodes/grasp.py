@@ -68,7 +68,9 @@ class Grasp(ConceptModel):
     observables = ("hand_position", "contacts", "tool_pose", "objects", "time")
 
     def initial_state(self, seen: Seen) -> str:
-        """The object must be known and fit into the hand."""
+        """The object must be seen and fit into the hand."""
+        if not np.isfinite(seen.object(self.target)[0]):
+            return f"{self.target} is not seen"
         model = seen.model(self.target)
         if self.closing is None and min(model.grasp_widths) > seen.world.opening:
             return (
@@ -137,8 +139,7 @@ class Grasp(ConceptModel):
 
     def _miss(self, seen: Seen, memory: GraspMemory) -> Array:
         gap = seen.tool[..., :3] - memory.path.table[..., -1, :3]
-        xp = array_namespace(gap)
-        return xp.sqrt(xp.sum(gap * gap, axis=-1))
+        return poses.norm(gap)
 
 
 def resting_place(seen: Seen, target: str) -> PlaceModel | None:

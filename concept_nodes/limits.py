@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bt_tasksim.context import Seen
-from bt_tasksim.poses import Array, array_namespace
+from bt_tasksim.poses import Array, norm
 
 FORCE_LIMIT = 60.0
 """N at the wrist: well above what carrying and placing take, well below what breaks a cup or a finger."""
@@ -11,13 +11,9 @@ FORCE_LIMIT = 60.0
 
 def strained(seen: Seen, limit: float) -> Array:
     """Boolean ``(...)``: the force at the wrist exceeds ``limit`` N."""
-    force = seen.wrench[..., :3]
-    xp = array_namespace(force)
-    return xp.sum(force * force, axis=-1) > limit * limit
+    return force_at_wrist(seen) > limit
 
 
 def force_at_wrist(seen: Seen) -> Array:
     """Magnitude ``(...)`` of the force at the wrist, N."""
-    force = seen.wrench[..., :3]
-    xp = array_namespace(force)
-    return xp.sqrt(xp.sum(force * force, axis=-1))
+    return norm(seen.wrench[..., :3])

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bt_tasksim import poses
 from bt_tasksim.concept import ConceptModel
 from bt_tasksim.context import Known, Seen
 from bt_tasksim.motion import Path, plan, sample
@@ -92,8 +93,7 @@ class Pick(ConceptModel):
 def miss(seen: Seen, path: Path) -> Array:
     """Distance ``(...)`` in metres of the tool from the end of a path."""
     gap = seen.tool[..., :3] - path.table[..., -1, :3]
-    xp = array_namespace(gap)
-    return xp.sqrt(xp.sum(gap * gap, axis=-1))
+    return poses.norm(gap)
 
 
 def arrived(seen: Seen, path: Path, tolerance: float) -> Array:

@@ -113,8 +113,7 @@ class Place(ConceptModel):
         frame, _ = destination(seen, self.on)
         now = seen.object(self.target)
         gap = now[..., :3] - standing_pose(frame, now, seen.model(self.target), 0.0)[..., :3]
-        xp = array_namespace(gap)
-        return xp.sqrt(xp.sum(gap * gap, axis=-1))
+        return poses.norm(gap)
 
     def sufficient_cost(self, known: Known, memory: PlaceMemory) -> Array:
         """1 unless the object touches its support."""

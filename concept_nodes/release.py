@@ -88,7 +88,7 @@ class Release(ConceptModel):
         """The hand is open, touches nothing, and has drawn back."""
         gap = seen.tool[..., :3] - memory.path.table[..., -1, :3]
         xp = array_namespace(gap)
-        close = xp.sqrt(xp.sum(gap * gap, axis=-1)) < self.tolerance
+        close = poses.norm(gap) < self.tolerance
         free = ~xp.any(xp.asarray(seen.contacts), axis=-1)
         return (memory.opened >= memory.path.duration) & close & free
 

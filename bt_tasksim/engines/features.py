@@ -68,11 +68,11 @@ class _Instant:
         self.objects = objects
 
     def nearest(self) -> int:
-        """Index of the object nearest to the tool; -1 where there is none."""
-        if len(self.objects) < 2:
-            return len(self.objects) - 1
+        """Index of the object nearest to the tool; -1 where there is none, or none was ever seen (NaN)."""
         gap = self.objects[:, :3] - self.tool[:3]
-        return int(np.argmin((gap * gap).sum(-1)))
+        distance = (gap * gap).sum(-1)
+        seen = ~np.isnan(distance)
+        return int(np.argmin(np.where(seen, distance, np.inf))) if seen.any() else -1
 
 
 def contact_points(shapes: list[Shape], now: _Instant, tips: Array) -> Array:

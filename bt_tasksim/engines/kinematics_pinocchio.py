@@ -102,7 +102,7 @@ class PinocchioKinematics:
             hand = np.maximum(hand, np.abs(robot.synergy_directions).max(axis=0))
         speed = np.concatenate([robot.arm_velocity, np.maximum(hand, 1e-9) * robot.hand_speed])
         self._period = period
-        self._per_step = 1.0 / (speed * period)
+        self._speeds = (1.0 / (speed * period)).tolist()
 
     def solve(self, command: Command, state: WorldState) -> JointTarget:
         """Joint target that brings the tool to ``command.tool`` in one control period.
@@ -144,8 +144,8 @@ class PinocchioKinematics:
         n = self._n
         assert self._target is not None
         step = self._goal - self._target
-        share = np.abs(step) * self._per_step
-        arm, hand = float(share[:n].max()), float(share[n:].max()) if len(share) > n else 0.0
+        share = [abs(x) * y for x, y in zip(step.tolist(), self._speeds, strict=True)]
+        arm, hand = max(share[:n]), max(share[n:], default=0.0)
         if arm > 1.0 or hand > 1.0:
             step[:n] /= max(arm, 1.0)
             step[n:] /= max(hand, 1.0)
@@ -161,7 +161,7 @@ class PinocchioKinematics:
         pose = se3(tool)
         last = self._goal[: self._n]
         pull = _PULL * self.robot.posture * (self._rest - last)
-        largest = float(np.abs(pull).max())
+        largest = _largest(pull)
         if largest > _PULL_LIMIT:
             pull *= _PULL_LIMIT / largest
         q, error = self._iterate(last, pose, _TRACK, pull)
@@ -244,7 +244,7 @@ class PinocchioKinematics:
             miss = pin.updateFramePlacement(model, data, frame).actInv(pose)
             error[:3], error[3:] = miss.translation, pin.log3(miss.rotation)
             e = error[self._rows] if self._masked else error
-            worst = float(np.abs(e).max())
+            worst = _largest(e)
             if (worst <= _TOLERANCE and pull is None) or k == iterations:
                 break
             J = pin.getFrameJacobian(model, data, frame, _LOCAL)
@@ -254,12 +254,11 @@ class PinocchioKinematics:
             e = e * self._weights
             damping = 0.5 * float(e @ e) + _DAMPING
             step = self._step(J, e, damping, pull)
-            largest = float(np.abs(step).max())
+            largest = _largest(step)
             if largest > 0.5:
                 step *= 0.5 / largest
-            moved = q + step
-            kept = np.minimum(np.maximum(moved, lower), upper)
-            if (kept != moved).any():
+            kept = q + step
+            if not (lower <= kept).all() or not (kept <= upper).all():
                 kept = self._saturate(q, J, e, damping, pull)
                 if pull is None and float(np.abs(kept - q).max()) < 1e-7:
                     break  # as near as the limits allow
@@ -371,3 +370,8 @@ def _unreachable(robot: str, pose: Any, distance: float, angle: float, how: str 
         distance,
         angle,
     )
+
+
+def _largest(values: Array) -> float:
+    """Largest magnitude of a few numbers; NumPy takes longer for so few."""
+    return float(max(map(abs, values.tolist())))

@@ -23,7 +23,7 @@ FALLING = (0.1, 1.5)
 """Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are `FINE` times
 shorter: a tilted object that lands spins so fast that it would be millimetres deep within one step."""
 FINE = 8
-WATCHED = 10
+WATCHED = 4
 """Control periods after the hand was moved or a contact came or went, in which overlaps are looked for at
 every step; at other times at the period's end."""
 TOUCH_DISTANCE = 0.002
@@ -71,7 +71,7 @@ class SapienPhysics:
         sapien, physx = self._sapien, self._physx
         physx.set_scene_config(enable_enhanced_determinism=False, bounce_threshold=2.0)
         physx.set_body_config(
-            solver_position_iterations=self.robot.solver_iterations, solver_velocity_iterations=1
+            solver_position_iterations=self.robot.solver_iterations, solver_velocity_iterations=0
         )
         physx.set_shape_config(contact_offset=CONTACT_OFFSET["object"], rest_offset=0.0)
         physx.set_default_material(0.5, 0.5, 0.0)
@@ -218,9 +218,10 @@ class SapienPhysics:
         self._tool_identity = bool(np.array_equal(robot.tool_pose, [0, 0, 0, 1, 0, 0, 0]))
         frame = poses.multiply(_array(wrist.entity_pose), _array(joint.pose_in_child))
         in_joint = poses.multiply(poses.inverse(frame), self._tool())
-        self._lever, self._to_tool = in_joint[:3], in_joint[3:] * _CONJUGATE
+        self._lever = in_joint[:3].tolist()
+        self._to_tool = [0.0, 0.0, 0.0, *(in_joint[3:] * _CONJUGATE).tolist()]
         self._tip_links = [links[tip.links[0]] for tip in robot.tips]
-        self._tip_points = [np.array(tip.point) for tip in robot.tips]
+        self._tip_points = [list(tip.point) for tip in robot.tips]
 
     # ---- running ----------------------------------------------------------------------------------------
 
@@ -281,11 +282,12 @@ class SapienPhysics:
         v = articulation.get_qvel()[self._index].astype(np.float64)
         # The drives' own law; SAPIEN reports no effort of drives.
         effort = self._stiffness * (self._target - q) + self._damping * (self._velocity_target - v)
-        np.clip(effort, -self._limit, self._limit, out=effort)
+        np.minimum(effort, self._limit, out=effort)
+        np.maximum(effort, -self._limit, out=effort)
         tool = self._tool()
         tips = np.array(
             [
-                poses.transform(_array(link.entity_pose), point)
+                poses.point(_list(link.entity_pose), point)
                 for link, point in zip(self._tip_links, self._tip_points, strict=True)
             ]
         )
@@ -317,10 +319,11 @@ class SapienPhysics:
         turned against the link's; at rest the world's force on the hand is its opposite. Moments are moved
         to the tool origin: t' = t - r x f.
         """
-        incoming = -self._articulation.get_link_incoming_joint_forces()[self._wrist].astype(np.float64)
-        force = incoming[:3]
-        torque = incoming[3:] - poses.cross(self._lever, force)
-        return np.concatenate([poses.rotate(self._to_tool, force), poses.rotate(self._to_tool, torque)])
+        x, y, z, u, v, w = self._articulation.get_link_incoming_joint_forces()[self._wrist].tolist()
+        rx, ry, rz = self._lever
+        moment = [ry * z - rz * y - u, rz * x - rx * z - v, rx * y - ry * x - w]
+        frame = self._to_tool
+        return np.array([*poses.point(frame, [-x, -y, -z]), *poses.point(frame, moment)])
 
     def _tool(self) -> Array:
         tool = _array(self._tool_link.entity_pose)
