@@ -176,8 +176,7 @@ class Runner:
             if leaf is not None and leaf.feedback_message.startswith("out of reach"):
                 reason = "out of reach"
             why = f"{leaf.name}: {leaf.feedback_message}" if leaf is not None else tree.feedback_message
-            unseen: dict[str, str] = getattr(pipeline.postprocess, "unseen", dict)()
-            if note := unseen.get(getattr(leaf, "actor", "")):
+            if note := pipeline.unseen().get(getattr(leaf, "actor", "")):
                 why = f"{why}; {note}"
         return Result(
             status=status,

@@ -7,24 +7,22 @@ import contextlib
 import numpy as np
 
 from bt_tasksim import poses
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Known, Seen
+from bt_tasksim.context import Seen
 from bt_tasksim.errors import InputError, NoWayError
-from bt_tasksim.motion import plan, sample
+from bt_tasksim.motion import plan
 from bt_tasksim.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Points, Position
 from bt_tasksim.planning import Carried, clear_path
 from bt_tasksim.poses import Array, array_namespace
-from bt_tasksim.world import Command, ObjectModel, PlaceModel
+from bt_tasksim.world import ObjectModel, PlaceModel
+from concept_nodes.carry import Carry, MoveMemory
 from concept_nodes.grasp import neutral_rotation, resting_place
-from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
-from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
-from concept_nodes.pick import MoveMemory, arrived, miss
+from concept_nodes.limits import FORCE_LIMIT
 
 LONG_TURN = 2.3
 """Radians of turn from which it matters which way round the hand goes."""
 
 
-class Bring(ConceptModel):
+class Bring(Carry):
     """Carry a held object to a place or a position (keeps free space: NC).
 
     The object ends ``hover`` above the place (above the rim of a bin), over the place's origin and with its
@@ -49,17 +47,14 @@ class Bring(ConceptModel):
     speed: MetresPerSecond = 0.5
     force_limit: Newtons = FORCE_LIMIT
 
-    maintains = (HOLDING,)
     default_timeout = 15.0
     default_tolerance = 0.01
 
     def initial_state(self, seen: Seen) -> str:
-        """The object must be in the hand."""
+        """The object must be in the hand, and one destination given."""
         if (self.to is None) == (self.position is None):
             raise InputError(f"leaf '{self.name}': give either 'to' or 'position'")
-        if not bool(holding(seen, self.target)):
-            return not_held(seen, self.target)
-        return ""
+        return super().initial_state(seen)
 
     def begin(self, seen: Seen) -> MoveMemory:
         """Find the way."""
@@ -78,40 +73,6 @@ class Bring(ConceptModel):
             carried = Carried(seen.robot.envelope, model.extent, poses.inverse(grip))
             way = self._way(seen, tool_goal, carried)
         return MoveMemory(plan(way, self.speed, blend=0.04))
-
-    def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
-        """Follow the path; the hand keeps its grip."""
-        return Command(tool=sample(memory.path, seen.elapsed))
-
-    def violated(self, seen: Seen, memory: MoveMemory) -> Array:
-        """The wrist is strained beyond the limit: the hand or the object presses against something."""
-        return strained(seen, self.force_limit)
-
-    def done(self, seen: Seen, memory: MoveMemory) -> Array:
-        """The tool has come to the end of the path."""
-        return arrived(seen, memory.path, self.tolerance)
-
-    def maintained(self, goal: str, seen: Seen, memory: MoveMemory) -> Array:
-        """The object is still in the hand."""
-        return holding(seen, self.target)
-
-    def necessary_cost(self, seen: Seen, memory: MoveMemory) -> Array:
-        """Distance of the tool from the end of the path, metres."""
-        return miss(seen, memory.path)
-
-    def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
-        """1 unless the object hangs in the hand, clear of everything else."""
-        free = ~known.supported(self.target) & (known.hand_force(self.target) > 0.2)
-        xp = array_namespace(known.hidden.objects)
-        return xp.where(xp.asarray(free), 0.0, 1.0)
-
-    def explain(self, seen: Seen, memory: MoveMemory) -> str:
-        """How far the tool still is from its goal, and the object from the tool."""
-        return (
-            f"tool {1000 * float(miss(seen, memory.path)):.0f} mm from its goal, "
-            f"{self.target} {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool, "
-            f"{float(force_at_wrist(seen)):.0f} N at the wrist"
-        )
 
     def _goal(self, seen: Seen, now: Array, model: ObjectModel) -> tuple[Array, Array]:
         """Pose of the object at the end, and the destination's origin that ``via`` refers to."""

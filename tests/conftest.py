@@ -43,6 +43,9 @@ class ToyWorld:
         self.held: str | None = None
         self.resets = 0
 
+    def unseen(self) -> dict[str, str]:
+        return {}
+
     def reset(self, configuration: Any, model: Any) -> Observation:
         self.robot, self.model = load_robot(configuration.robot), model
         self.steps.clear()

@@ -159,6 +159,11 @@ class EnginePipeline:
         """The physics state, in simulation."""
         return self.physics.hidden()
 
+    def unseen(self) -> dict[str, str]:
+        """Why perception has never seen an object, one sentence each, by the object's name."""
+        say: Any = getattr(self.postprocess, "unseen", dict)
+        return dict(say())
+
     def render(self, camera: str, *, depth: bool = False) -> Image:
         """A picture for a recording.
 

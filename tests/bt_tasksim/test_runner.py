@@ -12,7 +12,7 @@ from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import InputError, LeafError, UnreachableError
 from bt_tasksim.runner import Runner, failed_leaf
 from bt_tasksim.world import Command
-from concept_nodes import Wait
+from concept_nodes import Pick, Wait
 from trees import fallback, parallel, retry, sequence, timeout
 from trees.load import load_source
 
@@ -243,3 +243,11 @@ def test_the_tick_loop_resets_what_an_earlier_episode_left(toy, act):
     assert stage.context.now == 0.0 and stage.context.command == Command()
     result = finished(stage)
     assert result.control_steps == 5
+
+
+def test_what_was_never_seen_is_said(toy):
+    stage = toy(Pick("cup"))
+    stage.world.unseen = lambda: {"cup": "camera 'scene' shows 3 pixels of it"}
+    result = finished(stage)
+    assert result.status == Status.FAILURE
+    assert result.why.endswith("; camera 'scene' shows 3 pixels of it")

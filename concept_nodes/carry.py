@@ -1,0 +1,74 @@
+"""What pick and bring share: a held object is moved along a planned path."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from bt_tasksim import poses
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.context import Known, Seen
+from bt_tasksim.motion import Path, sample
+from bt_tasksim.poses import Array, array_namespace
+from bt_tasksim.world import Command
+from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
+from concept_nodes.limits import force_at_wrist, strained
+
+
+class MoveMemory(NamedTuple):
+    """A path that the tool follows."""
+
+    path: Path
+
+
+class Carry(ConceptModel):
+    """A task in which the held ``target`` is moved along a path that `begin` plans, and must stay held."""
+
+    target: str
+    force_limit: float
+
+    maintains = (HOLDING,)
+
+    def initial_state(self, seen: Seen) -> str:
+        """The object must be in the hand."""
+        if not bool(holding(seen, self.target)):
+            return not_held(seen, self.target)
+        return ""
+
+    def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
+        """Follow the path; the hand keeps its grip."""
+        return Command(tool=sample(memory.path, seen.elapsed))
+
+    def violated(self, seen: Seen, memory: MoveMemory) -> Array:
+        """The wrist is strained beyond the limit: the hand or the object presses against something."""
+        return strained(seen, self.force_limit)
+
+    def done(self, seen: Seen, memory: MoveMemory) -> Array:
+        """The tool has come to the end of the path."""
+        return (seen.elapsed >= memory.path.duration) & (miss(seen, memory.path) < self.tolerance)
+
+    def maintained(self, goal: str, seen: Seen, memory: MoveMemory) -> Array:
+        """The object is still in the hand."""
+        return holding(seen, self.target)
+
+    def necessary_cost(self, seen: Seen, memory: MoveMemory) -> Array:
+        """Distance of the tool from the end of the path, metres."""
+        return miss(seen, memory.path)
+
+    def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
+        """1 unless the object hangs in the hand, clear of everything else."""
+        free = ~known.supported(self.target) & (known.hand_force(self.target) > 0.2)
+        xp = array_namespace(known.hidden.objects)
+        return xp.where(xp.asarray(free), 0.0, 1.0)
+
+    def explain(self, seen: Seen, memory: MoveMemory) -> str:
+        """How far the tool still is from its goal, and the object from the tool."""
+        return (
+            f"tool {1000 * float(miss(seen, memory.path)):.0f} mm from its goal, "
+            f"{self.target} {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool, "
+            f"{float(force_at_wrist(seen)):.0f} N at the wrist"
+        )
+
+
+def miss(seen: Seen, path: Path) -> Array:
+    """Distance ``(...)`` in metres of the tool from the end of a path."""
+    return poses.norm(seen.tool[..., :3] - path.table[..., -1, :3])
