@@ -7,8 +7,8 @@ py_trees leaf that calls these functions once a tick with a batch of one.
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -17,12 +17,31 @@ from py_trees.common import Status
 from bt_tasksim.context import Context, Known, Seen
 from bt_tasksim.errors import InputError, NoWayError, nearest
 from bt_tasksim.parameters import Parameter, bind_arguments, declared_parameters
-from bt_tasksim.policy import Policy, resolve_policy
+from bt_tasksim.policy import Action, Policy, resolve_policy
 from bt_tasksim.poses import Array, array_namespace
+from bt_tasksim.robot import RobotDescription
 from bt_tasksim.world import Command
 
 LOST_TICKS = 3
 """Ticks in a row without a maintained goal after which it counts as lost (contacts flicker)."""
+VIOLATED = "limit violated"
+"""How the feedback message of a leaf begins that failed because it exceeded a limit."""
+TIMED_OUT = "not done within"
+"""How the feedback message of a leaf begins that ran into its own time-out."""
+
+
+class Decision(NamedTuple):
+    """What the tick of a leaf under training yields right before it acts: whoever trains it decides.
+
+    Attributes:
+        leaf: The leaf; its `ConceptNode.decide` takes the action before the tick goes on.
+        seen: What is seen.
+        memory: The leaf's memory.
+    """
+
+    leaf: ConceptNode
+    seen: Seen
+    memory: Any
 
 
 class ContextLeaf(Behaviour):
@@ -67,10 +86,13 @@ class ConceptNode(ContextLeaf, abc.ABC):
         super().__init__(name)
         self.memory: Any = None
         self.activations = 0
+        self.under_training = False
+        """The leaf's ticks are suspended before it acts, see `Decision`."""
         self._started = 0.0
         self._active = False
         self._lost = 0
         self._policy: Policy | None = None
+        self._decided: Action | None = None
 
     @property
     def policy_in_use(self) -> Policy:
@@ -79,22 +101,65 @@ class ConceptNode(ContextLeaf, abc.ABC):
             raise RuntimeError(f"leaf '{self.name}' was ticked before it was set up")
         return self._policy
 
+    @property
+    def model(self) -> ConceptModel:
+        """The concept's functions."""
+        return self._model
+
     def setup(self, **kwargs: Any) -> None:
         """Take the tree's context and resolve the policy."""
         super().setup(**kwargs)
-        model = self._model
-        self._policy = resolve_policy(model.policy, type(model).__name__.lower(), self.context.robot.name)
+        self._policy = resolve_policy(self._model, self.context.robot)
+
+    def use(self, policy: Policy) -> None:
+        """Let another policy decide, from now on and until the tree is set up again."""
+        self._policy = policy
+
+    def decide(self, action: Action) -> None:
+        """Take the action that the suspended tick waits for, see `Decision`."""
+        self._decided = action
 
     def initialise(self) -> None:
         """py_trees calls this when the leaf becomes active."""
         self._active = False
         self._lost = 0
+        self._decided = None
         self.activations += 1
+
+    def tick(self) -> Iterator[Behaviour]:
+        """One tick; under training it is suspended right before the leaf acts, by yielding a `Decision`."""
+        if not self.under_training:
+            yield from super().tick()
+            return
+        if self.status != Status.RUNNING:
+            self.initialise()
+        found = self._judge()
+        if isinstance(found, Seen):
+            model, memory = self._model, self.memory
+            if bool(model.decides(found, memory)):
+                yield Decision(self, found, memory)  # type: ignore[misc]  # not a behaviour, on purpose
+                if self._decided is None:
+                    raise RuntimeError(f"leaf '{self.name}' is under training and was given no action")
+                action, self._decided = self._decided, None
+            else:
+                action = Action(_zeros(found.tool, model.actions), np.False_)
+            found = self._act(action, found)
+        if found != Status.RUNNING:
+            self.stop(found)
+        self.status = found
+        yield self
 
     def update(self) -> Status:
         """One tick: judge, then act."""
-        model, context, policy = self._model, self._context, self._policy
-        if context is None or policy is None:
+        found = self._judge()
+        if not isinstance(found, Seen):
+            return found
+        return self._act(self.policy_in_use.act(self._model, found, self.memory), found)
+
+    def _judge(self) -> Seen | Status:
+        """What is seen, or FAILURE where the leaf cannot start or go on."""
+        model, context = self._model, self._context
+        if context is None or self._policy is None:
             raise RuntimeError(f"leaf '{self.name}' was ticked before it was set up")
         if context.refused is not None and context.refused[0] is self:
             return self._fail(f"out of reach: {context.refused[1]}")
@@ -113,7 +178,7 @@ class ConceptNode(ContextLeaf, abc.ABC):
             seen = context.seen(context.now - self._started)
         memory = self.memory
         if bool(model.violated(seen, memory)):
-            return self._fail(f"limit violated: {model.explain(seen, memory)}")
+            return self._fail(f"{VIOLATED}: {model.explain(seen, memory)}")
         for goal in model.maintains:
             if context.reached(goal, model.actor) and not bool(model.maintained(goal, seen, memory)):
                 self._lost += 1
@@ -125,7 +190,11 @@ class ConceptNode(ContextLeaf, abc.ABC):
                 break
         else:
             self._lost = 0
-        action = policy.act(model, seen, memory)
+        return seen
+
+    def _act(self, action: Action, seen: Seen) -> Status:
+        """Carry a decision out."""
+        model, memory, context = self._model, self.memory, self.context
         if bool(action.terminate):
             for goal in model.ends:
                 context.end(goal, model.actor)
@@ -134,11 +203,11 @@ class ConceptNode(ContextLeaf, abc.ABC):
             self.feedback_message = f"done after {seen.elapsed:.2f} s: {model.explain(seen, memory)}"
             return Status.SUCCESS
         if seen.elapsed > model.timeout:
-            return self._fail(f"not done within {model.timeout:g} s: {model.explain(seen, memory)}")
+            return self._fail(f"{TIMED_OUT} {model.timeout:g} s: {model.explain(seen, memory)}")
         context.write(model.command(action.motion, seen, memory), self)
         if model.looks(seen, memory):
             context.look = True
-        self.memory = model.advance(seen, memory)
+        self.memory = model.advance(action.motion, seen, memory)
         self.feedback_message = ""
         return Status.RUNNING
 
@@ -237,13 +306,22 @@ class ConceptModel(ConceptNode):
         """The memory at the first tick: start poses, planned paths. What cannot be batched happens here."""
         return None
 
-    def advance(self, seen: Seen, memory: Any) -> Any:
-        """The memory for the next tick."""
+    def advance(self, action: Array, seen: Seen, memory: Any) -> Any:
+        """The memory for the next tick, after the action ``(..., actions)``."""
         return memory
 
+    @classmethod
+    def layout(cls, robot: RobotDescription) -> Mapping[str, int]:
+        """Names and sizes of what `features` holds, in its order; none: the concept cannot be learned."""
+        return {}
+
     def features(self, seen: Seen, memory: Any) -> Array:
-        """What a learned policy sees: ``(..., n)``, from the declared observables only."""
+        """What a learned policy sees: ``(..., n)``, from the declared observables only, as in `layout`."""
         raise NotImplementedError(f"{type(self).__name__} declares no features: it cannot be learned")
+
+    def decides(self, seen: Seen, memory: Any) -> Array:
+        """Boolean ``(...)``: a learned policy is asked at this tick; else the reference motion goes on."""
+        return np.True_
 
     @abc.abstractmethod
     def command(self, action: Array, seen: Seen, memory: Any) -> Command:
@@ -270,7 +348,10 @@ class ConceptModel(ConceptNode):
         return np.True_
 
     def sufficient_cost(self, known: Known, memory: Any) -> Array:
-        """How far the hidden state is from the sufficient goal at the completion signal: ``(...)``."""
+        """How far the hidden state is from the sufficient goal at the completion signal: ``(...)``.
+
+        In units of what is tolerable: below 1 the goal is reached.
+        """
         return _zeros(known.hidden.tool_pose)
 
     def looks(self, seen: Seen, memory: Any) -> bool:

@@ -84,13 +84,20 @@ class Seen:
 
 
 class Known:
-    """The hidden state, with names resolved; batch dimensions ``(...)``."""
+    """The hidden state, with names resolved; batch dimensions ``(...)``.
 
-    __slots__ = ("hidden", "world")
+    Args:
+        hidden: The state now.
+        world: Names and calibrated facts.
+        began: The state when the concept became active; None where nobody kept it.
+    """
 
-    def __init__(self, hidden: Hidden, world: WorldModel) -> None:
+    __slots__ = ("began", "hidden", "world")
+
+    def __init__(self, hidden: Hidden, world: WorldModel, began: Hidden | None = None) -> None:
         self.hidden = hidden
         self.world = world
+        self.began = began
 
     def object(self, name: str) -> Array:
         """True pose ``(..., 7)`` of an object."""

@@ -60,6 +60,8 @@ def judge(configuration: ActorConfiguration, model: WorldModel, hidden: Hidden) 
         return Verdict(True, "", "no goal is set for this scene", math.nan, math.nan, depth)
     k = model.object_index(goal.object)
     place, thing = model.place(goal.place), model.object(goal.object)
+    if goal.relation == "lifted":
+        return _judge_lifted(configuration, goal, hidden, k)
     distance, angle, placed = _placement(goal, place, thing, hidden.objects[k])
     off = f"{1000 * distance:.0f} mm and {math.degrees(angle):.1f} degrees off"
 
@@ -90,6 +92,26 @@ def judge(configuration: ActorConfiguration, model: WorldModel, hidden: Hidden) 
     return end(
         "", f"{goal.object} {'is in' if goal.relation == 'inside' else 'stands on'} {goal.place}, {off}"
     )
+
+
+def _judge_lifted(configuration: ActorConfiguration, goal: Goal, hidden: Hidden, k: int) -> Verdict:
+    """The object hangs in the hand alone, as high as it should, and as upright as it stood."""
+    start, now = np.array(configuration.objects[k].pose), hidden.objects[k]
+    missing = goal.height - float(now[2] - start[2])
+    up = np.array([0.0, 0.0, 1.0])
+    cosine = float(poses.rotate(start[3:], up) @ poses.rotate(now[3:], up))
+    tilt, depth = math.acos(min(max(cosine, -1.0), 1.0)), float(hidden.penetration)
+    off = f"{1000 * missing:.0f} mm below and {math.degrees(tilt):.1f} degrees off"
+    reason, why = "", f"{goal.object} is held {1000 * goal.height:.0f} mm up, {off}"
+    if bool(np.any(hidden.support[k])) or float(hidden.hand_distance[k]) > TOUCHING:
+        reason, why = "not lifted", f"{goal.object} is not in the hand: {off}"
+    elif abs(missing) > goal.position_tolerance:
+        reason, why = "slipped", f"{goal.object} did not follow the hand: {off}"
+    elif tilt > goal.angle_tolerance:
+        reason, why = "tilted or turned", f"{goal.object} did not keep upright: {off}"
+    elif depth > DEEPEST:
+        reason, why = "penetration", f"two bodies overlapped by {1000 * depth:.1f} mm"
+    return Verdict(not reason, reason, why, abs(missing), tilt, depth)
 
 
 def at_rest(hidden: Hidden) -> bool:

@@ -156,12 +156,7 @@ class Runner:
                 tree.stop(Status.INVALID)
                 reason, why = "time over", f"not done within {self.longest:g} s"
                 break
-            try:
-                context.advance(pipeline.step(command, look=context.look))
-            except UnreachableError as error:  # the robot holds, and the leaf fails at its next tick
-                writer = context.tool_writer
-                context.advance(pipeline.step(Command()))
-                context.refused = (writer, str(error))
+            self.step(command)
             steps += 1
         status = tree.status
         sim_time = context.now
@@ -193,6 +188,20 @@ class Runner:
             },
             configuration=configuration,
         )
+
+    def step(self, command: Command) -> None:
+        """Carry a command out for one control period, and observe.
+
+        Where it is out of reach the robot holds, and the leaf that wrote it fails at its next tick.
+        """
+        context, pipeline = self.context, self.pipeline
+        assert pipeline is not None
+        try:
+            context.advance(pipeline.step(command, look=context.look))
+        except UnreachableError as error:
+            writer = context.tool_writer
+            context.advance(pipeline.step(Command()))
+            context.refused = (writer, str(error))
 
     def tick(self) -> Command:
         """Tick the tree once; returns the command that its leaves have written.

@@ -24,6 +24,9 @@ from bt_tasksim.world import ObjectModel, Obstacle, PlaceModel, WorldModel
 
 STREAMS = {"evaluation": 0, "training": 1, "validation": 2, "demonstration": 3}
 """Names of the independent streams of draws: the same seed gives unrelated draws in each."""
+_STRIPS = 10
+STRIPS = ("all", "even", "odd")
+"""Parts of a range from which draws are made, see `ObjectSpec`."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +44,12 @@ class ObjectSpec:
             of the mesh file.
         mass: Low and high, kg.
         friction: Low and high friction coefficient.
-        exponents: Low and high shape exponents ``(e1, e2)`` of a superellipsoid.
+        exponents: Low and high shape exponents ``(e1, e2)`` of a superellipsoid; or ``((e1, e2), (e1, e2))``
+            where the two have ranges of their own.
         mesh: Path of a mesh file, for kind ``mesh``.
+        strips: Which of the ten equal strips of each range of size and exponents are drawn from: ``all``,
+            ``even`` or ``odd`` ones. What is trained on even strips has never seen a value of an odd one.
+        size_error: Half width of the relative error with which the size is known beforehand.
     """
 
     kinds: tuple[str, ...]
@@ -53,10 +60,16 @@ class ObjectSpec:
     size: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     mass: tuple[float, float] = (0.08, 0.25)
     friction: tuple[float, float] = (0.4, 0.9)
-    exponents: tuple[float, float] = (0.2, 1.0)
+    exponents: tuple[float, float] | tuple[tuple[float, float], tuple[float, float]] = (0.2, 1.0)
     mesh: str | None = None
+    strips: str = "all"
+    size_error: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.strips not in STRIPS:
+            raise InputError(f"unknown strips '{self.strips}'{nearest(self.strips, STRIPS)}")
+        if not 0.0 <= self.size_error < 1.0:
+            raise InputError(f"'size_error' should be at least 0 and below 1, found {self.size_error:g}")
         for kind in self.kinds:
             if kind not in KINDS:
                 raise InputError(f"unknown kind of object '{kind}'{nearest(kind, KINDS)}")
@@ -90,10 +103,12 @@ class Goal:
     Attributes:
         object: Name of the object.
         place: Name of the place.
-        relation: ``stands`` (upright on the place's origin, with its heading up to the object's symmetry) or
-            ``inside`` (within the container, below its rim).
+        relation: ``stands`` (upright on the place's origin, with its heading up to the object's symmetry),
+            ``inside`` (within the container, below its rim) or ``lifted`` (held in the hand alone, ``height``
+            above where it stood on the place, and as upright).
         position_tolerance: Metres.
         angle_tolerance: Radians.
+        height: Metres, for ``lifted``.
     """
 
     object: str
@@ -101,6 +116,7 @@ class Goal:
     relation: str = "stands"
     position_tolerance: float = 0.03
     angle_tolerance: float = float(np.deg2rad(10.0))
+    height: float = 0.3
 
 
 @dataclass(frozen=True)
@@ -136,14 +152,21 @@ class ObjectActor:
     pose: tuple[float, ...]
     colour: tuple[float, float, float]
     mesh: str | None = None
+    known_size: tuple[float, float, float] | None = None
+    """The size it is taken to have; None where that is its true one."""
 
     def shape(self) -> Shape:
         """Its geometry."""
         return shape(self.kind, ShapeSize(self.size, self.exponents, self.mesh))
 
+    def known_shape(self) -> Shape:
+        """The geometry it is taken to have."""
+        return shape(self.kind, ShapeSize(self.known_size or self.size, self.exponents, self.mesh))
+
     def model(self) -> ObjectModel:
         """What is known about it beforehand."""
-        return object_model(self.name, self.kind, ShapeSize(self.size, self.exponents, self.mesh))
+        size = ShapeSize(self.known_size or self.size, self.exponents, self.mesh)
+        return object_model(self.name, self.kind, size)
 
 
 @dataclass(frozen=True)
@@ -353,12 +376,15 @@ def _draw_object(
     kind = spec.kinds[int(rng.integers(len(spec.kinds)))]
     entry = KINDS[kind]
     low, high = spec.size or size_range(kind, spec.mesh)
-    size = tuple(float(v) for v in rng.uniform(low, high))
+    size = _draw_in(low, high, spec.strips, rng)
     if entry.round:
         size = (size[0], size[0], size[2])
     if entry.cubic_range and spec.size is None:
         size = (size[0],) * 3
-    exponents = tuple(float(v) for v in rng.uniform(*spec.exponents, 2))
+    e_low, e_high = (np.broadcast_to(np.array(v, float), 2) for v in spec.exponents)
+    if isinstance(spec.exponents[0], tuple):
+        e_low, e_high = np.array(spec.exponents, float).T
+    exponents = _draw_in(e_low, e_high, spec.strips, rng)
     geometry = ShapeSize((size[0], size[1], size[2]), (exponents[0], exponents[1]), spec.mesh)
     mass, friction = float(rng.uniform(*spec.mass)), float(rng.uniform(*spec.friction))
     place = places[spec.on]
@@ -384,6 +410,7 @@ def _draw_object(
     taken = {o.colour for o in others}
     colours = [c for c in entry.colours if c not in taken] or entry.colours
     colour = colours[int(rng.integers(len(colours)))]
+    known_size = _known_size(size, entry, spec, rng)
     return ObjectActor(
         name=name,
         kind=kind,
@@ -394,7 +421,31 @@ def _draw_object(
         pose=tuple(float(v) for v in pose),
         colour=colour,
         mesh=spec.mesh,
+        known_size=known_size,
     )
+
+
+def _draw_in(low: Any, high: Any, strips: str, rng: np.random.Generator) -> tuple[float, ...]:
+    """Uniform draws from ranges, or from every other one of ten strips of them."""
+    if strips == "all":
+        return tuple(float(v) for v in rng.uniform(low, high))
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    u = rng.uniform(0.0, 1.0, low.shape) * (_STRIPS / 2)
+    k = np.floor(u)
+    share = (2 * k + (strips == "odd") + (u - k)) / _STRIPS
+    return tuple(float(v) for v in low + share * (high - low))
+
+
+def _known_size(
+    size: tuple[float, ...], entry: Any, spec: ObjectSpec, rng: np.random.Generator
+) -> tuple[float, float, float] | None:
+    """The size with a relative error, the same along x and y for what is round."""
+    if spec.size_error == 0.0:
+        return None
+    x, y, z = (1.0 + rng.uniform(-1.0, 1.0, 3) * spec.size_error).tolist()
+    if entry.round:
+        y = x
+    return size[0] * x, size[1] * y, size[2] * z
 
 
 def _draw_disturbance(name: str, rng: np.random.Generator) -> Disturbance:

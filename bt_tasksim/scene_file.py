@@ -23,8 +23,8 @@ _OBJECT = (
     "kind", "on", "at", "area", "heading", "size", "mass", "friction", "exponents", "mesh", "scale",
 )  # fmt: skip
 _SPOT = ("name", "on", "at", "area", "extent", "heading")
-_GOAL = ("object", "place", "relation", "position_tolerance", "angle_tolerance")
-_RELATIONS = ("stands", "inside")
+_GOAL = ("object", "place", "relation", "position_tolerance", "angle_tolerance", "height")
+_RELATIONS = ("stands", "inside", "lifted")
 _MASS = (0.001, 20.0)
 _FRICTION = (0.01, 2.0)
 _DENSEST = 20000.0

@@ -10,11 +10,15 @@ import numpy as np
 from bt_tasksim import poses
 from bt_tasksim.concept import ConceptModel
 from bt_tasksim.context import Known, Seen
-from bt_tasksim.motion import Path, plan, sample
-from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, ObjectName, Ratio
+from bt_tasksim.motion import Path, minimum_jerk, plan, sample
+from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, Ratio
 from bt_tasksim.poses import Array, array_namespace
+from bt_tasksim.robot import RobotDescription
 from bt_tasksim.world import Command, ObjectModel, PlaceModel
+from concept_nodes import grasp_features
+from concept_nodes.grasp_features import CLOSE
 from concept_nodes.holding import HOLDING, tool_distance
+from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 
 SETTLED = 3
 """Ticks for which opposing contacts and a still hand must be seen."""
@@ -26,24 +30,47 @@ class GraspMemory(NamedTuple):
 
     Attributes:
         path: Tool path to the grasp pose.
+        begins: Seconds after which the straight approach begins, and with it what is decided by a policy.
+        goal: Grasp pose ``(..., 7)`` of the reference motion.
+        offset: Offsets ``(..., 5)`` from the reference motion, see `grasp_features.SCALE`.
+        target: Tool pose ``(..., 7)`` that was last commanded.
         closing: Seconds since the hand began to close; negative before.
         closure: Closure at the previous tick.
         settled: Ticks in a row with opposing contacts and a still hand.
         preshape: Closure at which the hand comes.
+        touched: Which fingertips ``(..., n_tips)`` have touched anything since the approach began, 0 or 1.
+        first: How far before the grasp pose the tool was at the first contact, metres; 0 without one.
+        estimate: What the estimate says ``(..., 4)``: height of the grasp pose and of the object's centre
+            above what it stands on, the centre beyond the grasp pose along the approach (units of 50 mm), and
+            the cosine between the approach and straight down onto the support.
+        start: Estimated position ``(..., 3)`` of the object at the start.
     """
 
     path: Path
+    begins: Array
+    goal: Array
+    offset: Array
+    target: Array
     closing: Array
     closure: Array
     settled: Array
     preshape: Array
+    touched: Array
+    first: Array
+    estimate: Array
+    start: Array
 
 
 class Grasp(ConceptModel):
     """Grasp an object (makes the hand's contacts; the object's own contact with its support is kept).
 
     The tool comes to a pose above the object (against ``approach``), straight on to the grasp pose, and the
-    hand closes along ``closing``. Done when opposing fingertips have contact and the hand has come to rest.
+    hand closes along ``closing``. As a task model it is done when opposing fingertips have contact and the hand
+    has come to rest.
+
+    As a concept model it does not know the object's shape, mass, friction and true position, and its size only
+    as perception tells it. A learned policy moves the tool from this reference motion, says how far to close,
+    and when it is enough; what it looks at stands in `grasp_features`.
 
     Args:
         target: The object.
@@ -54,6 +81,7 @@ class Grasp(ConceptModel):
         standoff: How far before the grasp pose the straight approach begins.
         speed: Peak speed of the tool.
         grip: Closure that is commanded when closing; 1 presses as hard as the hand's drives may.
+        force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
@@ -62,10 +90,13 @@ class Grasp(ConceptModel):
     standoff: Metres = 0.10
     speed: MetresPerSecond = 0.5
     grip: Ratio = 1.0
+    force_limit: Newtons = FORCE_LIMIT
 
     reaches = (HOLDING,)
     default_timeout = 12.0
-    observables = ("hand_position", "contacts", "tool_pose", "objects", "time")
+    is_task_model = False
+    actions = len(grasp_features.ACTIONS)
+    observables = ("hand_position", "closure", "contacts", "tool_pose", "objects", "time")
 
     def initial_state(self, seen: Seen) -> str:
         """The object must be seen and fit into the hand."""
@@ -82,21 +113,65 @@ class Grasp(ConceptModel):
     def begin(self, seen: Seen) -> GraspMemory:
         """Choose the grasp pose and plan the way to it."""
         goal = grasp_pose(seen, self.target, self.approach, self.closing)
+        approach = poses.rotate(goal[3:], np.array([0.0, 0.0, 1.0]))
         back = goal.copy()
-        back[:3] -= self.standoff * poses.rotate(goal[3:], np.array([0.0, 0.0, 1.0]))
+        back[:3] -= self.standoff * approach
         path = plan([*_way_out(seen, back), back, goal], self.speed, blend=0.03)
-        return GraspMemory(path, np.float64(-1.0), seen.closure, np.int64(0), np.float64(0.0))
+        return GraspMemory(
+            path=path,
+            begins=_approach_begins(path, self.standoff),
+            goal=goal,
+            offset=np.zeros(self.actions),
+            target=seen.tool,
+            closing=np.float64(-1.0),
+            closure=seen.closure,
+            settled=np.int64(0),
+            preshape=np.float64(0.0),
+            touched=np.zeros(len(seen.robot.tips)),
+            first=np.float64(0.0),
+            estimate=self._estimate(seen, goal, approach),
+            start=seen.object(self.target)[:3],
+        )
+
+    def _estimate(self, seen: Seen, goal: Array, approach: Array) -> Array:
+        centre, place = seen.object(self.target)[:3], resting_place(seen, self.target)
+        beyond = float((centre - goal[:3]) @ approach)
+        if place is None:
+            return np.array([0.0, 0.0, beyond / 0.05, 0.0])
+        up = poses.rotate(place.pose[3:], np.array([0.0, 0.0, 1.0]))
+        heights = [float((p - place.pose[:3]) @ up) / 0.05 for p in (goal[:3], centre)]
+        return np.array([*heights, beyond / 0.05, -float(up @ approach)])
+
+    @classmethod
+    def layout(cls, robot: RobotDescription) -> dict[str, int]:
+        """See `grasp_features.layout`."""
+        return grasp_features.layout(robot)
+
+    def features(self, seen: Seen, memory: GraspMemory) -> Array:
+        """See `grasp_features.features`."""
+        return grasp_features.features(seen, memory)
+
+    def decides(self, seen: Seen, memory: GraspMemory) -> Array:
+        """From the beginning of the straight approach."""
+        return seen.elapsed >= memory.begins
 
     def command(self, action: Array, seen: Seen, memory: GraspMemory) -> Command:
-        """Follow the path with the hand open, then close."""
+        """Follow the path with the hand open, then close; both moved by the action's offsets."""
         xp = array_namespace(memory.closing)
-        closing = xp.where(memory.closing >= 0.0, self.grip, memory.preshape)
-        return Command(tool=sample(memory.path, seen.elapsed), hand=xp.asarray(closing)[..., None])
+        offset = grasp_features.moved_offset(action, memory, seen.world.control_period)
+        closing = xp.where(memory.closing >= 0.0, self.grip, memory.preshape) + offset[..., CLOSE]
+        return Command(
+            tool=grasp_features.displaced(sample(memory.path, seen.elapsed), offset),
+            hand=xp.clip(closing, 0.0, 1.0)[..., None],
+        )
 
-    def advance(self, seen: Seen, memory: GraspMemory) -> GraspMemory:
+    def advance(self, action: Array, seen: Seen, memory: GraspMemory) -> GraspMemory:
         """Begin to close when the tool has arrived; count the ticks at which the hand holds still."""
         xp = array_namespace(seen.tool)
-        arrived = (seen.elapsed >= memory.path.duration) & (self._miss(seen, memory) < self.tolerance)
+        offset = grasp_features.moved_offset(action, memory, seen.world.control_period)
+        target = grasp_features.displaced(sample(memory.path, seen.elapsed), offset)
+        gap = poses.norm(seen.tool[..., :3] - target[..., :3])
+        arrived = (seen.elapsed >= memory.path.duration) & (gap < self.tolerance)
         late = seen.elapsed >= memory.path.duration + 1.0
         begun = memory.closing >= 0.0
         closing = xp.where(
@@ -104,8 +179,17 @@ class Grasp(ConceptModel):
         )
         still = xp.abs(seen.closure - memory.closure) < 0.01
         good = seen.opposed() & still & begun
+        touched = xp.where(seen.contacts, 1.0, memory.touched)
+        along = poses.transform(poses.inverse(memory.goal), seen.tool[..., :3])[..., 2]
+        fresh = (xp.max(touched, axis=-1) > 0.0) & (xp.max(memory.touched, axis=-1) == 0.0)
         return memory._replace(
-            closing=closing, closure=seen.closure, settled=xp.where(good, memory.settled + 1, 0)
+            offset=offset,
+            target=target,
+            closing=closing,
+            closure=seen.closure,
+            settled=xp.where(good, memory.settled + 1, 0),
+            touched=touched,
+            first=xp.where(fresh, along, memory.first),
         )
 
     def done(self, seen: Seen, memory: GraspMemory) -> Array:
@@ -113,14 +197,21 @@ class Grasp(ConceptModel):
         return memory.settled >= SETTLED
 
     def violated(self, seen: Seen, memory: GraspMemory) -> Array:
-        """The hand has closed on nothing."""
-        return (memory.closing > 0.8) & (seen.closure > 0.97 * self.grip)
+        """The hand has closed on nothing, or presses against something."""
+        empty = (memory.closing > 0.8) & (seen.closure > 0.97 * self.grip)
+        return empty | strained(seen, self.force_limit)
 
     def necessary_cost(self, seen: Seen, memory: GraspMemory) -> Array:
-        """Mean distance of the fingertips to where they would touch the object, metres."""
+        """How far the hand is from holding the object where it stands, from 0 on.
+
+        The mean distance of the fingertips to where they would touch the object, over 0.1 m; 0.3 while
+        opposing fingertips have no contact; and how far the object was pushed, over 0.05 m.
+        """
         gap = seen.observation.tips - seen.observation.contact_points
         xp = array_namespace(gap)
-        return xp.mean(xp.sqrt(xp.sum(gap * gap, axis=-1)), axis=-1)
+        distance = xp.mean(xp.sqrt(xp.sum(gap * gap, axis=-1)), axis=-1)
+        pushed = poses.norm(seen.object(self.target)[..., :3] - memory.start)
+        return distance / 0.1 + xp.where(seen.opposed(), 0.0, 0.3) + pushed / 0.05
 
     def sufficient_cost(self, known: Known, memory: GraspMemory) -> Array:
         """1 unless the hand presses on the object."""
@@ -134,12 +225,18 @@ class Grasp(ConceptModel):
         return (
             f"hand {100 * float(seen.closure):.0f} % closed, "
             f"{'contact at ' + ', '.join(touching) if touching else 'no contact'}, "
-            f"tool {1000 * float(tool_distance(seen, self.target)):.0f} mm from {self.target}"
+            f"tool {1000 * float(tool_distance(seen, self.target)):.0f} mm from {self.target}, "
+            f"{float(force_at_wrist(seen)):.0f} N at the wrist"
         )
 
-    def _miss(self, seen: Seen, memory: GraspMemory) -> Array:
-        gap = seen.tool[..., :3] - memory.path.table[..., -1, :3]
-        return poses.norm(gap)
+
+def _approach_begins(path: Path, standoff: float) -> Array:
+    """Seconds after which no more than ``standoff`` metres are left of a path."""
+    left = np.linalg.norm(path.table[:, :3] - path.table[-1, :3], axis=-1)
+    inside = np.flatnonzero(left > standoff)
+    fraction = 0.0 if len(inside) == 0 else (inside[-1] + 1) / (len(path.table) - 1)
+    times = np.linspace(0.0, 1.0, 101)
+    return np.float64(np.interp(fraction, minimum_jerk(times), times) * float(path.duration))
 
 
 def resting_place(seen: Seen, target: str) -> PlaceModel | None:

@@ -90,7 +90,7 @@ class Place(ConceptModel):
         """Follow the path, and stop on it as long as the support is felt; the hand keeps its grip."""
         return Command(tool=sample(memory.path, self._progress(seen, memory)))
 
-    def advance(self, seen: Seen, memory: PlaceMemory) -> PlaceMemory:
+    def advance(self, action: Array, seen: Seen, memory: PlaceMemory) -> PlaceMemory:
         """Count the ticks at which the support is felt."""
         xp = array_namespace(seen.tool)
         felt = xp.where(self._supported(seen, memory), memory.felt + 1, 0)

@@ -70,7 +70,7 @@ class Release(ConceptModel):
             hand=xp.asarray(memory.start * share)[..., None],
         )
 
-    def advance(self, seen: Seen, memory: ReleaseMemory) -> ReleaseMemory:
+    def advance(self, action: Array, seen: Seen, memory: ReleaseMemory) -> ReleaseMemory:
         """Notice when the hand is open."""
         xp = array_namespace(seen.tool)
         period = seen.world.control_period

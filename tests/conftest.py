@@ -138,7 +138,7 @@ class Act(ConceptModel):
     def begin(self, seen: Seen) -> Any:
         return 0
 
-    def advance(self, seen: Seen, memory: Any) -> Any:
+    def advance(self, action: Any, seen: Seen, memory: Any) -> Any:
         return memory + 1
 
     def command(self, action: Any, seen: Seen, memory: Any) -> Command:

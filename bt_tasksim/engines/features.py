@@ -29,7 +29,7 @@ class ObservationBuilder:
         self._robot = robot
         self._n_arm = len(robot.arm_joints)
         self._limit = robot.hand_drive.force_limit * robot.hand_drive_scale
-        self._shapes = [actor.shape() for actor in configuration.objects]
+        self._shapes = [actor.known_shape() for actor in configuration.objects]
         self._before: _Instant | None = None
 
     def build(self, state: WorldState, estimate: Array) -> Observation:

@@ -1,0 +1,108 @@
+"""The function of a learned policy: a multilayer perceptron, in NumPy alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from bt_tasksim.errors import InputError
+from bt_tasksim.poses import Array, array_namespace, constant
+
+CLIP = 10.0
+"""Standard deviations beyond which a normalised feature is cut off."""
+_DEVIATION_FLOOR = 1e-3
+
+
+class Network:
+    """Normalises its input, and runs it through hidden layers of tanh and a linear one.
+
+    Args:
+        mean: Means ``(n,)`` of the features.
+        deviation: Their standard deviations ``(n,)``.
+        layers: Weights ``(out, in)`` and biases ``(out,)``, in order.
+
+    Raises:
+        InputError: The shapes do not fit together, or a number is not finite.
+    """
+
+    def __init__(self, mean: Array, deviation: Array, layers: Sequence[tuple[Array, Array]]) -> None:
+        as_float = [np.ascontiguousarray(a, np.float32) for a in (mean, deviation)]
+        self.mean, self.deviation = as_float
+        self.layers = tuple(
+            (np.ascontiguousarray(w, np.float32), np.ascontiguousarray(b, np.float32)) for w, b in layers
+        )
+        self._check()
+        self._scale = 1.0 / np.maximum(self.deviation, np.float32(_DEVIATION_FLOOR))
+
+    @property
+    def inputs(self) -> int:
+        """Number of features."""
+        return int(self.mean.shape[0])
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs."""
+        return int(self.layers[-1][1].shape[0])
+
+    def normalise(self, features: Array) -> Array:
+        """Features ``(..., n)`` as the first layer sees them."""
+        if isinstance(features, np.ndarray):
+            return np.clip((features.astype(np.float32) - self.mean) * self._scale, -CLIP, CLIP)
+        xp = array_namespace(features)
+        x = xp.astype(features, xp.float32)
+        return xp.clip((x - constant(self.mean, x)) * constant(self._scale, x), -CLIP, CLIP)
+
+    def __call__(self, features: Array) -> Array:
+        """Outputs ``(..., m)`` for features ``(..., n)``, in the library of the features."""
+        x = self.normalise(features)
+        last = len(self.layers) - 1
+        if isinstance(x, np.ndarray):
+            for k, (w, b) in enumerate(self.layers):
+                x = x @ w.T + b
+                if k < last:
+                    x = np.tanh(x)
+            return x
+        xp = array_namespace(x)
+        for k, (w, b) in enumerate(self.layers):
+            x = x @ xp.matrix_transpose(constant(w, x)) + constant(b, x)
+            if k < last:
+                x = xp.tanh(x)
+        return x
+
+    def arrays(self) -> dict[str, Array]:
+        """Everything by name, for a file."""
+        out = {"mean": self.mean, "deviation": self.deviation}
+        for k, (w, b) in enumerate(self.layers):
+            out[f"layer{k}.weight"], out[f"layer{k}.bias"] = w, b
+        return out
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Array]) -> Network:
+        """The network that `arrays` was taken of.
+
+        Raises:
+            InputError: An array is missing, is one too many, or does not fit.
+        """
+        count = sum(1 for name in arrays if name.endswith(".weight"))
+        names = {"mean", "deviation"} | {
+            f"layer{k}.{part}" for k in range(count) for part in ("weight", "bias")
+        }
+        if count == 0 or set(arrays) != names:
+            wrong = sorted(set(arrays) ^ names) or ["layer0.weight"]
+            raise InputError(f"a network's arrays do not fit together, such as '{wrong[0]}'")
+        layers = [(arrays[f"layer{k}.weight"], arrays[f"layer{k}.bias"]) for k in range(count)]
+        return cls(arrays["mean"], arrays["deviation"], layers)
+
+    def _check(self) -> None:
+        if not self.layers:
+            raise InputError("a network needs at least one layer")
+        n = self.mean.shape[0] if self.mean.ndim == 1 else -1
+        if self.deviation.shape != (n,):
+            raise InputError(f"a network's mean {self.mean.shape} and deviation {self.deviation.shape} differ")
+        for k, (w, b) in enumerate(self.layers):
+            if w.ndim != 2 or w.shape[1] != n or b.shape != (w.shape[0],):
+                raise InputError(f"a network's layer {k} has weights {w.shape} after {n} inputs, bias {b.shape}")
+            n = w.shape[0]
+        if not all(np.isfinite(a).all() for a in self.arrays().values()):
+            raise InputError("a network holds a number that is not finite")

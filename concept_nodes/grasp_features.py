@@ -1,0 +1,92 @@
+"""What a learned grasp looks at, and how its actions change the reference motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bt_tasksim import poses
+from bt_tasksim.context import Seen
+from bt_tasksim.poses import Array, array_namespace, constant
+from bt_tasksim.robot import RobotDescription
+
+if TYPE_CHECKING:
+    from concept_nodes.grasp import GraspMemory
+
+SIDE, ACROSS, ALONG, TURN, CLOSE = range(5)
+ACTIONS = ("aside", "across the fingers", "along the approach", "turn about the approach", "close")
+SCALE = (0.015, 0.025, 0.035, 0.25, 0.5)
+"""Largest offsets: metres along the tool's x (aside), y (the fingers' closing axis) and z (the approach),
+radians about z, and of the hand's closure. Source of their order: the released original's grasp training,
+which has 0.03 m, 0.01 m and 0.35 rad; the sides are wider here for estimates that are 8 mm off."""
+RATE = (0.004, 0.005, 0.006, 0.04, 0.15)
+"""Largest change of these offsets within a control period of 50 ms: exploring actions do not shake the arm."""
+PERIOD = 0.05
+"""Seconds that `RATE` refers to."""
+
+
+def layout(robot: RobotDescription) -> dict[str, int]:
+    """Names and sizes of the features for a robot."""
+    n_hand, n_tips = len(robot.hand_joints), len(robot.tips)
+    return {
+        "tool from grasp pose": 4,
+        "tool behind its target": 3,
+        "offsets": 5,
+        "hand joints": n_hand,
+        "closing speed": 1,
+        "contacts": n_tips,
+        "contacts so far": n_tips,
+        "first contact along the approach": 1,
+        "time": 3,
+        "estimate": 4,
+    }
+
+
+def features(seen: Seen, memory: GraspMemory) -> Array:
+    """The features ``(..., n)``, all of the order of one."""
+    xp = array_namespace(seen.tool)
+    local = poses.multiply(poses.inverse(memory.goal), seen.tool)
+    turn = poses.rotation_vector(local[..., 3:])[..., 2:]
+    behind = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])
+    robot = seen.robot
+    opened, span = constant(robot.hand_open, seen.tool), constant(_span(robot), seen.tool)
+    joints = (seen.observation.hand_position - opened) / span
+    arrived = seen.elapsed - memory.path.duration
+    parts = [
+        local[..., :3] / 0.03,
+        turn / 0.2,
+        behind / 0.01,
+        memory.offset / constant(SCALE, seen.tool),
+        joints,
+        ((seen.closure - memory.closure) / 0.1)[..., None],
+        xp.astype(seen.contacts, seen.tool.dtype),
+        memory.touched,
+        (memory.first / 0.03)[..., None],
+        (xp.clip(arrived, -1.0, 2.0))[..., None],
+        (xp.clip(memory.closing, -0.1, 2.0))[..., None],
+        (xp.clip(xp.astype(memory.settled, seen.tool.dtype), 0.0, 6.0) / 3.0)[..., None],
+        memory.estimate,
+    ]
+    return xp.concat([xp.astype(p, seen.tool.dtype) for p in parts], axis=-1)
+
+
+def moved_offset(action: Array, memory: GraspMemory, period: float) -> Array:
+    """The offsets ``(..., 5)`` one control period on: towards the action, no faster than `RATE`."""
+    xp = array_namespace(action, memory.offset)
+    wanted = xp.clip(action, -1.0, 1.0) * constant(SCALE, memory.offset)
+    step = constant(RATE, memory.offset) * (period / PERIOD)
+    return memory.offset + xp.clip(wanted - memory.offset, -step, step)
+
+
+def displaced(reference: Array, offset: Array) -> Array:
+    """Tool poses ``(..., 7)`` on the reference motion, moved by offsets ``(..., 5)`` in the tool's frame."""
+    xp = array_namespace(reference)
+    half = offset[..., TURN] / 2
+    zero = xp.zeros_like(half)
+    turn = xp.stack([xp.cos(half), zero, zero, xp.sin(half)], axis=-1)
+    return poses.multiply(reference, xp.concat([offset[..., :3], turn], axis=-1))
+
+
+def _span(robot: RobotDescription) -> Array:
+    """Range of each hand joint ``(n_hand,)``; 1 where it does not move."""
+    span = robot.hand_closed - robot.hand_open
+    return span + (span == 0.0)
