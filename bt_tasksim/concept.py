@@ -17,7 +17,7 @@ from py_trees.common import Status
 from bt_tasksim.context import Context, Known, Seen
 from bt_tasksim.errors import InputError, NoWayError, nearest
 from bt_tasksim.parameters import Parameter, bind_arguments, declared_parameters
-from bt_tasksim.policy import Action, Policy, resolve_policy
+from bt_tasksim.policy import PROGRAMMED, Action, Policy, resolve_policy
 from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.world import Command
@@ -86,6 +86,8 @@ class ConceptNode(ContextLeaf, abc.ABC):
         super().__init__(name)
         self.memory: Any = None
         self.activations = 0
+        self.lacks_policy = False
+        """It has no policy: it is not programmed, and nothing was learned yet."""
         self.under_training = False
         """The leaf's ticks are suspended before it acts, see `Decision`."""
         self._started = 0.0
@@ -97,6 +99,12 @@ class ConceptNode(ContextLeaf, abc.ABC):
     @property
     def policy_in_use(self) -> Policy:
         """The policy that decides; resolved when the tree is set up."""
+        if self.lacks_policy:
+            concept = type(self).__name__
+            raise InputError(
+                f"leaf '{self.name}' has no policy yet: {concept} is not programmed, and none is pinned for "
+                f"robot '{self.context.robot.name}'; train one, or name one with policy=..."
+            )
         if self._policy is None:
             raise RuntimeError(f"leaf '{self.name}' was ticked before it was set up")
         return self._policy
@@ -109,7 +117,16 @@ class ConceptNode(ContextLeaf, abc.ABC):
     def setup(self, **kwargs: Any) -> None:
         """Take the tree's context and resolve the policy."""
         super().setup(**kwargs)
-        self._policy = resolve_policy(self._model, self.context.robot)
+        model = self._model
+        self.lacks_policy = False
+        try:
+            self._policy = resolve_policy(model, self.context.robot)
+        except InputError:
+            if not self.under_training and model.is_programmed:
+                raise
+            self._policy = None
+        if not model.is_programmed and (self._policy is None or self._policy.name == PROGRAMMED):
+            self.lacks_policy, self._policy = True, None
 
     def use(self, policy: Policy) -> None:
         """Let another policy decide, from now on and until the tree is set up again."""
@@ -159,7 +176,7 @@ class ConceptNode(ContextLeaf, abc.ABC):
     def _judge(self) -> Seen | Status:
         """What is seen, or FAILURE where the leaf cannot start or go on."""
         model, context = self._model, self._context
-        if context is None or self._policy is None:
+        if context is None:
             raise RuntimeError(f"leaf '{self.name}' was ticked before it was set up")
         if context.refused is not None and context.refused[0] is self:
             return self._fail(f"out of reach: {context.refused[1]}")
@@ -257,6 +274,8 @@ class ConceptModel(ConceptNode):
     """Metres."""
     is_task_model: ClassVar[bool] = True
     """Nothing is unknown: the programmed policy is the last word."""
+    is_programmed: ClassVar[bool] = True
+    """It has a programmed policy; else a leaf of it needs a learned one."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         concept = type(self).__name__

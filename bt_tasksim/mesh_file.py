@@ -62,7 +62,7 @@ def mesh_shape(path: str, size: tuple[float, float, float]) -> Shape:
             UserWarning,
             stacklevel=2,
         )
-    return Shape(size, tuple(pieces), lambda: visual, mass, _box_surface(size))
+    return Shape(size, tuple(pieces), lambda: visual, lambda: mass, _box_surface(size))
 
 
 def check_size(what: str, size: tuple[float, float, float]) -> None:

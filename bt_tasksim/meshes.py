@@ -6,6 +6,7 @@ Faces are counter-clockwise seen from outside. Everything is NumPy alone and in 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -136,6 +137,7 @@ def cup(radius: float, height: float, wall: float, base: float, segments: int = 
     return loft(circle(segments), np.array(profile))
 
 
+@lru_cache(maxsize=8)
 def cube_sphere(n: int) -> TriangleMesh:
     """A cube whose faces are divided ``n`` by ``n``: vertices ``(6 n^2 + 2, 3)`` of largest coordinate 1."""
     grid = np.tan(np.linspace(-1, 1, n + 1) * np.pi / 4)

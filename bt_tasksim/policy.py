@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from bt_tasksim.errors import InputError
 from bt_tasksim.network import Network
+from bt_tasksim.policy_files import check_fits, load_policy
+from bt_tasksim.policy_library import PROGRAMMED, find_policy, folder_of_pinned, source_of
 from bt_tasksim.poses import Array, array_namespace
 
 if TYPE_CHECKING:
@@ -13,7 +15,6 @@ if TYPE_CHECKING:
     from bt_tasksim.context import Seen
     from bt_tasksim.robot import RobotDescription
 
-PROGRAMMED = "programmed"
 TERMINATE = 0.5
 """Output of a learned policy above which it says that the task is done."""
 
@@ -45,6 +46,7 @@ class ProgrammedPolicy:
     """The concept's own programmed action, done when its own goal state is observed."""
 
     name = PROGRAMMED
+    source = PROGRAMMED
 
     def act(self, model: ConceptModel, seen: Seen, memory: Any) -> Action:
         """See `Policy.act`."""
@@ -57,11 +59,13 @@ class LearnedPolicy:
     Args:
         network: From features to outputs.
         name: How results name it.
+        source: What a leaf names to get it again.
     """
 
-    def __init__(self, network: Network, name: str) -> None:
+    def __init__(self, network: Network, name: str, source: str = "") -> None:
         self.network = network
         self.name = name
+        self.source = source
 
     def act(self, model: ConceptModel, seen: Seen, memory: Any) -> Action:
         """See `Policy.act`; where the concept takes no decision, its reference motion goes on."""
@@ -84,12 +88,29 @@ def split_action(output: Array) -> Action:
 
 
 def resolve_policy(model: ConceptModel, robot: RobotDescription) -> Policy:
-    """The policy that a leaf names, or the one pinned for its concept and robot.
+    """The policy that a leaf names, or the one pinned for its concept and robot, or the programmed one.
+
+    A name is ``programmed``, a policy of ``assets/policies``, or the path of a policy's folder.
+
+    Args:
+        model: The leaf.
+        robot: The robot that it runs on.
 
     Raises:
-        InputError: There is no such policy.
+        InputError: There is no such policy, it is damaged, or it is none for this concept and robot.
     """
-    if model.policy in (None, "", PROGRAMMED):
-        return ProgrammedPolicy()
-    concept = type(model).__name__.lower()
-    raise InputError(f"concept '{concept}' on robot '{robot.name}': no policy '{model.policy}'")
+    try:
+        concept = concept_name(type(model))
+        folder = find_policy(model.policy) if model.policy else folder_of_pinned(concept, robot.name)
+        if folder is None:
+            return ProgrammedPolicy()
+        network, card = load_policy(folder)
+        check_fits(card, folder, concept, robot.name, type(model).layout(robot), model.actions)
+    except InputError as error:
+        raise InputError(f"leaf '{model.name}': {error}") from error
+    return LearnedPolicy(network, f"{folder.resolve().name}@{card.hash}", source_of(folder))
+
+
+def concept_name(concept: type[ConceptModel]) -> str:
+    """How cards, pins and the command line name a concept."""
+    return concept.__name__.lower()

@@ -71,6 +71,13 @@ def constant(value: Any, like: Array) -> Array:
     return array_namespace(like).asarray(value, dtype=like.dtype, device=like.device)
 
 
+def clip(x: Array, low: Any, high: Any) -> Array:
+    """``x (...)`` between bounds that broadcast against it."""
+    if isinstance(x, _NUMPY):
+        return np.minimum(np.maximum(x, low), high)
+    return array_namespace(x).clip(x, constant(low, x), constant(high, x))
+
+
 def quat_multiply(a: Array, b: Array) -> Array:
     """Hamilton product ``a * b`` of quaternions ``(..., 4)``."""
     if _single(a) and _single(b):

@@ -8,6 +8,7 @@ the installed mani_skill package (``mani_skill:robots/...``); on a robot compute
 from __future__ import annotations
 
 import importlib.util
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from bt_tasksim import poses
 from bt_tasksim.errors import InputError, nearest
 from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.resources import asset
@@ -168,6 +170,15 @@ class RobotDescription:
         xp = array_namespace(hand_position)
         fit = xp.sum((hand_position - xp.asarray(self.hand_open)) * xp.asarray(weights), axis=-1)
         return xp.clip(fit, 0.0, 1.0)
+
+    def pointing_down(self, position: Array, turn: float = 0.0) -> Array:
+        """The tool pose ``(7,)`` at a position ``(3,)`` that points down, turned from its neutral orientation.
+
+        Neutral is the closing axis of the rest posture, when the arm's base turns to the position.
+        """
+        heading = poses.yaw(math.atan2(position[1], position[0]) + turn)
+        rotation = poses.frame_from_axes(np.array([0.0, 0.0, -1.0]), poses.rotate(heading, self.closing))
+        return poses.pose(position, rotation)
 
     @cached_property
     def _closure_weights(self) -> Array:

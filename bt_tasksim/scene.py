@@ -97,6 +97,51 @@ class SpotSpec:
 
 
 @dataclass(frozen=True)
+class HandStart:
+    """Where the hand is when an episode begins, instead of in its rest posture.
+
+    Attributes:
+        over: Name of the object that it is above.
+        height: Lowest and highest height above the object's centre, metres.
+        aside: Half width of the square about the object's centre, metres.
+        turn: Half width of the range of its turn from its neutral orientation, pointing down, radians.
+    """
+
+    over: str
+    height: tuple[float, float] = (0.20, 0.30)
+    aside: float = 0.04
+    turn: float = 0.4
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """A part of a curriculum: how worlds are drawn while it is taught.
+
+    Attributes:
+        name: Its name.
+        objects: Objects that are drawn otherwise than in the scene itself, by name.
+        noise: Names of noise models of the estimate; each world has one of them. None: the engine's.
+        hand: Where the hand is at first; None: in its rest posture.
+        tolerance: Sufficient cost below which a goal counts as reached: 1 for what is meant in the end.
+        until: Share of successes in training from which the next lesson begins; the last one never ends.
+    """
+
+    name: str
+    objects: Mapping[str, ObjectSpec] = field(default_factory=dict)
+    noise: tuple[str, ...] = ()
+    hand: HandStart | None = None
+    tolerance: float = 1.0
+    until: float = 0.9
+
+    def __post_init__(self) -> None:
+        if not (self.tolerance > 0.0 and 0.0 < self.until <= 1.0):
+            raise InputError(
+                f"lesson '{self.name}': 'tolerance' should be positive and 'until' a share above 0, found "
+                f"{self.tolerance:g} and {self.until:g}"
+            )
+
+
+@dataclass(frozen=True)
 class Goal:
     """Where an object should be at the end, judged by the hidden state.
 
@@ -180,10 +225,15 @@ class ActorConfiguration:
         places: Places by name, spots included, as ``PlaceModel`` data.
         joint_position: Initial joint positions in the robot's joint order; empty for its rest posture.
         seed: The seed and stream it was drawn with.
+        hand_start: Position of the tool (m) and its turn from the neutral orientation (rad), pointing down,
+            ``(4,)``; then the joints follow from it. Empty: ``joint_position`` counts.
         physics_frequency: Hz.
         control_frequency: Hz.
         goal: What should be true at the end, or None.
         disturbance: What happens on the way, or None.
+        noise: Name of the noise model of the estimate; empty for the engine's own.
+        tolerance: In training, the sufficient cost below which a goal counts as reached.
+        lesson: Name of the lesson it was drawn for.
     """
 
     robot: str
@@ -197,6 +247,10 @@ class ActorConfiguration:
     control_frequency: int = 20
     goal: Goal | None = None
     disturbance: Disturbance | None = None
+    noise: str = ""
+    tolerance: float = 1.0
+    lesson: str = ""
+    hand_start: tuple[float, ...] = ()
 
     def generator(self, purpose: str) -> np.random.Generator:
         """Random numbers for one purpose (such as ``"estimate"``), independent of every other."""
@@ -268,6 +322,7 @@ class Scene:
         spots: Spots marked on places.
         goal: What should be true at the end.
         knock: The object named here is knocked out of the hand at a random moment.
+        lessons: The curriculum of a training in this scene, in order.
         name: Name of the scene in results.
     """
 
@@ -277,9 +332,17 @@ class Scene:
     spots: Sequence[SpotSpec] = ()
     goal: Goal | None = None
     knock: str | None = None
+    lessons: Sequence[Lesson] = ()
     name: str = "scene"
 
     def __post_init__(self) -> None:
+        for lesson in self.lessons:
+            for name in (*lesson.objects, *([lesson.hand.over] if lesson.hand else ())):
+                if name not in self.objects:
+                    raise InputError(
+                        f"lesson '{lesson.name}' names the object '{name}', which is not in the scene"
+                        f"{nearest(name, self.objects)}"
+                    )
         specs = {name: _object_spec(name, spec) for name, spec in self.objects.items()}
         object.__setattr__(self, "objects", specs)
         object.__setattr__(self, "fixtures", tuple(dict.fromkeys(("table", *self.fixtures))))
@@ -303,23 +366,30 @@ class Scene:
         """The same scene with another robot."""
         return dataclasses.replace(self, robot=robot)
 
-    def sample(self, seed: int, stream: str = "evaluation") -> ActorConfiguration:
+    def sample(
+        self, seed: int, stream: str = "evaluation", lesson: int | None = None
+    ) -> ActorConfiguration:
         """Draw one world.
 
         Args:
             seed: Any non-negative integer; the same seed gives the same world.
             stream: One of `STREAMS`; training and evaluation never share draws.
+            lesson: Number of the lesson to draw it for; None: the scene itself.
 
         Raises:
-            InputError: The objects do not fit on their places.
+            InputError: The objects do not fit on their places, or there is no such lesson.
         """
+        if lesson is not None and not 0 <= lesson < len(self.lessons):
+            raise InputError(f"scene '{self.name}' has {len(self.lessons)} lessons, and none number {lesson}")
+        taught = None if lesson is None else self.lessons[lesson]
         rng = generator(seed, stream, "scene")
         fixtures = tuple(load_fixture(name) for name in self.fixtures)
         places = {p.name: p for f in fixtures for p in f.place_models()}
         for spot in self.spots:
             places[spot.name] = _draw_spot(spot, places, rng)
         objects: list[ObjectActor] = []
-        for name, spec in self.objects.items():
+        for name, usual in self.objects.items():
+            spec = usual if taught is None else taught.objects.get(name, usual)
             assert isinstance(spec, ObjectSpec)
             objects.append(_draw_object(name, spec, places, objects, rng))
         disturbance = None
@@ -334,6 +404,10 @@ class Scene:
             stream=stream,
             goal=self.goal,
             disturbance=disturbance,
+            noise=_draw_noise(taught, seed, stream),
+            tolerance=1.0 if taught is None else taught.tolerance,
+            lesson="" if taught is None else taught.name,
+            hand_start=_draw_hand(taught, objects, seed, stream),
         )
 
 
@@ -446,6 +520,24 @@ def _known_size(
     if entry.round:
         y = x
     return size[0] * x, size[1] * y, size[2] * z
+
+
+def _draw_noise(lesson: Lesson | None, seed: int, stream: str) -> str:
+    if lesson is None or not lesson.noise:
+        return ""
+    return lesson.noise[int(generator(seed, stream, "noise").integers(len(lesson.noise)))]
+
+
+def _draw_hand(
+    lesson: Lesson | None, objects: Sequence[ObjectActor], seed: int, stream: str
+) -> tuple[float, ...]:
+    if lesson is None or lesson.hand is None:
+        return ()
+    start, rng = lesson.hand, generator(seed, stream, "hand")
+    centre = next(o.pose for o in objects if o.name == start.over)
+    x, y = rng.uniform(-start.aside, start.aside, 2).tolist()
+    z, turn = float(rng.uniform(*start.height)), float(rng.uniform(-start.turn, start.turn))
+    return centre[0] + x, centre[1] + y, centre[2] + z, turn
 
 
 def _draw_disturbance(name: str, rng: np.random.Generator) -> Disturbance:

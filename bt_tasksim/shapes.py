@@ -130,20 +130,25 @@ class Shape:
         extent: Full size ``(3,)`` of the bounding box, metres.
         collision: Convex pieces that together are the solid.
         draw: Makes the mesh that is seen; physics alone never does.
-        mass: Volume, centre of mass and inertia for 1 kg.
+        weigh: Computes `mass`; nobody asks for that of a shape which is only taken to be there.
         surface: Outer surface without hollows.
     """
 
     extent: Size
     collision: tuple[Piece, ...]
     draw: Callable[[], TriangleMesh]
-    mass: MassProperties
+    weigh: Callable[[], MassProperties]
     surface: Surface
 
     @cached_property
     def visual(self) -> TriangleMesh:
         """What is seen; a cup really is hollow."""
         return self.draw()
+
+    @cached_property
+    def mass(self) -> MassProperties:
+        """Volume, centre of mass and inertia for 1 kg."""
+        return self.weigh()
 
     @property
     def volume(self) -> float:
@@ -301,7 +306,7 @@ def _prism(
         extent=extent,
         collision=collision,
         draw=lambda: meshes.prism(seen, height, bevel=min(0.0015, 0.1 * min(extent))),
-        mass=meshes.mass_properties(meshes.prism(solid, height)),
+        weigh=lambda: meshes.mass_properties(meshes.prism(solid, height)),
         surface=PrismSurface(footprint, height / 2),
     )
 
@@ -323,7 +328,7 @@ def _cup(size: Size) -> Shape:
         extent=(2 * radius, 2 * radius, height),
         collision=tuple(pieces),
         draw=lambda: visual,
-        mass=meshes.mass_properties(visual),
+        weigh=lambda: meshes.mass_properties(visual),
         surface=PrismSurface(Ellipse(radius, radius), h),
     )
 
@@ -332,17 +337,21 @@ def _superellipsoid(size: ShapeSize) -> Shape:
     half = np.array(size.size) / 2
     # Sharper than this is a box to within 0.2 mm, and its powers would overflow.
     e1, e2 = (max(e, _SHARPEST) for e in size.exponents)
-    coarse = np.concatenate([meshes.cube_sphere(3).vertices, np.eye(3), -np.eye(3)])
+    coarse = _hull_directions()
     hull = coarse * meshes.superellipsoid_scale(coarse, e1, e2)[:, None] * half
     hull.setflags(write=False)
-    visual = meshes.superellipsoid(half, e1, e2)
     return Shape(
         extent=size.size,
         collision=(ConvexPiece(hull),),
-        draw=lambda: visual,
-        mass=meshes.mass_properties(visual),
+        draw=lambda: meshes.superellipsoid(half, e1, e2),
+        weigh=lambda: meshes.mass_properties(meshes.superellipsoid(half, e1, e2)),
         surface=SuperellipsoidSurface((float(half[0]), float(half[1]), float(half[2])), (e1, e2)),
     )
+
+
+@lru_cache(maxsize=1)
+def _hull_directions() -> Array:
+    return np.concatenate([meshes.cube_sphere(3).vertices, np.eye(3), -np.eye(3)])
 
 
 def _floats(corners: Array) -> tuple[tuple[float, float], ...]:

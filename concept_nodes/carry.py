@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from bt_tasksim import poses
@@ -12,6 +13,13 @@ from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.world import Command
 from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
 from concept_nodes.limits import force_at_wrist, strained
+
+
+SLIP = 0.03
+"""Metres that a carried object may slip in the hand. Source, as of `TILT`: the last lesson of the released
+original's grasp training, task-sequencing-robotics-simulator."""
+TILT = math.radians(10.0)
+"""Radians that a carried object may turn in the hand."""
 
 
 class MoveMemory(NamedTuple):
@@ -55,10 +63,23 @@ class Carry(ConceptModel):
         return miss(seen, memory.path)
 
     def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
-        """1 unless the object hangs in the hand, clear of everything else."""
+        """How far the object failed to follow the hand, over what is tolerable.
+
+        10 unless it hangs in the hand, clear of everything else; else the larger of its slip in the hand over
+        `SLIP` and of its tilt against the hand over `TILT`, where it is known how it lay in the hand at first.
+        """
         free = ~known.supported(self.target) & (known.hand_force(self.target) > 0.2)
         xp = array_namespace(known.hidden.objects)
-        return xp.where(xp.asarray(free), 0.0, 1.0)
+        cost = xp.where(xp.asarray(free), 0.0, 10.0)
+        if known.began is None:
+            return cost
+        first = Known(known.began, known.world)
+        before, after = (
+            poses.multiply(poses.inverse(k.hidden.tool_pose), k.object(self.target)) for k in (first, known)
+        )
+        slip = poses.norm(after[..., :3] - before[..., :3]) / SLIP
+        tilt = poses.angle_between(before[..., 3:], after[..., 3:]) / TILT
+        return xp.maximum(cost, xp.maximum(slip, tilt))
 
     def explain(self, seen: Seen, memory: MoveMemory) -> str:
         """How far the tool still is from its goal, and the object from the tool."""

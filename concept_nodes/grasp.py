@@ -162,30 +162,28 @@ class Grasp(ConceptModel):
         closing = xp.where(memory.closing >= 0.0, self.grip, memory.preshape) + offset[..., CLOSE]
         return Command(
             tool=grasp_features.displaced(sample(memory.path, seen.elapsed), offset),
-            hand=xp.clip(closing, 0.0, 1.0)[..., None],
+            hand=xp.asarray(poses.clip(closing, 0.0, 1.0))[..., None],
         )
 
     def advance(self, action: Array, seen: Seen, memory: GraspMemory) -> GraspMemory:
         """Begin to close when the tool has arrived; count the ticks at which the hand holds still."""
-        xp = array_namespace(seen.tool)
         offset = grasp_features.moved_offset(action, memory, seen.world.control_period)
         target = grasp_features.displaced(sample(memory.path, seen.elapsed), offset)
         gap = poses.norm(seen.tool[..., :3] - target[..., :3])
         arrived = (seen.elapsed >= memory.path.duration) & (gap < self.tolerance)
         late = seen.elapsed >= memory.path.duration + 1.0
         begun = memory.closing >= 0.0
-        closing = xp.where(
-            begun, memory.closing + seen.world.control_period, xp.where(arrived | late, 0.0, memory.closing)
-        )
-        still = xp.abs(seen.closure - memory.closure) < 0.01
+        still = abs(seen.closure - memory.closure) < 0.01
         good = seen.opposed() & still & begun
-        touched = xp.where(seen.contacts, 1.0, memory.touched)
         along = poses.transform(poses.inverse(memory.goal), seen.tool[..., :3])[..., 2]
+        xp = array_namespace(seen.tool)
+        touched = xp.where(seen.contacts, 1.0, memory.touched)
         fresh = (xp.max(touched, axis=-1) > 0.0) & (xp.max(memory.touched, axis=-1) == 0.0)
+        go_on = memory.closing + seen.world.control_period
         return memory._replace(
             offset=offset,
             target=target,
-            closing=closing,
+            closing=xp.where(begun, go_on, xp.where(arrived | late, 0.0, memory.closing)),
             closure=seen.closure,
             settled=xp.where(good, memory.settled + 1, 0),
             touched=touched,

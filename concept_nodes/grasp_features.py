@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from bt_tasksim import poses
 from bt_tasksim.context import Seen
@@ -43,47 +46,71 @@ def layout(robot: RobotDescription) -> dict[str, int]:
 
 def features(seen: Seen, memory: GraspMemory) -> Array:
     """The features ``(..., n)``, all of the order of one."""
-    xp = array_namespace(seen.tool)
     local = poses.multiply(poses.inverse(memory.goal), seen.tool)
     turn = poses.rotation_vector(local[..., 3:])[..., 2:]
     behind = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])
     robot = seen.robot
     opened, span = constant(robot.hand_open, seen.tool), constant(_span(robot), seen.tool)
     joints = (seen.observation.hand_position - opened) / span
-    arrived = seen.elapsed - memory.path.duration
+    numbers = (
+        (seen.closure - memory.closure) / 0.1,
+        memory.first / 0.03,
+        poses.clip(seen.elapsed - memory.path.duration, -1.0, 2.0),
+        poses.clip(memory.closing, -0.1, 2.0),
+        poses.clip(memory.settled / 3.0, 0.0, 2.0),
+    )
+    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+        rest = numbers
+        parts = [
+            local[:3] / 0.03, turn / 0.2, behind / 0.01, memory.offset / _SCALE, joints, rest[:1],
+            seen.contacts, memory.touched, rest[1:], memory.estimate,
+        ]  # fmt: skip
+        return np.concatenate(parts)
+    xp = array_namespace(seen.tool)
+    columns = [xp.astype(n, seen.tool.dtype)[..., None] for n in numbers]
     parts = [
         local[..., :3] / 0.03,
         turn / 0.2,
         behind / 0.01,
         memory.offset / constant(SCALE, seen.tool),
         joints,
-        ((seen.closure - memory.closure) / 0.1)[..., None],
+        columns[0],
         xp.astype(seen.contacts, seen.tool.dtype),
         memory.touched,
-        (memory.first / 0.03)[..., None],
-        (xp.clip(arrived, -1.0, 2.0))[..., None],
-        (xp.clip(memory.closing, -0.1, 2.0))[..., None],
-        (xp.clip(xp.astype(memory.settled, seen.tool.dtype), 0.0, 6.0) / 3.0)[..., None],
+        *columns[1:],
         memory.estimate,
     ]
-    return xp.concat([xp.astype(p, seen.tool.dtype) for p in parts], axis=-1)
+    return xp.concat(parts, axis=-1)
 
 
 def moved_offset(action: Array, memory: GraspMemory, period: float) -> Array:
     """The offsets ``(..., 5)`` one control period on: towards the action, no faster than `RATE`."""
-    xp = array_namespace(action, memory.offset)
-    wanted = xp.clip(action, -1.0, 1.0) * constant(SCALE, memory.offset)
+    if type(action) is np.ndarray:
+        step = _RATE * (period / PERIOD)
+        gap = np.minimum(np.maximum(action, -1.0), 1.0) * _SCALE - memory.offset
+        return memory.offset + np.minimum(np.maximum(gap, -step), step)
+    gap = poses.clip(action, -1.0, 1.0) * constant(SCALE, memory.offset) - memory.offset
     step = constant(RATE, memory.offset) * (period / PERIOD)
-    return memory.offset + xp.clip(wanted - memory.offset, -step, step)
+    return memory.offset + poses.clip(gap, -step, step)
 
 
 def displaced(reference: Array, offset: Array) -> Array:
     """Tool poses ``(..., 7)`` on the reference motion, moved by offsets ``(..., 5)`` in the tool's frame."""
+    if type(offset) is np.ndarray and offset.ndim == 1:
+        x, y, z, turn, _ = offset.tolist()
+        if x == y == z == turn == 0.0:
+            return reference
+        return poses.multiply(
+            reference, np.array([x, y, z, math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)])
+        )
     xp = array_namespace(reference)
     half = offset[..., TURN] / 2
     zero = xp.zeros_like(half)
     turn = xp.stack([xp.cos(half), zero, zero, xp.sin(half)], axis=-1)
     return poses.multiply(reference, xp.concat([offset[..., :3], turn], axis=-1))
+
+
+_SCALE, _RATE = np.array(SCALE), np.array(RATE)
 
 
 def _span(robot: RobotDescription) -> Array:

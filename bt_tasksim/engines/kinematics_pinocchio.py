@@ -195,6 +195,18 @@ class PinocchioKinematics:
         starts = [self._rest] if seed is None else [np.asarray(seed, float), self._rest]
         return self._search(se3(pose), starts, self._rest if posture is None else np.asarray(posture, float))
 
+    def joints_of_hand_start(self, start: tuple[float, ...]) -> tuple[float, ...]:
+        """All joints ``(n_joints,)`` with the hand open where an `ActorConfiguration` lets it begin.
+
+        Args:
+            start: Position (m) and turn (rad) ``(4,)``.
+
+        Raises:
+            UnreachableError: No posture brings the tool there.
+        """
+        arm = self.inverse(self.robot.pointing_down(np.array(start[:3]), start[3]))
+        return tuple(np.concatenate([arm, self.robot.hand_open]).tolist())
+
     def _search(self, pose: Any, starts: Sequence[Array], posture: Array, best: Array | None = None) -> Array:
         """The solution nearest to a posture from given starts, or else from one of the random ones."""
         found: list[Array] = []

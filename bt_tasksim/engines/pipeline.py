@@ -7,7 +7,7 @@ robot, a simulator, or parts of both in other processes.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 from bt_tasksim.poses import Array
@@ -130,6 +130,10 @@ class EnginePipeline:
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> Observation:
         """Begin an episode; returns its first observation."""
         self.kinematics.reset(configuration)
+        if configuration.hand_start:
+            posture: Any = self.kinematics
+            joints = posture.joints_of_hand_start(configuration.hand_start)
+            configuration = replace(configuration, joint_position=joints)
         self.state = self.physics.reset(configuration)
         if self.rendering is not None:
             self.rendering.reset(configuration)

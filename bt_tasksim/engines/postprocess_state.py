@@ -8,7 +8,7 @@ import numpy as np
 
 from bt_tasksim import poses
 from bt_tasksim.engines.features import ObservationBuilder
-from bt_tasksim.engines.noise import NoiseModel
+from bt_tasksim.engines.noise import NoiseModel, noise_model
 from bt_tasksim.engines.pipeline import Image
 from bt_tasksim.errors import MachineError
 from bt_tasksim.poses import Array
@@ -22,7 +22,7 @@ class StatePostProcess:
 
     Args:
         robot: The robot.
-        noise: Error of the estimate.
+        noise: Error of the estimate, where the world as drawn does not say otherwise.
     """
 
     perception = "state"
@@ -34,7 +34,8 @@ class StatePostProcess:
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> None:
         """See `PostProcessEngine.reset`."""
         n = len(configuration.objects)
-        self._error = self.noise.draw(configuration.generator("estimate"), n)
+        noise = noise_model(configuration.noise) if configuration.noise else self.noise
+        self._error = noise.draw(configuration.generator("estimate"), n)
         self._local: Array | None = None
         self._builder = ObservationBuilder(self.robot, configuration)
 

@@ -1,36 +1,73 @@
-"""Grasp an object of unknown shape, size, mass and friction, and lift it: the tree a grasp is trained in."""
+"""Grasp an object of unknown shape, size, mass and friction, and lift it: the tree a grasp is trained in.
+
+The scene itself draws what is never trained on: other kinds of objects, and of superellipsoids other sizes and
+exponents (the odd strips of their ranges). Its lessons draw superellipsoids from the even strips alone.
+"""
 
 from __future__ import annotations
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.scene import Goal, ObjectSpec, Scene
+from bt_tasksim.scene import Goal, HandStart, Lesson, ObjectSpec, Scene
+from bt_tasksim.training.decorator import Train
 from concept_nodes import Grasp, Pick
 from trees.authoring import sequence
 
 LIFT = 0.3
+UNSEEN = ObjectSpec(
+    kinds=("box", "cup", "cylinder", "oval", "diamond", "superellipsoid"),
+    on="table",
+    mass=(0.05, 0.6),
+    friction=(0.3, 0.9),
+    exponents=((0.05, 0.8), (0.05, 2.0)),
+    strips="odd",
+    size_error=0.1,
+)
+"""Exponents beyond 0.8 in the vertical make bodies that do not stand on a table."""
+BOXES = ObjectSpec(
+    kinds=("superellipsoid",),
+    on="table",
+    size=((0.055, 0.04, 0.06), (0.08, 0.055, 0.09)),
+    mass=(0.05, 0.3),
+    friction=(0.5, 0.9),
+    exponents=((0.05, 0.2), (0.05, 0.5)),
+    strips="even",
+    size_error=0.1,
+)
+SHAPES = ObjectSpec(
+    kinds=("superellipsoid",),
+    on="table",
+    size=((0.045, 0.036, 0.05), (0.09, 0.062, 0.125)),
+    mass=(0.05, 0.6),
+    friction=(0.3, 0.9),
+    exponents=((0.05, 0.8), (0.05, 2.0)),
+    strips="even",
+    size_error=0.1,
+)
+HAND = HandStart("target")
+"""Half a second away: the way from the rest posture is not what is learned."""
+LESSONS = (
+    Lesson("near-boxes", {"target": BOXES}, ("fine", "original"), HAND, tolerance=3.0, until=0.7),
+    Lesson("all shapes", {"target": SHAPES}, ("original", "hard"), HAND, tolerance=3.0, until=0.8),
+    Lesson("all shapes, held firmly", {"target": SHAPES}, ("original", "hard"), HAND),
+)
 
 
 def scene(robot: str = "panda") -> Scene:
-    """One object on the table: the held-apart draws."""
+    """One object on the table."""
     return Scene(
         robot,
-        objects={
-            "target": ObjectSpec(
-                kinds=("box", "cup", "cylinder", "oval", "diamond", "superellipsoid"),
-                on="table",
-                mass=(0.05, 0.6),
-                friction=(0.3, 0.9),
-                exponents=((0.05, 0.8), (0.05, 2.0)),
-                strips="odd",
-                size_error=0.1,
-            )
-        },
+        objects={"target": UNSEEN},
         goal=Goal("target", "table", relation="lifted", height=LIFT),
+        lessons=LESSONS,
         name="grasp_then_pick",
     )
 
 
 def build() -> Behaviour:
     """The tree."""
-    return sequence("grasp then pick", Grasp("target"), Pick("target", distance=LIFT))
+    return sequence(
+        "grasp then pick",
+        Train(Grasp("target", timeout=6.0)),
+        Pick("target", distance=LIFT, speed=0.5),
+    )

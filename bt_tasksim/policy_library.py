@@ -1,0 +1,264 @@
+"""The policies at hand: those of ``assets/policies``, which of them are pinned, and others by path.
+
+``assets/policies/pins.json`` says which policy a leaf takes that names none: a mapping of concepts to mappings
+of robots to folders beside it, such as ``{"grasp": {"panda": "grasp-panda"}}``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.files import write_text
+from bt_tasksim.policy_files import FILES, PolicyCard, check_fits, load_card, load_policy
+from bt_tasksim.resources import asset
+from bt_tasksim.robot import load_robot
+
+if TYPE_CHECKING:
+    from bt_tasksim.concept import ConceptModel
+
+PROGRAMMED = "programmed"
+"""Name of the policy that is a concept's own."""
+PINS = "pins.json"
+NEVER = "never measured"
+
+Pins = dict[str, dict[str, str]]
+"""Names of policies by concept and robot."""
+
+
+@dataclass(frozen=True)
+class PolicyEntry:
+    """A policy in a list.
+
+    Attributes:
+        name: Its folder's name.
+        folder: Its folder.
+        card: Its card, None where it is damaged.
+        problem: Why it cannot be used; empty where it can.
+        pinned: A leaf of its concept on its robot takes it without naming it.
+    """
+
+    name: str
+    folder: Path
+    card: PolicyCard | None
+    problem: str
+    pinned: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry as plain data."""
+        return {
+            "name": self.name,
+            "folder": str(self.folder),
+            "hash": self.card.hash if self.card else None,
+            "pinned": self.pinned,
+            "problem": self.problem,
+            "card": self.card.to_json() if self.card else None,
+        }
+
+
+def find_policy(name: str) -> Path | None:
+    """The folder of a policy that a leaf names, None for the programmed one.
+
+    A name of ``assets/policies`` comes before a folder of this name; write ``./name`` for the folder.
+
+    Raises:
+        InputError: There is no such policy.
+    """
+    if name == PROGRAMMED:
+        return None
+    shipped = asset("policies")
+    known = _policy_folders(shipped)
+    if name in known:
+        return known[name]
+    path = Path(name)
+    if path.is_dir():
+        return path
+    if path.exists():
+        raise InputError(f"'{name}' is a file; a policy is a folder")
+    if len(path.parts) > 1:
+        hint = nearest(path.name, _policy_folders(path.parent))
+        raise InputError(f"there is no policy folder '{name}'{hint}")
+    raise InputError(f"no policy '{name}'{nearest(name, [PROGRAMMED, *known])} (or give a policy's folder)")
+
+
+def source_of(folder: Path) -> str:
+    """What a leaf has to name to get this policy again, from any working folder."""
+    whole = folder.resolve()
+    return whole.name if whole.parent == asset("policies").resolve() else str(whole)
+
+
+def folder_of_pinned(concept: str, robot: str) -> Path | None:
+    """The folder of the policy that is pinned for a concept and a robot; None where none is.
+
+    Raises:
+        InputError: The pins are damaged, or the pinned policy is missing.
+    """
+    name = read_pins().get(concept, {}).get(robot)
+    if name is None:
+        return None
+    folder = asset("policies", name)
+    if not folder.is_dir():
+        known = nearest(name, _policy_folders(asset("policies")))
+        raise InputError(
+            f"the policy '{name}', pinned for '{concept}' on '{robot}', is not in '{folder.parent}'{known} "
+            f"(or take it out with 'bt-tasksim policies --unpin {concept} {robot}')"
+        )
+    return folder
+
+
+def read_pins() -> Pins:
+    """The pins; none where there is no file.
+
+    Raises:
+        InputError: The file does not hold pins.
+    """
+    file = asset("policies", PINS)
+    try:
+        content = json.loads(file.read_text(encoding="utf-8") or "{}")
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError) as error:
+        raise InputError(f"pins '{file}' cannot be read: {error}") from error
+    if not isinstance(content, dict):
+        raise InputError(f"pins '{file}' should map concepts to robots to names of policies")
+    for concept, robots in content.items():
+        if not isinstance(robots, dict) or not all(_is_name(name) for name in robots.values()):
+            raise InputError(f"pins '{file}': '{concept}' should map robots to names of policies beside it")
+    return content
+
+
+def pin(name: str, concepts: Mapping[str, type[ConceptModel]]) -> PolicyCard:
+    """Have leaves of a policy's concept take it on its robot, where they name none.
+
+    Args:
+        name: Name of a policy of ``assets/policies``.
+        concepts: Concepts by their names in lower case.
+
+    Returns:
+        The policy's card.
+
+    Raises:
+        InputError: There is no such policy there, it is damaged, or does not fit its concept and robot.
+        MachineError: The pins cannot be written.
+    """
+    known = _policy_folders(asset("policies"))
+    if name not in known:
+        raise InputError(
+            f"no policy '{name}' in '{asset('policies')}'{nearest(name, known)}; "
+            f"only a policy that is there can be pinned"
+        )
+    _, card = load_policy(known[name])
+    if card.concept not in concepts:
+        raise InputError(
+            f"policy '{name}' is for the concept '{card.concept}', which is not a bundled one"
+            f"{nearest(card.concept, concepts)}; name it in the tree instead"
+        )
+    _check_as_it_is(card, known[name], concepts[card.concept])
+    pins = read_pins()
+    pins.setdefault(card.concept, {})[card.robot] = name
+    _write_pins(pins)
+    return card
+
+
+def unpin(concept: str, robot: str) -> str:
+    """Have leaves of a concept that name no policy take the programmed one again.
+
+    Returns:
+        Name of the policy that was pinned.
+
+    Raises:
+        InputError: None was.
+        MachineError: The pins cannot be written.
+    """
+    pins = read_pins()
+    for known, word in ((pins, concept), (pins.get(concept, {}), robot)):
+        if word not in known:
+            raise InputError(f"no policy is pinned for '{concept}' on '{robot}'{nearest(word, known)}")
+    name = pins[concept].pop(robot)
+    _write_pins({c: robots for c, robots in pins.items() if robots})
+    return name
+
+
+def list_policies(
+    folder: str | Path | None = None, concepts: Mapping[str, type[ConceptModel]] | None = None
+) -> list[PolicyEntry]:
+    """The policies in a folder, damaged ones with their problem.
+
+    Args:
+        folder: A folder of policies' folders, or one policy's folder; by default ``assets/policies``.
+        concepts: Concepts by their names in lower case: the policies of these are checked against them.
+
+    Raises:
+        InputError: There is no such folder.
+    """
+    at = asset("policies") if folder is None else Path(folder)
+    if folder is not None and not at.is_dir():
+        raise InputError(f"there is no folder '{folder}' to look for policies in")
+    shipped = at.resolve() == asset("policies").resolve()
+    pins = read_pins() if shipped else {}
+    found = {at.resolve().name: at} if _is_policy(at) else _policy_folders(at)
+    return [_entry(name, path, pins, concepts or {}) for name, path in sorted(found.items())]
+
+
+def describe(entry: PolicyEntry) -> str:
+    """A policy in a list: one line, and one more for each measurement."""
+    card = entry.card
+    if card is None:
+        return f"{entry.name}  damaged: {entry.problem}"
+    mark = "  pinned" if entry.pinned else ""
+    first = f"{entry.name}@{card.hash}  {card.concept} on {card.robot}{mark}"
+    lines = [first, f"  trained in {card.tree}, {card.steps:,} steps {card.algorithm}".rstrip()]
+    lines += [f"  {measured_text(entry)}" for entry in card.measured] or [f"  {NEVER}"]
+    return "\n".join([*lines, f"  {entry.problem}"] if entry.problem else lines)
+
+
+def measured_text(measured: Mapping[str, Any]) -> str:
+    """A measurement of a card, such as ``960 of 1000 (96.0 %, 94.6 to 97.0) pick_and_place, noise fine``."""
+    n, k = measured["episodes"], measured["successes"]
+    low, high = measured["confidence_interval"]
+    how = str(measured.get("perception", "")).removeprefix("state, ")
+    text = f"{k} of {n} ({100 * k / n:.1f} %, {100 * low:.1f} to {100 * high:.1f}) {measured['tree']}"
+    return f"{text}, {how}" if how else text
+
+
+def _entry(name: str, folder: Path, pins: Pins, concepts: Mapping[str, type[ConceptModel]]) -> PolicyEntry:
+    card, problem = None, ""
+    try:
+        card = load_card(folder)
+        load_policy(folder)
+        if card.concept in concepts:
+            _check_as_it_is(card, folder, concepts[card.concept])
+    except InputError as error:
+        problem = str(error)
+    pinned = card is not None and pins.get(card.concept, {}).get(card.robot) == name
+    return PolicyEntry(name, folder, card, problem, pinned)
+
+
+def _check_as_it_is(card: PolicyCard, folder: Path, concept: type[ConceptModel]) -> None:
+    """Check that a policy fits its concept and robot as they are now."""
+    robot = load_robot(card.robot)
+    check_fits(card, folder, card.concept, robot.name, concept.layout(robot), concept.actions)
+
+
+def _write_pins(pins: Pins) -> None:
+    write_text(asset("policies", PINS), json.dumps(pins, indent=2, sort_keys=True) + "\n")
+
+
+def _policy_folders(folder: Path) -> dict[str, Path]:
+    """Folders in a folder that hold a policy or a part of one, by name."""
+    if not folder.is_dir():
+        return {}
+    return {p.name: p for p in folder.iterdir() if not p.name.startswith(".") and _is_policy(p)}
+
+
+def _is_policy(folder: Path) -> bool:
+    return any((folder / name).exists() for name in FILES)
+
+
+def _is_name(name: Any) -> bool:
+    """A folder's name and not a path that leads elsewhere."""
+    return isinstance(name, str) and bool(name) and Path(name).name == name and name != ".."

@@ -1,0 +1,121 @@
+"""`Train`: the decorator that marks what is to be learned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Sequence
+from py_trees.decorators import Decorator
+
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.errors import InputError
+
+
+class Train(Decorator):
+    """Marks a leaf or a subtree that is to be learned inside the tree that will execute it.
+
+    When the tree runs, ticks and statuses pass through. In training one activation of the subtree is an
+    episode: what stands before it makes the initial state, and what follows it judges.
+
+    Args:
+        child: A concept, or a subtree with at least one concept that can be learned.
+        name: The node's name; by default ``train`` and the child's.
+    """
+
+    def __init__(self, child: Behaviour, name: str | None = None) -> None:
+        if not isinstance(child, Behaviour):
+            raise InputError(f"Train(...) takes a leaf or a subtree, found {child!r}")
+        if child.parent is not None:
+            raise InputError(f"'{child.name}' already has a parent, '{child.parent.name}': build a new one")
+        super().__init__(name or f"train {child.name}", child)
+        self.activations = 0
+        self.interrupted = False
+
+    def initialise(self) -> None:
+        """A new activation."""
+        self.activations += 1
+        self.interrupted = False
+
+    def terminate(self, new_status: Status) -> None:
+        """Remember whether something outside has ended the activation."""
+        if new_status == Status.INVALID and self.status == Status.RUNNING:
+            self.interrupted = True
+
+    def update(self) -> Status:
+        """The child's status."""
+        return self.decorated.status
+
+    def concepts(self) -> list[ConceptModel]:
+        """All concepts of the subtree."""
+        return concepts_in(self)
+
+    def learners(self) -> list[ConceptModel]:
+        """The concepts that learn: those with something unknown, whose policy is not named ``programmed``.
+
+        Raises:
+            InputError: There is none, one cannot be learned, or Train stands below another Train.
+        """
+        below = [node for node in self.iterate() if isinstance(node, Train) and node is not self]
+        if below:
+            raise InputError(f"'{below[0].name}' stands below '{self.name}': one Train inside another")
+        found = [leaf for leaf in self.concepts() if not leaf.is_task_model and leaf.policy != "programmed"]
+        if not found:
+            names = ", ".join(f"'{leaf.name}'" for leaf in self.concepts()) or "no concept at all"
+            raise InputError(
+                f"nothing below '{self.name}' can learn ({names}): a concept with something unknown sets "
+                f"is_task_model = False, and its leaf does not say policy=\"programmed\""
+            )
+        for leaf in found:
+            if type(leaf).features is ConceptModel.features or type(leaf).layout is ConceptModel.layout:
+                raise InputError(
+                    f"'{leaf.name}' below '{self.name}' cannot learn: {type(leaf).__name__} has no features() "
+                    f"with its layout()"
+                )
+        return found
+
+
+def concepts_in(root: Behaviour) -> list[ConceptModel]:
+    """The concepts of a tree, in its order from left to right."""
+    if isinstance(root, ConceptModel):
+        return [root]
+    return [leaf for child in root.children for leaf in concepts_in(child)]
+
+
+def train_nodes(root: Behaviour) -> list[Train]:
+    """The Train nodes of a tree, in its order from left to right."""
+    return list(_train_nodes(root))
+
+
+def _train_nodes(root: Behaviour) -> Iterator[Train]:
+    if isinstance(root, Train):
+        yield root
+    for child in root.children:
+        yield from _train_nodes(child)
+
+
+def judges(leaf: ConceptModel) -> bool:
+    """The concept says what must be true when it has succeeded, and has a policy to get there."""
+    return type(leaf).sufficient_cost is not ConceptModel.sufficient_cost and not leaf.lacks_policy
+
+
+def follower_of(train: Behaviour) -> tuple[Behaviour, Sequence] | None:
+    """What judges a Train node, and the sequence in which it follows.
+
+    The next sibling in the nearest sequence above, else its parent's next one, and so on up. Siblings without
+    a concept that can judge (conditions, waiting) are passed over. The later children of a selector are
+    fallbacks, and those of a parallel run beside: they follow nothing.
+
+    Returns:
+        None where nothing follows.
+    """
+    node = train
+    while node.parent is not None:
+        parent = node.parent
+        if isinstance(parent, Sequence):
+            for sibling in parent.children[parent.children.index(node) + 1 :]:
+                if any(judges(leaf) for leaf in concepts_in(sibling)):
+                    return sibling, parent
+        node = parent
+    return None
