@@ -11,12 +11,12 @@ import importlib
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from bt_tasksim.errors import BtTasksimError, InputError
+from bt_tasksim.progress import progress
 
 DEMO_LOG = ("demonstrations", "shelf_to_shelf", "00.h5")
 DEMO_SEED = 7
@@ -87,6 +87,13 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--out", type=Path, metavar="DIR", help="folder for result, log, pictures and report")
     run.add_argument("--video", action="store_true", help="draw the run: run.mp4, and in the report")
 
+    policies = add("policies", _policies, "List the learned policies, or choose which one leaves take.")
+    policies.add_argument("--folder", type=Path, metavar="DIR", help="list those of another folder, too")
+    policies.add_argument("--json", type=Path, metavar="F", help="write the list as JSON")
+    choice = policies.add_mutually_exclusive_group()
+    choice.add_argument("--pin", metavar="NAME", help="have leaves take it that name no policy")
+    choice.add_argument("--unpin", nargs=2, metavar=("CONCEPT", "ROBOT"), help="undo that")
+
     replay = add("replay", _replay, "Run a logged run again and compare, state by state.")
     replay.add_argument("run", metavar="RUN", type=Path, help="a run's folder or its run.h5")
 
@@ -124,6 +131,24 @@ def _engine_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--noise", default="fine", metavar="N", help="estimate's error: fine (default), none, original, hard"
     )
+    parser.add_argument(
+        "--policy",
+        action="append",
+        default=[],
+        type=_policy,
+        metavar="CONCEPT=P",
+        help="every leaf of a concept takes this policy, whatever the tree says: programmed, or a policy's "
+        "name or folder; repeatable",
+    )
+
+
+def _policy(text: str) -> tuple[str, str]:
+    concept, _, policy = text.partition("=")
+    if not concept or not policy:
+        raise argparse.ArgumentTypeError(
+            f"should be CONCEPT=POLICY, such as grasp=programmed, found '{text}'"
+        )
+    return concept, policy
 
 
 def _count(text: str) -> int:
@@ -189,7 +214,7 @@ def _decompose(options: argparse.Namespace) -> int:
 
     logged = Path(options.log) / "run.h5"
     log = open_log(logged if logged.is_file() else options.log)
-    with _progress("decomposing", None):
+    with progress("decomposing", None):
         found = decompose_log(log, options.episode)
     print(text_table(found.tasks))
     wrote = []
@@ -240,7 +265,7 @@ def _show(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     from trees.load import load_source
 
-    source = load_source(options.tree, options.robot, options.scene, options.nodes)
+    source = load_source(options.tree, options.robot, options.scene, options.nodes, options.policy)
     engines = _options(options, rendering=options.video)
     parts = [source.name, Path(source.scene.robot).stem, str(options.seed)]
     if options.perception != "state":
@@ -263,17 +288,41 @@ def _run_tree(tree: Any, scene: Any, seed: int, engines: Any, folder: Path, name
             print(f"(without video: {why})", file=sys.stderr)
     else:
         runner = Runner(tree, scene, engines)
-    with _progress("running", None):
+    with progress("running", None):
         result, files = write_run(folder, runner, seed, scenario=name, no_video=why or NO_VIDEO)
     for remark in files.remarks:
         print(remark)
     return result, files
 
 
+def _policies(options: argparse.Namespace) -> int:
+    from bt_tasksim.concept import ConceptModel
+    from bt_tasksim.files import write_text
+    from bt_tasksim.policy import concept_name
+    from bt_tasksim.policy_library import describe, list_policies, pin, unpin
+    from concept_nodes import catalogue
+
+    concepts = {concept_name(c): c for c in catalogue().values() if issubclass(c, ConceptModel)}
+    if options.pin:
+        card = pin(options.pin, concepts)
+        print(f"pinned {options.pin}@{card.hash} for '{card.concept}' on '{card.robot}'")
+    if options.unpin:
+        concept, robot = options.unpin
+        print(f"'{unpin(concept, robot)}' is no longer pinned for '{concept}' on '{robot}'")
+    found = list_policies(None, concepts)
+    if options.folder:
+        found += list_policies(options.folder, concepts)
+    print("\n".join(describe(entry) for entry in found) or "there is no learned policy")
+    if options.json:
+        write_text(options.json, json.dumps([entry.to_json() for entry in found], indent=2) + "\n")
+        print(f"wrote {options.json}")
+    return 0
+
+
 def _replay(options: argparse.Namespace) -> int:
     from bt_tasksim.replay import replay
 
-    with _progress("replaying", None):
+    with progress("replaying", None):
         found = replay(options.run)
     print(found.why)
     return 0 if found.identical else 1
@@ -283,9 +332,10 @@ def _evaluate(options: argparse.Namespace) -> int:
     from bt_tasksim.files import write_text
     from bt_tasksim.training.evaluation import Job, evaluate
 
-    job = Job(options.tree, options.scene, options.robot, _options(options), options.nodes)
+    engines, policies = _options(options), tuple(options.policy)
+    job = Job(options.tree, options.scene, options.robot, engines, options.nodes, policies)
     seeds = range(options.seed, options.seed + options.episodes)
-    with _progress("episodes", options.episodes) as advance:
+    with progress("episodes", options.episodes) as advance:
         found = evaluate(job, seeds, options.workers, lambda outcome: advance(outcome.success))
     content = found.to_json()
     if options.json:
@@ -325,30 +375,6 @@ def _summary(result: Any) -> str:
 
 def _shown(files: Any) -> str:
     return str(Path(files.folder) / "report.html")
-
-
-@contextmanager
-def _progress(what: str, total: int | None) -> Iterator[Callable[[bool], None]]:
-    """A progress bar on a terminal, shown from the second second on; nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield lambda success: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns: list[Any] = [TextColumn("{task.description}"), BarColumn()]
-    if total is not None:
-        columns += [MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn()]
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=total, rate="")
-        counts = [0, 0]
-
-        def advance(success: bool) -> None:
-            counts[0] += success
-            counts[1] += 1
-            bar.update(task, advance=1, rate=f"{100 * counts[0] / counts[1]:.0f} % success")
-
-        yield advance
 
 
 if __name__ == "__main__":

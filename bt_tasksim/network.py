@@ -99,10 +99,14 @@ class Network:
             raise InputError("a network needs at least one layer")
         n = self.mean.shape[0] if self.mean.ndim == 1 else -1
         if self.deviation.shape != (n,):
-            raise InputError(f"a network's mean {self.mean.shape} and deviation {self.deviation.shape} differ")
+            raise InputError(
+                f"a network's mean {self.mean.shape} and deviation {self.deviation.shape} differ"
+            )
         for k, (w, b) in enumerate(self.layers):
             if w.ndim != 2 or w.shape[1] != n or b.shape != (w.shape[0],):
-                raise InputError(f"a network's layer {k} has weights {w.shape} after {n} inputs, bias {b.shape}")
+                raise InputError(
+                    f"a network's layer {k} has weights {w.shape} after {n} inputs, bias {b.shape}"
+                )
             n = w.shape[0]
         if not all(np.isfinite(a).all() for a in self.arrays().values()):
             raise InputError("a network holds a number that is not finite")

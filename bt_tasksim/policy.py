@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from bt_tasksim.errors import InputError
 from bt_tasksim.network import Network
 from bt_tasksim.policy_files import check_fits, load_policy
-from bt_tasksim.policy_library import PROGRAMMED, find_policy, folder_of_pinned, source_of
+from bt_tasksim.policy_library import PROGRAMMED as PROGRAMMED
+from bt_tasksim.policy_library import find_policy, folder_of_pinned, source_of
 from bt_tasksim.poses import Array, array_namespace
 
 if TYPE_CHECKING:

@@ -207,7 +207,8 @@ def check_fits(
         differs = f"it has {card.actions} actions, the concept has {actions}"
     if differs:
         raise InputError(
-            f"{owner} does not fit the concept '{concept}' on '{robot}' as it is now: {differs}; train it again"
+            f"{owner} does not fit the concept '{concept}' on '{robot}' as it is now: {differs}; "
+            f"train it again"
         )
 
 

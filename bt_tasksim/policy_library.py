@@ -1,7 +1,7 @@
 """The policies at hand: those of ``assets/policies``, which of them are pinned, and others by path.
 
-``assets/policies/pins.json`` says which policy a leaf takes that names none: a mapping of concepts to mappings
-of robots to folders beside it, such as ``{"grasp": {"panda": "grasp-panda"}}``.
+``assets/policies/pins.json`` says which policy a leaf takes that names none: a mapping of concepts to
+mappings of robots to folders beside it, such as ``{"grasp": {"panda": "grasp-panda"}}``.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def read_pins() -> Pins:
         content = json.loads(file.read_text(encoding="utf-8") or "{}")
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"pins '{file}' cannot be read: {error}") from error
     if not isinstance(content, dict):
         raise InputError(f"pins '{file}' should map concepts to robots to names of policies")
@@ -201,26 +201,28 @@ def list_policies(
     shipped = at.resolve() == asset("policies").resolve()
     pins = read_pins() if shipped else {}
     found = {at.resolve().name: at} if _is_policy(at) else _policy_folders(at)
+    found |= {name: at / name for robots in pins.values() for name in robots.values() if name not in found}
     return [_entry(name, path, pins, concepts or {}) for name, path in sorted(found.items())]
 
 
 def describe(entry: PolicyEntry) -> str:
     """A policy in a list: one line, and one more for each measurement."""
     card = entry.card
-    if card is None:
-        return f"{entry.name}  damaged: {entry.problem}"
     mark = "  pinned" if entry.pinned else ""
+    if card is None or entry.problem:
+        return f"{entry.name}{mark}\n  cannot be used: {entry.problem}"
     first = f"{entry.name}@{card.hash}  {card.concept} on {card.robot}{mark}"
     lines = [first, f"  trained in {card.tree}, {card.steps:,} steps {card.algorithm}".rstrip()]
     lines += [f"  {measured_text(entry)}" for entry in card.measured] or [f"  {NEVER}"]
-    return "\n".join([*lines, f"  {entry.problem}"] if entry.problem else lines)
+    return "\n".join(lines)
 
 
 def measured_text(measured: Mapping[str, Any]) -> str:
     """A measurement of a card, such as ``960 of 1000 (96.0 %, 94.6 to 97.0) pick_and_place, noise fine``."""
     n, k = measured["episodes"], measured["successes"]
     low, high = measured["confidence_interval"]
-    how = str(measured.get("perception", "")).removeprefix("state, ")
+    noise = f"noise {measured['noise']}" if "noise" in measured else ""
+    how = str(measured.get("perception", noise)).removeprefix("state, ")
     text = f"{k} of {n} ({100 * k / n:.1f} %, {100 * low:.1f} to {100 * high:.1f}) {measured['tree']}"
     return f"{text}, {how}" if how else text
 
@@ -230,11 +232,11 @@ def _entry(name: str, folder: Path, pins: Pins, concepts: Mapping[str, type[Conc
     try:
         card = load_card(folder)
         load_policy(folder)
-        if card.concept in concepts:
+        if card.concept in concepts and asset("robots", f"{card.robot}.yaml").is_file():
             _check_as_it_is(card, folder, concepts[card.concept])
     except InputError as error:
         problem = str(error)
-    pinned = card is not None and pins.get(card.concept, {}).get(card.robot) == name
+    pinned = any(name in robots.values() for robots in pins.values())
     return PolicyEntry(name, folder, card, problem, pinned)
 
 

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept import ConceptModel
 from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import InputError
-from bt_tasksim.report.run_log import RunRecorder, read_text, versions
+from bt_tasksim.report.run_log import RunRecorder, nodes_of, read_text, versions
 from bt_tasksim.runner import Result, Runner
 from bt_tasksim.scene import ActorConfiguration, Scene
 from demos_decomp.log import Demonstration
@@ -45,7 +46,7 @@ class ReplayResult:
         time: Seconds at which the first difference was seen; None where there is none.
         differences: Largest difference by compared array, where there is one; infinity where one has a number
             and the other has none.
-        changed: What differs in versions and machine: recorded and present one, by name.
+        changed: What differs in versions, machine and policies: recorded and present one, by name.
         result: What the repetition gave.
     """
 
@@ -76,8 +77,10 @@ def replay(run: str | Path, tree: Behaviour | None = None) -> ReplayResult:
         raise InputError(f"'{path}' was recorded on a robot; only runs in simulation can be replayed")
     about = json.loads(parts["run/about"])
     configuration = ActorConfiguration.from_json(parts["run/configuration"])
+    root = tree if tree is not None else _tree(parts["run/tree"], path)
+    _take_policies(root, recorded, path)
     runner = Runner(
-        tree if tree is not None else _tree(parts["run/tree"], path),
+        root,
         Scene(configuration.robot),
         _options(about, path),
         longest=float(about["longest"]),
@@ -90,6 +93,8 @@ def replay(run: str | Path, tree: Behaviour | None = None) -> ReplayResult:
         runner.pipeline.close()
     repeated = recorder.demonstration(result)
     before, now = about["versions"], versions(runner.robot)
+    before |= _policies(about["policies"])
+    now |= _policies(result.policies)
     changed = {
         name: (before.get(name, "none"), now.get(name, "none"))
         for name in sorted({*before, *now})
@@ -121,6 +126,23 @@ def _tree(text: str, path: Path) -> Behaviour:
     if not text:
         raise InputError(f"'{path}' does not hold its tree, which XML could not; replay it from Python")
     return tree_from_xml(text, source=f"{path}: run/tree")
+
+
+def _take_policies(root: Behaviour, recorded: Demonstration, path: Path) -> None:
+    """Have each leaf take the policy that it had, whatever is pinned by now."""
+    if "run/policies" not in recorded.extra:  # an older log: all were programmed
+        return
+    nodes = nodes_of(root)
+    for entry in json.loads(read_text(recorded.extra["run/policies"])):
+        leaf = nodes[entry["node"]] if entry["node"] < len(nodes) else None
+        if not isinstance(leaf, ConceptModel):
+            raise InputError(f"'{path}' was recorded with another tree; give that one")
+        if entry["source"]:
+            leaf.policy = entry["source"]
+
+
+def _policies(names: Mapping[str, str]) -> dict[str, str]:
+    return {f"policy of '{leaf}'": name for leaf, name in names.items()}
 
 
 def _compared(

@@ -7,8 +7,8 @@ import importlib
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept import ConceptModel, Condition
 from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.policy import concept_name
 from bt_tasksim.scene import Scene
 from trees.authoring import check_tree
 
@@ -46,7 +47,11 @@ def scenarios() -> list[str]:
 
 
 def load_source(
-    tree: str, robot: str | None = None, scene: str | None = None, nodes: str | None = None
+    tree: str,
+    robot: str | None = None,
+    scene: str | None = None,
+    nodes: str | None = None,
+    policies: Iterable[tuple[str, str]] = (),
 ) -> TreeSource:
     """The tree and scene that a name stands for.
 
@@ -55,6 +60,7 @@ def load_source(
         robot: Name or file of the robot; by default the scene's own.
         scene: Name of a scenario whose scene is taken, or path of a scene file; by default the tree's own.
         nodes: Path of a ``.py`` file with concepts and conditions of one's own, for an ``.xml`` file.
+        policies: Concepts and the policies that their leaves take, see `with_policies`.
 
     Raises:
         InputError: There is no such tree or scene, or the file is no good.
@@ -85,7 +91,47 @@ def load_source(
         raise InputError(f"'{tree}': build() should return a py_trees behaviour, found {type(root).__name__}")
     check_tree(root)
     check_names(root, source.scene)
+    source = replace(source, build=with_policies(source.build, policies))
+    source.build()
     return source
+
+
+def with_policies(
+    build: Callable[[], Behaviour], policies: Iterable[tuple[str, str]]
+) -> Callable[[], Behaviour]:
+    """A tree's ``build`` whose trees have other policies.
+
+    Args:
+        build: Builds a fresh tree.
+        policies: Pairs of a concept's name, such as ``grasp``, and the policy that every leaf of this concept
+            takes, whatever the tree itself says: ``programmed``, or a policy's name or folder.
+
+    Raises:
+        InputError: A concept is named twice, or (when the tree is built) has no leaf in the tree.
+    """
+    wanted: dict[str, str] = {}
+    for concept, policy in policies:
+        if concept.lower() in wanted:
+            raise InputError(f"the policy of '{concept}' is given twice: give one")
+        wanted[concept.lower()] = policy
+    return functools.partial(_built_with, build, wanted) if wanted else build
+
+
+def _built_with(build: Callable[[], Behaviour], wanted: Mapping[str, str]) -> Behaviour:
+    root = build()
+    leaves = [leaf for leaf in root.iterate() if isinstance(leaf, ConceptModel)]
+    concepts = {concept_name(type(leaf)) for leaf in leaves}
+    for concept in wanted:
+        if concept not in concepts:
+            raise InputError(
+                f"a policy is given for '{concept}', and the tree has no leaf of this concept"
+                f"{nearest(concept, concepts)}"
+            )
+    for leaf in leaves:
+        policy = wanted.get(concept_name(type(leaf)))
+        if policy is not None:
+            leaf.policy = leaf._settings["policy"] = policy
+    return root
 
 
 def check_names(root: Behaviour, scene: Scene) -> None:

@@ -10,7 +10,7 @@ Besides what every demonstration holds, a run's log has, one row a tick:
 - ``tree/necessary_cost`` ``(T, nodes)``: of the active concepts, else NaN;
 
 and once: ``messages/time``, ``messages/node``, ``messages/text`` (what nodes said), and as JSON or XML
-``run/nodes``, ``run/configuration``, ``run/tree``, ``run/about``.
+``run/nodes``, ``run/configuration``, ``run/tree``, ``run/about``, ``run/policies``.
 """
 
 from __future__ import annotations
@@ -165,6 +165,7 @@ class RunRecorder:
             "run/configuration": _text(configuration.to_json()),
             "run/tree": _text(self._tree),
             "run/about": _text(json.dumps(about(result, runner, self.scenario))),
+            "run/policies": _text(json.dumps(policies_of(self.nodes))),
         }
         return Demonstration(
             name="000",
@@ -238,6 +239,15 @@ def describe_nodes(nodes: list[Behaviour]) -> list[dict[str, Any]]:
             }
         )
     return out
+
+
+def policies_of(nodes: list[Behaviour]) -> list[dict[str, Any]]:
+    """Which policy each concept uses: its node's number, its name, and what a leaf names to get it again."""
+    return [
+        {"node": i, "name": leaf.policy_in_use.name, "source": getattr(leaf.policy_in_use, "source", "")}
+        for i, leaf in enumerate(nodes)
+        if isinstance(leaf, ConceptNode)
+    ]
 
 
 def tree_text(tree: Behaviour) -> str:

@@ -33,6 +33,7 @@ class Job:
         robot: Name or file of the robot, or None for the scene's own.
         options: Which engines.
         nodes: A Python file with concepts and conditions of one's own, for an XML tree.
+        policies: Concepts and the policies that their leaves take, whatever the tree itself says.
     """
 
     tree: str
@@ -40,6 +41,7 @@ class Job:
     robot: str | None = None
     options: EngineOptions = field(default_factory=EngineOptions)
     nodes: str | None = None
+    policies: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,7 @@ def _runner(job: Job) -> Any:
     from bt_tasksim.runner import Runner
     from trees.load import load_source
 
-    source = load_source(job.tree, job.robot, job.scene, job.nodes)
+    source = load_source(job.tree, job.robot, job.scene, job.nodes, job.policies)
     return Runner(source.build(), source.scene, job.options)
 
 
