@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import gymnasium
@@ -13,11 +13,11 @@ from py_trees.common import Status
 from bt_tasksim.concept import TIMED_OUT, VIOLATED, ConceptModel, Decision
 from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import BtTasksimError, InputError
-from bt_tasksim.policy import split_action
+from bt_tasksim.policy import Policy, split_action
 from bt_tasksim.poses import Array
 from bt_tasksim.runner import LONGEST, Runner, end_all, failed_leaf
 from bt_tasksim.scene import Scene
-from bt_tasksim.training.decorator import Train, train_nodes
+from bt_tasksim.training.decorator import Train, concepts_in, train_nodes
 from bt_tasksim.training.follower import Judgement, Outcome
 from bt_tasksim.training.reward import PARTS, Reward
 
@@ -50,6 +50,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         lesson: Number of the scene's lesson that worlds are drawn from; None: the scene itself.
         longest: Seconds of an episode, earlier siblings included, after which it is truncated.
         render_mode: ``rgb_array``, or None.
+        policies: Policies of other leaves, by the leaf's name: what was trained before.
 
     Raises:
         InputError: There is no `Train` node, nothing under it can learn, or the leaves that learn differ in
@@ -69,6 +70,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         lesson: int | None = None,
         longest: float = LONGEST,
         render_mode: str | None = None,
+        policies: Mapping[str, Policy] | None = None,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise InputError(f"render_mode should be 'rgb_array' or None, found {render_mode!r}")
@@ -78,6 +80,9 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         for leaf in self.learners:
             leaf.under_training = True
         self.runner = Runner(tree, scene, options, longest=longest)
+        for leaf in concepts_in(tree):
+            if policies and leaf.name in policies and leaf not in self.learners:
+                leaf.use(policies[leaf.name])
         self.tree, self.scene = tree, scene
         self.reward = reward or Reward()
         self.stream, self.lesson, self.render_mode = stream, lesson, render_mode

@@ -1,0 +1,220 @@
+"""PPO of stable-baselines3, fed with lanes."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.buffers import RolloutBuffer
+from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+
+from bt_tasksim.network import Network
+from bt_tasksim.poses import Array
+from bt_tasksim.training.config import TrainConfig
+from bt_tasksim.training.rollouts import Lane
+
+
+class _Spaces(gymnasium.Env[Array, Array]):
+    """Tells stable-baselines3 the spaces; the episodes run elsewhere."""
+
+    def __init__(self, observation_space: Any, action_space: Any) -> None:
+        self.observation_space, self.action_space = observation_space, action_space
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        return np.zeros(self.observation_space.shape, np.float32), {}
+
+    def step(self, action: Any) -> Any:
+        raise RuntimeError("episodes are collected by worker processes")
+
+
+class Statistics:
+    """Running mean and variance of features.
+
+    Source: T. Chan, G. Golub, R. LeVeque, "Updating formulae and a pairwise algorithm for computing sample
+    variances", 1979.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.mean, self.variance, self.count = np.zeros(n), np.ones(n), 0.0
+
+    def update(self, rows: Array) -> None:
+        """Take in rows ``(k, n)``."""
+        k, mean, variance = len(rows), rows.mean(axis=0, dtype=float), rows.var(axis=0, dtype=float)
+        if self.count == 0.0:
+            self.mean, self.variance, self.count = mean, variance, float(k)
+            return
+        gap, total = mean - self.mean, self.count + k
+        spread = self.variance * self.count + variance * k + gap * gap * self.count * k / total
+        self.mean = self.mean + gap * (k / total)
+        self.variance, self.count = spread / total, total
+
+
+class Learner:
+    """A PPO whose rollouts come from lanes.
+
+    Args:
+        observation_space: Box ``(n,)``.
+        action_space: Box ``(m,)``.
+        config: The settings.
+        board: Folder for TensorBoard; None: nothing is logged.
+    """
+
+    def __init__(
+        self, observation_space: Any, action_space: Any, config: TrainConfig, board: Path | None = None
+    ) -> None:
+        self.config = config
+        with _seeded(config.seed):
+            self.ppo = PPO(
+                "MlpPolicy",
+                _Spaces(observation_space, action_space),
+                n_steps=config.lane_steps * config.lanes,
+                batch_size=min(config.minibatch, config.rollout),
+                n_epochs=config.epochs,
+                learning_rate=lambda left: (
+                    config.final_learning_rate + left * (config.learning_rate - config.final_learning_rate)
+                ),
+                gamma=config.reward.gamma,
+                gae_lambda=config.gae_lambda,
+                clip_range=config.clip,
+                ent_coef=config.entropy,
+                device="cpu",
+                policy_kwargs={
+                    "net_arch": {"pi": list(config.hidden), "vf": list(config.hidden)},
+                    "activation_fn": torch.nn.Tanh,
+                    "log_std_init": config.log_deviation,
+                },
+            )
+            with torch.no_grad():
+                self.ppo.policy.action_net.bias[-1] = config.terminate_bias
+        self.ppo.rollout_buffer = RolloutBuffer(
+            config.lane_steps,
+            observation_space,
+            action_space,
+            device="cpu",
+            gae_lambda=config.gae_lambda,
+            gamma=config.reward.gamma,
+            n_envs=config.lanes,
+        )
+        outputs = [TensorBoardOutputFormat(str(board))] if board is not None else []
+        self.logger = Logger(None if board is None else str(board), outputs)
+        self.ppo.set_logger(self.logger)
+        self.statistics = Statistics(observation_space.shape[0])
+
+    @property
+    def network(self) -> Network:
+        """The present policy without its exploration."""
+        policy = self.ppo.policy
+        hidden = [m for m in policy.mlp_extractor.policy_net if isinstance(m, torch.nn.Linear)]
+        layers = [(_numpy(m.weight), _numpy(m.bias)) for m in (*hidden, policy.action_net)]
+        return Network(self.statistics.mean, np.sqrt(self.statistics.variance), layers)
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviations ``(m,)`` of the actions."""
+        return np.exp(_numpy(self.ppo.policy.log_std))
+
+    def update(self, lanes: list[Lane], iteration: int) -> None:
+        """Learn from one rollout."""
+        config, policy, buffer = self.config, self.ppo.policy, self.ppo.rollout_buffer
+        network = self.network
+        n = config.lane_steps
+        features = np.stack([network.normalise(lane.features) for lane in lanes], axis=1)
+        actions = np.stack([lane.actions for lane in lanes], axis=1)
+        rewards = np.stack([lane.rewards for lane in lanes], axis=1)
+        starts = np.stack([lane.starts for lane in lanes], axis=1)
+        with torch.no_grad():
+            flat = torch.as_tensor(features.reshape(-1, features.shape[-1]))
+            values, log_prob, _ = policy.evaluate_actions(
+                flat, torch.as_tensor(actions.reshape(-1, actions.shape[-1]))
+            )
+            values = values.reshape(n, len(lanes))
+            log_prob = log_prob.reshape(n, len(lanes))
+            last = torch.zeros(len(lanes))
+            ended = np.ones(len(lanes), bool)
+            for k, lane in enumerate(lanes):
+                if len(lane.cut):
+                    beyond = policy.predict_values(torch.as_tensor(network.normalise(lane.cut))).flatten()
+                    for at, value in zip(lane.cut_at.tolist(), beyond, strict=True):
+                        if at == n - 1:
+                            last[k], ended[k] = value, False
+                        else:
+                            rewards[at, k] += config.reward.gamma * float(value)
+        buffer.reset()
+        for t in range(n):
+            buffer.add(features[t], actions[t], rewards[t], starts[t], values[t], log_prob[t])
+        buffer.compute_returns_and_advantage(last_values=last, dones=ended)
+        self.ppo.num_timesteps += config.rollout
+        self.ppo._update_current_progress_remaining(iteration, max(config.rollouts, 1))
+        with _seeded(config.seed, iteration + 1):
+            self.ppo.train()
+        self.statistics.update(np.concatenate([lane.features for lane in lanes]))
+
+    # ---- checkpoints ------------------------------------------------------------------------------------
+
+    def tensors(self) -> dict[str, Array]:
+        """Everything that a later `restore` needs, by name."""
+        out = {f"policy/{k}": _numpy(v) for k, v in self.ppo.policy.state_dict().items()}
+        state = self.ppo.policy.optimizer.state_dict()["state"]
+        for index, entries in state.items():
+            for name, value in entries.items():
+                out[f"optimizer/{index}/{name}"] = np.atleast_1d(_numpy(torch.as_tensor(value)))
+        statistics = self.statistics
+        out["statistics/mean"], out["statistics/variance"] = statistics.mean, statistics.variance
+        out["statistics/count"] = np.array([statistics.count])
+        return out
+
+    def restore(self, tensors: dict[str, Array], timesteps: int) -> None:
+        """Go on where `tensors` was taken."""
+        weights = {k.removeprefix("policy/"): v for k, v in tensors.items() if k.startswith("policy/")}
+        self.ppo.policy.load_state_dict({k: torch.as_tensor(v) for k, v in weights.items()})
+        optimizer = self.ppo.policy.optimizer
+        state = optimizer.state_dict()
+        for key, value in tensors.items():
+            if key.startswith("optimizer/"):
+                _, index, name = key.split("/")
+                entry = torch.as_tensor(value)
+                state["state"].setdefault(int(index), {})[name] = entry[0] if name == "step" else entry
+        optimizer.load_state_dict(state)
+        self.statistics.mean = tensors["statistics/mean"].astype(float)
+        self.statistics.variance = tensors["statistics/variance"].astype(float)
+        self.statistics.count = float(tensors["statistics/count"][0])
+        self.ppo.num_timesteps = timesteps
+
+    def begin_with(self, network: Network) -> None:
+        """Take over a trained network, to go on learning from it."""
+        policy = self.ppo.policy
+        hidden = [m for m in policy.mlp_extractor.policy_net if isinstance(m, torch.nn.Linear)]
+        with torch.no_grad():
+            for module, (w, b) in zip((*hidden, policy.action_net), network.layers, strict=True):
+                module.weight.copy_(torch.as_tensor(w))
+                module.bias.copy_(torch.as_tensor(b))
+        self.statistics.mean = network.mean.astype(float)
+        self.statistics.variance = network.deviation.astype(float) ** 2
+        self.statistics.count = float(self.config.rollout * 50)
+
+
+def _numpy(tensor: Any) -> Array:
+    found: Array = tensor.detach().cpu().numpy().copy()
+    return found
+
+
+@contextlib.contextmanager
+def _seeded(*seed: int) -> Iterator[None]:
+    """Seeds torch's and NumPy's own generators inside the block, and leaves them as they were."""
+    before = np.random.get_state()  # noqa: NPY002  # stable-baselines3 shuffles with it
+    number = int(np.random.SeedSequence(seed).generate_state(1)[0])
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(number)
+        np.random.seed(number)  # noqa: NPY002
+        try:
+            yield
+        finally:
+            np.random.set_state(before)  # noqa: NPY002
+
+
