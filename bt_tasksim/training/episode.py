@@ -266,7 +266,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             why, truncated = self._over, self._over == "time over"
         elif outcome is not None:
             why, truncated = outcome.why, outcome.discarded
-            if not outcome.discarded:
+            if not outcome.discarded and self.reward.sufficient:
                 parts["success" if outcome.success else "failure"] = (
                     self.reward.success if outcome.success else self.reward.failure
                 )

@@ -23,6 +23,7 @@ class Reward:
         timeout: The concept's own time was over.
         shaping: Weight of the potential.
         gamma: The learner's discount, for the potential.
+        sufficient: What follows pays; else only shaping and limits do (an ablation).
     """
 
     success: float = 1.0
@@ -31,6 +32,7 @@ class Reward:
     timeout: float = -1.0
     shaping: float = 0.5
     gamma: float = 0.99
+    sufficient: bool = True
 
     def __post_init__(self) -> None:
         if not 0.0 < self.gamma <= 1.0:
@@ -45,5 +47,5 @@ class Reward:
         return self.shaping * (self.gamma * after - before)
 
 
-PARTS = tuple(f.name for f in fields(Reward) if f.name != "gamma")
+PARTS = tuple(f.name for f in fields(Reward) if f.name not in ("gamma", "sufficient"))
 """Names of the parts of a reward, as an episode's ``info["reward"]`` gives them."""
