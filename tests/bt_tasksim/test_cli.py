@@ -19,6 +19,7 @@ from bt_tasksim.resources import asset
 
 ROOT = Path(__file__).resolve().parents[2]
 LOG = asset("demonstrations", "pick_and_place", "00.h5")
+COMMANDS = ("demo", "decompose", "show", "run", "policies", "replay", "evaluate", "bench")
 HEAVY = ("torch", "sapien", "mani_skill", "pinocchio", "mujoco", "ray", "cv2", "scipy", "h5py", "networkx")
 
 TREE = """
@@ -105,11 +106,11 @@ def test_the_package_hands_on_its_names_without_anything_heavy():
 def test_without_a_command_the_help_is_shown(call):
     code, out, _ = call()
     assert code == 0
-    for command in ("demo", "decompose", "show", "run", "replay", "evaluate", "bench"):
+    for command in COMMANDS:
         assert f"\n    {command}" in out
 
 
-@pytest.mark.parametrize("command", ["demo", "decompose", "show", "run", "replay", "evaluate", "bench"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_each_command_has_its_help(call, command):
     code, out, _ = call(command, "--help")
     assert code == 0 and out.startswith(f"usage: bt-tasksim {command}")
@@ -169,6 +170,42 @@ def test_run_writes_its_folder_and_replay_finds_the_same(call):
     assert (code == 0 and "identical" in out) or "same" in out
 
 
+def test_policies_are_listed_pinned_and_unpinned(call, shipped, policy):
+    home, pins = shipped("one"), Path("assets/policies/pins.json")
+    code, out, _ = call("policies", "--pin", "one")
+    assert code == 0 and json.loads(pins.read_text()) == {"grasp": {"panda": "one"}}
+    assert out.startswith("pinned one@") and "grasp on panda  pinned" in out
+    folder = policy("mine")
+    (folder / "card.json").write_text("{")
+    code, out, _ = call("policies", "--folder", folder, "--json", "p.json")
+    assert code == 0 and "960 of 1000 (96.0 %, 94.6 to 97.0) grasp_then_pick, noise original" in out
+    assert "mine\n  cannot be used: card '" in out and out.endswith("wrote p.json\n")
+    one, mine = json.loads(Path("p.json").read_text())
+    assert one["pinned"] and one["problem"] == "" and one["card"]["steps"] == 5000
+    assert one["folder"] == str(home / "one")
+    assert mine["card"] is None and "is not JSON" in mine["problem"] and not mine["pinned"]
+    code, out, _ = call("policies", "--unpin", "grasp", "panda")
+    assert code == 0 and out.startswith("'one' is no longer pinned") and json.loads(pins.read_text()) == {}
+
+
+def test_without_a_policy_the_list_says_so(call, shipped):
+    shipped()
+    assert call("policies") == (0, "there is no learned policy\n", "")
+
+
+def test_run_and_evaluate_take_the_policy_of_the_command_line(call, policy):
+    folder = policy("mine")
+    words = ("--policy", f"grasp={folder}", "--seed", 3)
+    code, out, _ = call("run", "pick_and_place", *words, "--out", "here")
+    assert code == 0
+    named = json.loads(Path("here/result.json").read_text())["policies"]
+    assert named["grasp target"].startswith("mine@") and named["place target"] == "programmed"
+    code, out, _ = call("replay", "here")
+    assert code == 0 and out.startswith("identical")
+    code, out, _ = call("evaluate", "pick_and_place", *words, "--episodes", 1, "--json", "e.json")
+    assert code == 0 and json.loads(Path("e.json").read_text())["policies"] == named
+
+
 def test_a_goal_out_of_reach_is_a_failed_run_with_the_leaf_and_the_distance(call):
     name = tree_file('sequence("far", Grasp("cup"), Pick("cup"), Bring("cup", position=(3.0, 0.0, 0.4)))')
     code, out, err = call("run", name, "--out", "far")
@@ -209,6 +246,13 @@ def test_a_failed_run_says_which_leaf_and_why(call):
         ("show gone.xml", "there is no tree file 'gone.xml'"),
         ("decompose gone.h5", "there is no file 'gone.h5'; check the path"),
         ("replay gone", "there is no file 'gone'; check the path"),
+        ("run pick_and_place --policy gasp=x", "no leaf of this concept; did you mean 'grasp'?"),
+        ("run pick_and_place --policy grasp=progammed", "no policy 'progammed'; did you mean 'programmed'?"),
+        ("evaluate pick_and_place --policy grasp=gone/x", "leaf 'grasp target': there is no policy folder"),
+        ("run pick_and_place --policy grasp=a --policy Grasp=b", "the policy of 'Grasp' is given twice"),
+        ("policies --folder gone", "there is no folder 'gone' to look for policies in"),
+        ("policies --pin gone", "no policy 'gone' in "),
+        ("policies --unpin gone panda", "no policy is pinned for 'gone' on 'panda'"),
     ],
 )
 def test_unknown_names(refused, words, sentence):
@@ -221,6 +265,8 @@ def test_unknown_names(refused, words, sentence):
         ("evaluate pick_and_place --episodes 0", "--episodes: should be a positive whole number, found '0'"),
         ("evaluate pick_and_place --workers many", "--workers: should be a whole number, found 'many'"),
         ("run pick_and_place --seed -1", "--seed: should be zero or a positive whole number, found '-1'"),
+        ("run pick_and_place --policy grasp", "--policy: should be CONCEPT=POLICY, such as grasp=programmed"),
+        ("policies --pin a --unpin b c", "not allowed with argument --pin"),
         ("runn pick_and_place", "invalid choice: 'runn'"),
         ("run", "the following arguments are required: TREE"),
     ],
@@ -411,6 +457,7 @@ WRITERS = [
     (f"decompose {LOG} --xml out", "out"),
     (f"decompose {LOG} --picture out", "out"),
     ("evaluate pick_and_place --episodes 1 --json out", "out"),
+    ("policies --json out", "out"),
 ]
 
 

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,10 +16,7 @@ from bt_tasksim.network import CLIP, Network
 def network(inputs=5, hidden=(8, 7), outputs=3, seed=0):
     rng = np.random.default_rng(seed)
     sizes = [inputs, *hidden, outputs]
-    layers = [
-        (rng.normal(size=(b, a)) / np.sqrt(a), rng.normal(size=b))
-        for a, b in zip(sizes[:-1], sizes[1:], strict=True)
-    ]
+    layers = [(rng.normal(size=(b, a)) / np.sqrt(a), rng.normal(size=b)) for a, b in pairwise(sizes)]
     return Network(rng.normal(size=inputs), rng.uniform(0.1, 2.0, inputs), layers)
 
 

@@ -1,18 +1,43 @@
-"""Policies: the programmed one does what the concept says, and names are resolved."""
+"""Policies: the programmed one does what the concept says, a learned one its network; names are found."""
+
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from bt_tasksim.errors import InputError
-from bt_tasksim.policy import Action, ProgrammedPolicy, resolve_policy
+from bt_tasksim.network import Network
+from bt_tasksim.policy import Action, LearnedPolicy, ProgrammedPolicy, resolve_policy, split_action
+from bt_tasksim.report.write import write_run
+from bt_tasksim.robot import load_robot
+from bt_tasksim.runner import Runner
+from concept_nodes import Grasp, Pick, Place
+from trees import sequence
+from trees.scenarios import pick_and_place
+
+PANDA, XARM = load_robot("panda"), load_robot("xarm7_ability")
 
 
 class Model:
+    actions = 2
+
     def programmed_motion(self, seen, memory):
         return np.array([seen, memory])
 
     def done(self, seen, memory):
         return seen == memory
+
+    def features(self, seen, memory):
+        return seen.tool
+
+    def decides(self, seen, memory):
+        return memory
+
+
+class Seen:
+    def __init__(self, tool):
+        self.tool = np.asarray(tool, float)
 
 
 def test_the_programmed_policy_is_the_concepts_own():
@@ -22,17 +47,106 @@ def test_the_programmed_policy_is_the_concepts_own():
     assert ProgrammedPolicy().act(Model(), 2.0, 1.0).terminate is False
 
 
+def test_a_learned_policy_clips_its_motion_and_its_last_output_says_done():
+    motion, done = split_action(np.array([[3.0, -0.2, 0.6], [0.0, -9.0, 0.4]]))
+    assert motion.tolist() == [[1.0, -0.2], [0.0, -1.0]] and done.tolist() == [True, False]
+
+
+def test_a_learned_policy_decides_only_where_the_concept_asks():
+    net = Network(np.zeros(3), np.ones(3), [(np.eye(3), np.zeros(3))])
+    policy = LearnedPolicy(net, "x@1")
+    rows = np.array([[0.5, 0.25, 1.0], [0.5, 0.25, 1.0], [0.5, 0.25, 0.0]])
+    asked = np.array([True, False, True])
+    batch = policy.act(Model(), Seen(rows), asked)
+    assert batch.motion.tolist() == [[0.5, 0.25], [0.0, 0.0], [0.5, 0.25]]
+    assert batch.terminate.tolist() == [True, False, False]
+    for row, free, motion, done in zip(rows, asked, batch.motion, batch.terminate, strict=True):
+        one = policy.act(Model(), Seen(row), free)
+        assert one.motion.tolist() == motion.tolist() and bool(one.terminate) == done
+
+
+# ---- names ------------------------------------------------------------------------------------------------
+
+
 @pytest.mark.parametrize("name", [None, "", "programmed"])
-def test_the_programmed_policy_has_a_name(name):
-    policy = resolve_policy(name, "grasp", "panda")
-    assert isinstance(policy, ProgrammedPolicy) and policy.name == "programmed"
+@pytest.mark.parametrize("concept", [Grasp, Pick])
+def test_where_nothing_is_pinned_the_programmed_policy_decides(shipped, name, concept):
+    shipped()
+    policy = resolve_policy(concept("cup", policy=name), PANDA)
+    assert isinstance(policy, ProgrammedPolicy) and policy.name == policy.source == "programmed"
 
 
-def test_an_unknown_policy_is_one_sentence():
-    with pytest.raises(
-        InputError, match="concept 'grasp' on robot 'panda': no policy 'x'; known: programmed"
+def test_a_policy_is_named_by_its_folder(policy, shipped, monkeypatch):
+    folder = policy("mine")
+    found = resolve_policy(Grasp("cup", policy=str(folder)), PANDA)
+    assert isinstance(found, LearnedPolicy) and found.source == str(folder)
+    name, hash = found.name.split("@")
+    assert name == "mine" and len(hash) == 12
+    monkeypatch.chdir(folder)
+    assert resolve_policy(Grasp("cup", policy="."), PANDA).name == found.name
+    assert resolve_policy(Grasp("cup", policy="../mine/"), PANDA).source == str(folder)
+
+
+def test_a_pinned_policy_is_taken_on_its_robot_alone(shipped):
+    shipped("grasp-one", pins={"grasp": {"panda": "grasp-one"}})
+    found = resolve_policy(Grasp("cup"), PANDA)
+    assert found.name.startswith("grasp-one@") and found.source == "grasp-one"
+    assert resolve_policy(Grasp("cup", policy="grasp-one"), PANDA).name == found.name
+    for leaf, robot in (
+        (Grasp("cup"), XARM),
+        (Pick("cup"), PANDA),
+        (Grasp("cup", policy="programmed"), PANDA),
     ):
-        resolve_policy("x", "grasp", "panda")
+        assert resolve_policy(leaf, robot).name == "programmed"
+
+
+def test_a_shipped_name_comes_before_a_folder(shipped, policy, monkeypatch, tmp_path):
+    shipped("same", steps=1)
+    local = policy("same", steps=2)
+    monkeypatch.chdir(tmp_path)
+    assert resolve_policy(Grasp("cup", policy="same"), PANDA).source == "same"
+    assert resolve_policy(Grasp("cup", policy="./same"), PANDA).source == str(local)
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("programed", r"leaf 'grasp cup': no policy 'programed'; did you mean 'programmed'\?"),
+        ("grasp-two", r"no policy 'grasp-two'; did you mean 'grasp-one'\?"),
+        ("runs/by-hnd", "there is no policy folder 'runs/by-hnd'; none is known"),
+        ("{tmp}/by-hnd", "there is no policy folder '.*/by-hnd'; did you mean 'by-hand'"),
+        ("{tmp}/by-hand/card.json", "card.json' is a file; a policy is a folder"),
+        ("{tmp}", "has no card.json"),
+    ],
+)
+def test_an_unknown_policy_is_one_sentence(shipped, policy, tmp_path, name, sentence):
+    shipped("grasp-one")
+    policy("by-hand")
+    with pytest.raises(InputError, match=sentence):
+        resolve_policy(Grasp("cup", policy=name.format(tmp=tmp_path)), PANDA)
+
+
+@pytest.mark.parametrize(
+    ("leaf", "robot", "sentence"),
+    [
+        (Pick, PANDA, "leaf 'pick cup': policy '.*' is for the concept 'grasp', not for 'pick'"),
+        (Grasp, XARM, "leaf 'grasp cup': policy '.*' is for the robot 'panda', not for 'xarm7_ability'"),
+    ],
+)
+def test_a_policy_for_something_else(policy, leaf, robot, sentence):
+    with pytest.raises(InputError, match=sentence):
+        resolve_policy(leaf("cup", policy=str(policy())), robot)
+
+
+def test_a_policy_of_an_older_layout(policy, monkeypatch):
+    folder = policy()
+    now = {**Grasp.layout(PANDA), "smell": 1}
+    monkeypatch.setattr(Grasp, "layout", classmethod(lambda cls, robot: now))
+    with pytest.raises(InputError, match="the concept's feature 'smell' is none of its own; train it again"):
+        resolve_policy(Grasp("cup", policy=str(folder)), PANDA)
+
+
+# ---- in a tree --------------------------------------------------------------------------------------------
 
 
 def test_results_name_the_policy_of_each_leaf(toy, act):
@@ -40,3 +154,41 @@ def test_results_name_the_policy_of_each_leaf(toy, act):
     configuration = stage.runner.scene.sample(0)
     result = stage.runner.finish(configuration, stage.context.world)
     assert result.policies == {"move": "programmed"}
+
+
+def test_a_wrong_policy_is_refused_before_anything_runs(policy, toy):
+    with pytest.raises(InputError, match="leaf 'grasp cup': policy"):
+        toy(sequence("t", Grasp("cup"), Grasp("cup", policy=str(policy("xarm", robot="xarm7_ability")))))
+
+
+def test_a_learned_policy_runs_in_physics_and_is_named(policy, tmp_path):
+    def build(name):
+        return sequence("s", Grasp("target", policy=name), Pick("target"), Place("target", on="goal"))
+
+    scene, folder = pick_and_place.scene(), policy("mine")
+    learned, files = write_run(tmp_path / "run", Runner(build(str(folder)), scene), 3)
+    programmed = Runner(build("programmed"), scene).run(3)
+    assert learned.policies["grasp target"].startswith("mine@")
+    assert learned.policies["pick target"] == "programmed"
+    # The network by hand says what the programmed policy says, so the episodes are the same.
+    assert learned.control_steps == programmed.control_steps and learned.verdict == programmed.verdict
+    assert learned.policies["grasp target"] in files.paths["report.html"].read_text()
+
+
+def test_a_run_with_a_learned_policy_needs_no_torch(policy, tmp_path):
+    code = (
+        "import sys\n"
+        "class NoTorch:\n"
+        "    def find_spec(self, name, *rest):\n"
+        "        if name.split('.')[0] in ('torch', 'stable_baselines3', 'gymnasium'):\n"
+        "            raise ImportError(name)\n"
+        "sys.meta_path.insert(0, NoTorch())\n"
+        "from bt_tasksim.robot import load_robot\n"
+        "from bt_tasksim.concept import Context\n"
+        "from concept_nodes import Grasp\n"
+        f"leaf = Grasp('cup', policy={str(policy())!r})\n"
+        "leaf.setup(context=Context(load_robot('panda')))\n"
+        "print(leaf.policy_in_use.name.split('@')[0], leaf.policy_in_use.network.inputs)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["by-hand", str(sum(Grasp.layout(PANDA).values()))]

@@ -76,6 +76,44 @@ def test_another_version_is_named(folder, tampered):
     assert found.differences["observations/objects"] > 1e-4
 
 
+@pytest.fixture
+def with_policy(shipped, tmp_path):
+    """A run with a pinned policy that was taken out again."""
+    shipped("one", pins={"grasp": {"panda": "one"}})
+    result, _ = write_run(tmp_path / "run", Runner(pick_and_place.build(), pick_and_place.scene()), 3)
+    assert result.policies["grasp target"].startswith("one@")
+    return tmp_path / "run", shipped("one", pins={})
+
+
+def test_the_recorded_policy_is_taken_whatever_is_pinned_now(with_policy):
+    run, _ = with_policy
+    found = replay(run)
+    assert found.identical and found.changed == {}
+    assert found.result.policies["grasp target"].startswith("one@")
+
+
+def test_another_policy_of_the_same_name_is_named(with_policy):
+    from bt_tasksim.policy_files import load_policy, save_policy
+
+    run, home = with_policy
+    network, card = load_policy(home / "one")
+    network.layers[0][1][0] = 0.3  # to the side
+    new = save_policy(home / "one", network, card)
+    found = replay(run)
+    assert not found.identical
+    assert found.changed == {"policy of 'grasp target'": (f"one@{card.hash}", f"one@{new.hash}")}
+    assert found.why.endswith(f"recorded with policy of 'grasp target' one@{card.hash}, now one@{new.hash}")
+
+
+def test_a_policy_that_is_gone_is_one_sentence(with_policy):
+    import shutil
+
+    run, home = with_policy
+    shutil.rmtree(home / "one")
+    with pytest.raises(InputError, match="leaf 'grasp target': no policy 'one'"):
+        replay(run)
+
+
 def test_a_demonstration_is_no_run():
     shipped = next(asset("demonstrations").rglob("*.h5"))
     with pytest.raises(InputError, match="is a demonstration, not the log of a run"):

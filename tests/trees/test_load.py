@@ -41,6 +41,39 @@ def refused(*arguments):
     return sentence
 
 
+# ---- policies ---------------------------------------------------------------------------------------------
+
+
+def policies_of(source):
+    return {leaf.name: leaf.policy for leaf in source.build().iterate() if hasattr(leaf, "policy")}
+
+
+def test_the_given_policy_goes_over_the_trees_own_and_into_its_xml(write, tmp_path):
+    text = GOOD.replace('Pick("cup")', 'Pick("cup"), Grasp("cup", policy="programmed", name="again")')
+    source = load_source(write("t.py", text), policies=[("Grasp", "policies/x")])
+    assert {k: v for k, v in policies_of(source).items() if v} == {
+        "grasp cup": "policies/x",
+        "again": "policies/x",
+    }
+    save_tree(source.build(), tmp_path / "t.xml")
+    again = load_source(str(tmp_path / "t.xml"), scene="shelf_to_shelf")
+    assert policies_of(again)["again"] == "policies/x"
+
+
+def test_without_one_the_tree_says_it(write):
+    source = load_source(write("t.py", GOOD.replace('Pick("cup")', 'Pick("cup", policy="programmed")')))
+    assert policies_of(source)["pick cup"] == "programmed" and policies_of(source)["grasp cup"] is None
+
+
+def test_policies_of_concepts_that_the_tree_lacks(write):
+    file = write("t.py", GOOD)
+    assert refused(file, None, None, None, [("bring", "x")]) == (
+        "a policy is given for 'bring', and the tree has no leaf of this concept; known: grasp, pick"
+    )
+    assert "did you mean 'grasp'" in refused(file, None, None, None, [("gasp", "x")])
+    assert "'pick' is given twice" in refused(file, None, None, None, [("pick", "x"), ("pick", "x")])
+
+
 # ---- scenarios --------------------------------------------------------------------------------------------
 
 

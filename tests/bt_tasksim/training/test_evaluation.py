@@ -47,6 +47,22 @@ def test_what_is_written_adds_up(evaluated):
     assert content["seconds"] > 0
 
 
+def test_workers_take_the_policies_of_the_job(policy):
+    programmed = evaluate(Job("pick_and_place"), [3, 4])
+    job = Job("pick_and_place", policies=(("grasp", str(policy("mine"))),))
+    one, two = evaluate(job, [3, 4]), evaluate(job, [3, 4], workers=2)
+    assert one.policies == two.policies and one.policies["grasp target"].startswith("mine@")
+    assert {v for k, v in one.policies.items() if k != "grasp target"} == {"programmed"}
+    # The policy by hand says what the programmed one says.
+    assert timeless(one.outcomes) == timeless(two.outcomes) == timeless(programmed.outcomes)
+
+
+def test_a_policy_that_never_says_done_fails(policy):
+    found = evaluate(Job("pick_and_place", policies=(("grasp", str(policy("idle", gain=0.0))),)), [3])
+    assert found.successes == 0 and found.outcomes[0].reason == "grasp target failed"
+    assert "not done within" in found.outcomes[0].why
+
+
 def outcome(seed, reason=""):
     return Outcome(seed, not reason, "SUCCESS", reason, "why", 10, 0.001, 0.0, 0.0, 0.1)
 
@@ -97,6 +113,11 @@ def test_an_error_in_an_episode_is_one_failure_and_not_the_end():
         ((Job("pick_and_thro"), [1]), "no scenario 'pick_and_thro'; did you mean 'pick_and_throw'"),
         ((Job("pick_and_throw", robot="pandar"), [1]), "'pandar'.*did you mean 'panda'"),
         ((Job("pick_and_throw", scene="shelf_to_shelf"), [1], 2), "no place 'trash_bin' in the scene"),
+        ((Job("pick_and_throw", policies=(("wipe", "x"),)), [1], 2), "given for 'wipe'.*no leaf.*known: "),
+        (
+            (Job("pick_and_throw", policies=(("grasp", "x/y"),)), [1], 2),
+            "'grasp cup': there is no policy folder",
+        ),
     ],
 )
 def test_bad_input_is_refused_before_any_process_starts(arguments, sentence):
