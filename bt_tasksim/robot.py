@@ -172,7 +172,7 @@ class RobotDescription:
         return xp.clip(fit, 0.0, 1.0)
 
     def pointing_down(self, position: Array, turn: float = 0.0) -> Array:
-        """The tool pose ``(7,)`` at a position ``(3,)`` that points down, turned from its neutral orientation.
+        """The tool pose ``(7,)`` at a position ``(3,)``, pointing down, turned from its neutral orientation.
 
         Neutral is the closing axis of the rest posture, when the arm's base turns to the position.
         """

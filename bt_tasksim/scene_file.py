@@ -205,10 +205,15 @@ def _check_areas(scene: Scene) -> None:
                 )
 
 
+def _smallest_exponents(spec: ObjectSpec) -> tuple[float, float]:
+    low = spec.exponents[0]
+    return low if isinstance(low, tuple) else (low, low)
+
+
 def _check_density(what: str, spec: ObjectSpec) -> None:
     for kind in spec.kinds:
         small = (spec.size or KINDS[kind].size_range)[0]
-        volume = shape(kind, ShapeSize(small, (spec.exponents[0],) * 2, spec.mesh)).volume
+        volume = shape(kind, ShapeSize(small, _smallest_exponents(spec), spec.mesh)).volume
         if spec.mass[1] > _DENSEST * volume:
             raise InputError(
                 f"{what}: {spec.mass[1]:g} kg in {1e6 * volume:.3g} cm3 would be denser than any metal: "

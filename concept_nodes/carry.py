@@ -14,7 +14,6 @@ from bt_tasksim.world import Command
 from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
 from concept_nodes.limits import force_at_wrist, strained
 
-
 SLIP = 0.03
 """Metres that a carried object may slip in the hand. Source, as of `TILT`: the last lesson of the released
 original's grasp training, task-sequencing-robotics-simulator."""
@@ -66,7 +65,7 @@ class Carry(ConceptModel):
         """How far the object failed to follow the hand, over what is tolerable.
 
         10 unless it hangs in the hand, clear of everything else; else the larger of its slip in the hand over
-        `SLIP` and of its tilt against the hand over `TILT`, where it is known how it lay in the hand at first.
+        `SLIP` and of its tilt against the hand over `TILT`, where it is known how it lay there at first.
         """
         free = ~known.supported(self.target) & (known.hand_force(self.target) > 0.2)
         xp = array_namespace(known.hidden.objects)

@@ -65,12 +65,12 @@ class Grasp(ConceptModel):
     """Grasp an object (makes the hand's contacts; the object's own contact with its support is kept).
 
     The tool comes to a pose above the object (against ``approach``), straight on to the grasp pose, and the
-    hand closes along ``closing``. As a task model it is done when opposing fingertips have contact and the hand
-    has come to rest.
+    hand closes along ``closing``. As a task model it is done when opposing fingertips have contact and the
+    hand has come to rest.
 
-    As a concept model it does not know the object's shape, mass, friction and true position, and its size only
-    as perception tells it. A learned policy moves the tool from this reference motion, says how far to close,
-    and when it is enough; what it looks at stands in `grasp_features`.
+    As a concept model it does not know the object's shape, mass, friction and true position, and its size
+    only as perception tells it. A learned policy moves the tool from this reference motion, says how far to
+    close, and when it is enough; what it looks at stands in `grasp_features`.
 
     Args:
         target: The object.

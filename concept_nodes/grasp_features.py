@@ -22,7 +22,7 @@ SCALE = (0.015, 0.025, 0.035, 0.25, 0.5)
 radians about z, and of the hand's closure. Source of their order: the released original's grasp training,
 which has 0.03 m, 0.01 m and 0.35 rad; the sides are wider here for estimates that are 8 mm off."""
 RATE = (0.004, 0.005, 0.006, 0.04, 0.15)
-"""Largest change of these offsets within a control period of 50 ms: exploring actions do not shake the arm."""
+"""Largest change of these offsets in a control period of 50 ms: exploring actions do not shake the arm."""
 PERIOD = 0.05
 """Seconds that `RATE` refers to."""
 

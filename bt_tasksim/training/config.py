@@ -23,12 +23,12 @@ class TrainConfig:
         steps: Decisions of the leaves under training, in all.
         seed: Everything random follows from it.
         lanes: Parallel strands of episodes in a rollout; results depend on it, and not on the workers.
-        lane_steps: Decisions of a lane in one rollout. 8 lanes of 512 hold some 150 episodes: enough to judge a
-            completion signal that pays once in each.
+        lane_steps: Decisions of a lane in one rollout. 8 lanes of 512 hold some 150 episodes: enough to judge
+            a completion signal that pays once in each.
         epochs: Passes over a rollout.
         minibatch: Decisions in a gradient step.
         learning_rate: At the beginning.
-        final_learning_rate: At the end; in between it falls linearly, so that the last policy is a settled one.
+        final_learning_rate: At the end; in between it falls linearly, so that the last policy is settled.
         gae_lambda: Of the generalised advantage estimation.
         clip: Largest relative change of a decision's probability.
         entropy: Weight of the entropy; none, since the deviation below only shrinks when that pays.
@@ -65,14 +65,24 @@ class TrainConfig:
     reward: Reward = field(default_factory=Reward)
 
     def __post_init__(self) -> None:
-        for name in ("steps", "lanes", "lane_steps", "epochs", "minibatch", "success_window", "checkpoint_every"):
+        for name in (
+            "steps",
+            "lanes",
+            "lane_steps",
+            "epochs",
+            "minibatch",
+            "success_window",
+            "checkpoint_every",
+        ):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < 1:
                 raise InputError(f"training: '{name}' should be a positive whole number, found {value!r}")
         for name in ("seed", "evaluate_every", "evaluation_draws"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-                raise InputError(f"training: '{name}' should be zero or a positive whole number, found {value!r}")
+                raise InputError(
+                    f"training: '{name}' should be zero or a positive whole number, found {value!r}"
+                )
         for name in ("learning_rate", "final_learning_rate", "clip"):
             value = getattr(self, name)
             if not math.isfinite(value) or value <= 0.0:

@@ -65,13 +65,13 @@ class Train(Decorator):
             names = ", ".join(f"'{leaf.name}'" for leaf in self.concepts()) or "no concept at all"
             raise InputError(
                 f"nothing below '{self.name}' can learn ({names}): a concept with something unknown sets "
-                f"is_task_model = False, and its leaf does not say policy=\"programmed\""
+                f'is_task_model = False, and its leaf does not say policy="programmed"'
             )
         for leaf in found:
             if type(leaf).features is ConceptModel.features or type(leaf).layout is ConceptModel.layout:
                 raise InputError(
-                    f"'{leaf.name}' below '{self.name}' cannot learn: {type(leaf).__name__} has no features() "
-                    f"with its layout()"
+                    f"'{leaf.name}' below '{self.name}' cannot learn: "
+                    f"{type(leaf).__name__} has no features() with its layout()"
                 )
         return found
 

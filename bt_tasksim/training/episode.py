@@ -30,8 +30,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
     """One activation of what stands under a `Train` node, as an episode.
 
     ``reset`` draws a world and ticks the tree until a leaf under training is about to act; ``step`` gives it
-    an action and goes on to its next decision. Earlier siblings run first; once the subtree says SUCCESS, what
-    follows it runs to its end within that same ``step`` and pays the sufficient reward.
+    an action and goes on to its next decision. Earlier siblings run first; once the subtree says SUCCESS,
+    what follows it runs to its end within that same ``step`` and pays the sufficient reward.
 
     An action holds the concept's motion in [-1, 1] and, last, the completion signal: above
     `bt_tasksim.policy.TERMINATE` the task is done, and the motion counts for nothing.
@@ -90,6 +90,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         n, m = sum(self.layout.values()), self.learners[0].actions
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (n,), np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (m + 1,), np.float32)
+        self._action_shape = (m + 1,)
         self.judgement = Judgement(self.train, self.runner.context)
         self.redrawn = 0
         """Draws so far in which the subtree was never active."""
@@ -125,8 +126,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             if redrawn >= REDRAWS or given is not None:
                 leaf = failed_leaf(self.tree)
                 raise InputError(
-                    f"'{self.train.name}' was not reached in {redrawn} draws; the last one (seed {draw}) ended "
-                    f"with {self.tree.status.name}: {leaf.feedback_message if leaf is not None else ''}"
+                    f"'{self.train.name}' was not reached in {redrawn} draws; the last one (seed {draw}) "
+                    f"ended with {self.tree.status.name}: {leaf.feedback_message if leaf is not None else ''}"
                 )
         self.redrawn += redrawn
         self._cost0 = self._cost(decision)
@@ -146,8 +147,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         if decision is None:
             raise RuntimeError("step() without an episode: call reset() first")
         action = np.asarray(action, np.float64)
-        if action.shape != self.action_space.shape or not np.isfinite(action).all():
-            raise InputError(f"an action should be {self.action_space.shape[0]} finite numbers, found {action}")
+        if action.shape != self._action_shape or not np.isfinite(action).all():
+            raise InputError(f"an action should be {self._action_shape[0]} finite numbers, found {action}")
         decision.leaf.decide(split_action(action))
         parts = dict.fromkeys(PARTS, 0.0)
         found = self._until_decision()

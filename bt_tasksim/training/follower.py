@@ -76,7 +76,10 @@ class Judgement:
             known = Known(hidden, self._context.world, began[1])
             cost = float(node.sufficient_cost(known, node.memory))
             if cost >= self._cost and cost > 0.0:
-                self._cost, self._why = cost, f"{node.name} ended SUCCESS, and its goal is missed by {cost:.2g}"
+                self._cost, self._why = (
+                    cost,
+                    f"{node.name} ended SUCCESS, and its goal is missed by {cost:.2g}",
+                )
 
     def ended(self) -> Outcome | None:
         """The outcome, once there is one; asked after each tick."""
@@ -114,6 +117,7 @@ class Judgement:
 def _why(root: Behaviour) -> str:
     """The reason of the leaf that failed below a node."""
     leaf = next(
-        (n for n in root.iterate() if n.status == Status.FAILURE and not n.children and n.feedback_message), None
+        (n for n in root.iterate() if n.status == Status.FAILURE and not n.children and n.feedback_message),
+        None,
     )
     return f"{leaf.name}: {leaf.feedback_message}" if leaf is not None else root.feedback_message

@@ -27,7 +27,7 @@ class _Spaces(gymnasium.Env[Array, Array]):
         self.observation_space, self.action_space = observation_space, action_space
 
     def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
-        return np.zeros(self.observation_space.shape, np.float32), {}
+        return np.zeros(self.observation_space.shape or (), np.float32), {}
 
     def step(self, action: Any) -> Any:
         raise RuntimeError("episodes are collected by worker processes")
@@ -216,5 +216,3 @@ def _seeded(*seed: int) -> Iterator[None]:
             yield
         finally:
             np.random.set_state(before)  # noqa: NPY002
-
-

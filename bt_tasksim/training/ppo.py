@@ -158,14 +158,12 @@ class _Run:
     def go(self, resume: bool, report: Callable[[Progress], None] | None) -> LearnedPolicy:
         if self.folder is not None and not resume and (self.folder / CHECKPOINT).exists():
             raise InputError(
-                f"there is an unfinished training in '{self.folder}': go on with --resume, or remove the folder"
+                f"there is a training in '{self.folder}' already: go on with --resume, or remove the folder"
             )
         tree, scene, node = self.tree, self.scene, self.node
 
         def make() -> EpisodeEnv:
-            return EpisodeEnv(
-                tree, scene, node.name, self.options, self.config.reward, policies=self.trained
-            )
+            return EpisodeEnv(tree, scene, node.name, self.options, self.config.reward, policies=self.trained)
 
         pool = Workers(make, self.workers)  # before torch starts threads of its own
         try:
@@ -173,9 +171,7 @@ class _Run:
         finally:
             pool.close()
 
-    def _learn(
-        self, pool: Workers, resume: bool, report: Callable[[Progress], None] | None
-    ) -> LearnedPolicy:
+    def _learn(self, pool: Workers, resume: bool, report: Callable[[Progress], None] | None) -> LearnedPolicy:
         import gymnasium
         import torch
 
@@ -229,7 +225,9 @@ class _Run:
         arrays, deviation = learner.network.arrays(), learner.deviation
         lesson = self.lesson if self.scene.lessons else None
         tasks = [
-            Task("lane", arrays, deviation, (self.config.seed, int(warm), self.iteration, k), decisions, lesson)
+            Task(
+                "lane", arrays, deviation, (self.config.seed, int(warm), self.iteration, k), decisions, lesson
+            )
             for k in range(self.config.lanes)
         ]
         found = dict(pool.each(tasks))

@@ -11,9 +11,9 @@ from bt_tasksim.errors import InputError
 class Reward:
     """What an episode pays.
 
-    The sum over an episode lies near ``success`` or ``failure``; shaping only shows the way. The potential of a
-    state is how much smaller its necessary cost is than the cost at the episode's first decision: so standing
-    still pays nothing, and coming closer without ever being done pays less than nothing in the end.
+    The sum over an episode lies near ``success`` or ``failure``; shaping only shows the way. The potential of
+    a state is how much smaller its necessary cost is than the cost at the episode's first decision: so
+    standing still pays nothing, and coming closer without ever being done pays less than nothing in the end.
     Source: A. Ng, D. Harada, S. Russell, "Policy invariance under reward transformations", ICML 1999.
 
     Attributes:

@@ -1,7 +1,7 @@
 """Episodes collected over worker processes, the same whatever their number.
 
-A rollout is a fixed number of lanes. Each lane runs its own episodes for a fixed number of decisions, with its
-own seeds, in whichever worker is free: so the number of workers changes the time and nothing else.
+A rollout is a fixed number of lanes. Each lane runs its own episodes for a fixed number of decisions, with
+its own seeds, in whichever worker is free: so the number of workers changes the time and nothing else.
 """
 
 from __future__ import annotations
@@ -219,4 +219,3 @@ def _work(make: EnvMaker, pipe: Connection, others: list[Connection]) -> None:
         except Exception as error:
             pipe.send(("error", MachineError(f"{error!r}: {traceback.format_exc(limit=-3)}")))
     os._exit(0)
-
