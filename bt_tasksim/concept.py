@@ -119,18 +119,16 @@ class ConceptNode(ContextLeaf, abc.ABC):
         super().setup(**kwargs)
         model = self._model
         self.lacks_policy = False
-        try:
-            self._policy = resolve_policy(model, self.context.robot)
-        except InputError:
-            if not self.under_training and model.is_programmed:
-                raise
+        if self.under_training:
             self._policy = None
-        if not model.is_programmed and (self._policy is None or self._policy.name == PROGRAMMED):
+            return
+        self._policy = resolve_policy(model, self.context.robot)
+        if not model.is_programmed and self._policy.name == PROGRAMMED:
             self.lacks_policy, self._policy = True, None
 
     def use(self, policy: Policy) -> None:
         """Let another policy decide, from now on and until the tree is set up again."""
-        self._policy = policy
+        self._policy, self.lacks_policy = policy, False
 
     def decide(self, action: Action) -> None:
         """Take the action that the suspended tick waits for, see `Decision`."""

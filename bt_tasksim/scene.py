@@ -25,6 +25,8 @@ from bt_tasksim.world import ObjectModel, Obstacle, PlaceModel, WorldModel
 STREAMS = {"evaluation": 0, "training": 1, "validation": 2, "demonstration": 3}
 """Names of the independent streams of draws: the same seed gives unrelated draws in each."""
 _STRIPS = 10
+ASIDE = 0.5
+"""Radians by which a tilted approach may lean aside, see `Lesson`."""
 STRIPS = ("all", "even", "odd")
 """Parts of a range from which draws are made, see `ObjectSpec`."""
 
@@ -122,6 +124,9 @@ class Lesson:
         objects: Objects that are drawn otherwise than in the scene itself, by name.
         noise: Names of noise models of the estimate; each world has one of them. None: the engine's.
         hand: Where the hand is at first; None: in its rest posture.
+        tilt: Largest angle in radians between straight down and the direction in which a hand comes to the
+            objects. Half of the worlds have straight down, the others an angle up to this, leaning away from
+            the robot, and aside by up to `ASIDE`.
         tolerance: Sufficient cost below which a goal counts as reached: 1 for what is meant in the end.
         until: Share of successes in training from which the next lesson begins; the last one never ends.
     """
@@ -130,6 +135,7 @@ class Lesson:
     objects: Mapping[str, ObjectSpec] = field(default_factory=dict)
     noise: tuple[str, ...] = ()
     hand: HandStart | None = None
+    tilt: float = 0.0
     tolerance: float = 1.0
     until: float = 0.9
 
@@ -199,6 +205,8 @@ class ObjectActor:
     mesh: str | None = None
     known_size: tuple[float, float, float] | None = None
     """The size it is taken to have; None where that is its true one."""
+    on: str = ""
+    """Name of the place where it starts."""
 
     def shape(self) -> Shape:
         """Its geometry."""
@@ -366,9 +374,7 @@ class Scene:
         """The same scene with another robot."""
         return dataclasses.replace(self, robot=robot)
 
-    def sample(
-        self, seed: int, stream: str = "evaluation", lesson: int | None = None
-    ) -> ActorConfiguration:
+    def sample(self, seed: int, stream: str = "evaluation", lesson: int | None = None) -> ActorConfiguration:
         """Draw one world.
 
         Args:
@@ -392,6 +398,8 @@ class Scene:
             spec = usual if taught is None else taught.objects.get(name, usual)
             assert isinstance(spec, ObjectSpec)
             objects.append(_draw_object(name, spec, places, objects, rng))
+        if taught is not None and taught.tilt > 0.0:
+            _tilt_access(taught, objects, places, generator(seed, stream, "approach"))
         disturbance = None
         if self.knock is not None:
             disturbance = _draw_disturbance(self.knock, rng)
@@ -496,6 +504,7 @@ def _draw_object(
         colour=colour,
         mesh=spec.mesh,
         known_size=known_size,
+        on=spec.on,
     )
 
 
@@ -538,6 +547,17 @@ def _draw_hand(
     x, y = rng.uniform(-start.aside, start.aside, 2).tolist()
     z, turn = float(rng.uniform(*start.height)), float(rng.uniform(-start.turn, start.turn))
     return centre[0] + x, centre[1] + y, centre[2] + z, turn
+
+
+def _tilt_access(
+    lesson: Lesson, objects: Sequence[ObjectActor], places: dict[str, PlaceModel], rng: np.random.Generator
+) -> None:
+    tilt, aside = max(0.0, float(rng.uniform(-lesson.tilt, lesson.tilt))), float(rng.uniform(-ASIDE, ASIDE))
+    for actor in objects:
+        heading = np.arctan2(actor.pose[1], actor.pose[0]) + aside
+        level = np.sin(tilt)
+        access = np.array([level * np.cos(heading), level * np.sin(heading), -np.cos(tilt)])
+        places[actor.on] = dataclasses.replace(places[actor.on], access=access)
 
 
 def _draw_disturbance(name: str, rng: np.random.Generator) -> Disturbance:

@@ -36,6 +36,7 @@ class StatePostProcess:
         n = len(configuration.objects)
         noise = noise_model(configuration.noise) if configuration.noise else self.noise
         self._error = noise.draw(configuration.generator("estimate"), n)
+        self._error[:, :3] = _along_approach(self._error[:, :3], configuration)
         self._local: Array | None = None
         self._builder = ObservationBuilder(self.robot, configuration)
 
@@ -53,6 +54,31 @@ class StatePostProcess:
         for i in range(estimate.shape[0]):
             estimate[i] = poses.multiply(state.objects[i], self._local[i])
         return self._builder.build(state, estimate)
+
+
+def _along_approach(errors: Array, configuration: ActorConfiguration) -> Array:
+    """Displacements ``(n, 3)`` given across and along the approach, in the robot base frame.
+
+    The approach is that of the place on which each object starts; straight down leaves them as they are, and
+    another one turns them by the shortest turn from straight down.
+    """
+    access = {place.name: place.access for place in configuration.places}
+    out = errors.copy()
+    for i, actor in enumerate(configuration.objects):
+        towards = access.get(actor.on)
+        if towards is not None:
+            out[i] = poses.rotate(_shortest_turn(_DOWN, towards), errors[i])
+    return out
+
+
+def _shortest_turn(a: Array, b: Array) -> Array:
+    """Unit quaternion ``(4,)`` of the shortest turn from one unit vector ``(3,)`` to another."""
+    q = np.array([1.0 + float(a @ b), *poses.cross(a, b)])
+    length = float(np.linalg.norm(q))
+    return q / length if length > 1e-9 else np.array([0.0, 1.0, 0.0, 0.0])
+
+
+_DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def _error_in_object(objects: Array, error: Array) -> Array:

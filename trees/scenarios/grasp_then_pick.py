@@ -1,7 +1,8 @@
 """Grasp an object of unknown shape, size, mass and friction, and lift it: the tree a grasp is trained in.
 
-The scene itself draws what is never trained on: other kinds of objects, and of superellipsoids other sizes and
-exponents (the odd strips of their ranges). Its lessons draw superellipsoids from the even strips alone.
+The scene itself draws what is never trained on: other kinds of objects, and of superellipsoids other sizes
+and exponents (the odd strips of their ranges). Its lessons draw superellipsoids from the even strips alone,
+and let the hand come from above or slanted, as to a shelf.
 """
 
 from __future__ import annotations
@@ -46,10 +47,13 @@ SHAPES = ObjectSpec(
 )
 HAND = HandStart("target")
 """Half a second away: the way from the rest posture is not what is learned."""
+TILT = 1.05
+"""Radians from straight down: 60 degrees, of which the shelf takes 55."""
+NOISE = ("original", "hard")
 LESSONS = (
-    Lesson("near-boxes", {"target": BOXES}, ("fine", "original"), HAND, tolerance=3.0, until=0.7),
-    Lesson("all shapes", {"target": SHAPES}, ("original", "hard"), HAND, tolerance=3.0, until=0.8),
-    Lesson("all shapes, held firmly", {"target": SHAPES}, ("original", "hard"), HAND),
+    Lesson("near-boxes", {"target": BOXES}, ("fine", "original"), HAND, TILT, tolerance=3.0, until=0.6),
+    Lesson("all shapes", {"target": SHAPES}, NOISE, HAND, TILT, tolerance=3.0, until=0.65),
+    Lesson("all shapes, held firmly", {"target": SHAPES}, NOISE, HAND, TILT),
 )
 
 
