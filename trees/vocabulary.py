@@ -1,4 +1,4 @@
-"""The nodes of BehaviorTree.CPP v4 that trees are read from and written to, and the ports of leaves.
+"""The nodes of BehaviorTree.CPP v4 that trees are read from and written to, `Train`, and the ports of leaves.
 
 One table serves the reader, the writer, the node models, tree equality and pictures.
 """
@@ -16,6 +16,7 @@ from py_trees.decorators import FailureIsSuccess, Inverter, SuccessIsFailure
 from bt_tasksim.concept import ConceptModel, Condition
 from bt_tasksim.errors import InputError, nearest
 from bt_tasksim.parameters import MISSING, Parameter, Quantity
+from bt_tasksim.training.decorator import Train
 from trees.authoring import (
     fallback,
     force_failure,
@@ -55,6 +56,7 @@ class Kind:
         ports: Its attributes.
         read: Values of its ports.
         memory: ``memory`` of a py_trees sequence or selector; None for the others.
+        own: BehaviorTree.CPP does not have it: a file declares it in its node models.
     """
 
     tag: str
@@ -64,6 +66,7 @@ class Kind:
     ports: tuple[Port, ...] = ()
     read: Callable[[Any], dict[str, int]] = lambda node: {}
     memory: bool | None = None
+    own: bool = False
 
     def describes(self, node: Behaviour) -> bool:
         """The node is of this kind."""
@@ -114,6 +117,7 @@ KINDS: dict[str, Kind] = {
             (Port("msec"),),
             lambda node: {"msec": round(node.seconds * 1000)},
         ),
+        Kind("Train", "Decorator", Train, lambda n, c, p: Train(c[0], n), own=True),
     )
 }
 

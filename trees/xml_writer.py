@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
@@ -43,6 +43,8 @@ PORT_DOCS = {
     "vector": "three numbers",
     "points": "three numbers a point",
 }
+OWN = tuple(tag for tag, kind in KINDS.items() if kind.own)
+"""Decorators that BehaviorTree.CPP does not have."""
 TAKEN = {*KINDS, *OUTSIDE, *CATEGORIES}
 FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -77,16 +79,17 @@ def tree_to_xml(root: Behaviour, *, scene: str | None = None) -> str:
     return _Writer(root).document(scene)
 
 
-def node_models(leaves: Mapping[str, Leaf]) -> str:
+def node_models(leaves: Mapping[str, Leaf], decorators: Iterable[str] = OWN) -> str:
     """The ``TreeNodesModel`` of concepts and conditions, for Groot2's palette and for BehaviorTree.CPP.
 
     Args:
         leaves: The classes, by name.
+        decorators: Decorators that BehaviorTree.CPP does not have.
 
     Raises:
         InputError: A parameter has a name that BehaviorTree.CPP keeps for itself.
     """
-    lines = ["<TreeNodesModel>"]
+    lines = ["<TreeNodesModel>", *(f'{INDENT}<Decorator ID="{name}"/>' for name in sorted(decorators))]
     for name in sorted(leaves):
         leaf = leaves[name]
         tag = "Action" if is_concept(leaf) else "Condition"
@@ -106,6 +109,7 @@ class _Writer:
 
         self.root = root
         self.leaves: dict[str, Leaf] = {}
+        self.own: set[str] = set()
         for node in root.iterate():
             if isinstance(node, ConceptModel | Condition):
                 name = type(node).__name__
@@ -113,6 +117,8 @@ class _Writer:
                     raise InputError(f"two different leaves are called {name}: rename one of the classes")
                 if name in TAKEN:
                     raise InputError(f"leaf {name} has the name of a node of BehaviorTree.CPP: rename it")
+            elif (kind := kind_of(node)) is not None and kind.own:
+                self.own.add(kind.tag)
         reserved = {*TAKEN, *self.leaves, *catalogue()}
         self.taken = {name.casefold() for name in reserved} | {"root", "undefined"}
         self.trees: dict[str, str] = {}
@@ -128,8 +134,8 @@ class _Writer:
             _tree(main, body),
             *(_tree(name, text) for name, text in self.trees.items()),
         ]
-        if self.leaves:
-            parts.append(_shift(node_models(self.leaves), 1))
+        if self.leaves or self.own:
+            parts.append(_shift(node_models(self.leaves, self.own), 1))
         return "\n".join([*parts, "</root>\n"])
 
     def _body(self, root: Behaviour) -> str:

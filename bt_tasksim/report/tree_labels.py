@@ -27,6 +27,7 @@ SYMBOLS = {
     "Timeout": "◷",
     "ForceSuccess": "✓",
     "ForceFailure": "✗",
+    "Train": "✎",
 }
 WORDS = {
     "Sequence": "sequence",
@@ -40,6 +41,7 @@ WORDS = {
     "Timeout": "time-out",
     "ForceSuccess": "force success",
     "ForceFailure": "force failure",
+    "Train": "train",
 }
 SETTING_UNITS = {"timeout": "s", "tolerance": "m", "policy": ""}
 

@@ -15,6 +15,7 @@ from py_trees.common import Status
 
 import trees
 from bt_tasksim.concept import Condition
+from bt_tasksim.training.decorator import Train
 from trees import authoring
 
 cpp = pytest.importorskip("behaviortreepy", reason="BehaviorTree.CPP's Python binding is not installed")
@@ -61,7 +62,9 @@ def shapes() -> st.SearchStrategy:
                 st.sampled_from(["sequence", "fallback", "reactive_sequence", "reactive_fallback"]), several
             ),
             st.tuples(st.just("parallel"), several, counts, counts),
-            st.tuples(st.sampled_from(["invert", "force_success", "force_failure", "subtree"]), inner),
+            st.tuples(
+                st.sampled_from(["invert", "force_success", "force_failure", "subtree", "train"]), inner
+            ),
             st.tuples(st.sampled_from(["retry", "repeat"]), inner, st.sampled_from([-1, 1, 2, 3])),
         )
 
@@ -85,6 +88,8 @@ def build(shape) -> tuple[Behaviour, list[Scripted]]:
             return authoring.parallel("p", *children, success=fit[0], failure=fit[1])
         if kind == "subtree":
             return authoring.subtree("s", node(part[1]))
+        if kind == "train":
+            return Train(node(part[1]))
         if kind in ("invert", "force_success", "force_failure"):
             return getattr(authoring, kind)(node(part[1]))
         return getattr(authoring, kind)("n", *(node(c) for c in part[1]))
@@ -115,6 +120,7 @@ def test_both_tick_and_halt_the_same_leaves(shape):
     factory = cpp.BehaviorTreeFactory()
     for leaf in leaves:
         register(factory, leaf, cpp_log)
+    factory.register_simple_decorator("Train", lambda status, node: status)
     text = trees.tree_to_xml(tree)
     factory.register_behavior_tree_from_text(text)
     cpp_tree = factory.create_tree(ET.fromstring(text).get("main_tree_to_execute"))

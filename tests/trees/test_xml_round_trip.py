@@ -24,6 +24,7 @@ from bt_tasksim.parameters import (
     Ratio,
     Text,
 )
+from bt_tasksim.training.decorator import Train
 from bt_tasksim.world import Command
 from trees import authoring
 
@@ -127,6 +128,7 @@ def extend(inner: st.SearchStrategy) -> st.SearchStrategy:
         st.builds(lambda c, n: authoring.force_success(c, name=n), inner, names),
         st.builds(lambda c: authoring.force_failure(c), inner),
         st.builds(lambda n, c: authoring.subtree(n, c), names, inner),
+        st.builds(lambda c, n: Train(c, n), inner, st.none() | names),
     )
 
 
@@ -208,6 +210,21 @@ def test_a_file_holds_the_models_of_its_leaves():
     assert ports["target"].get("default") is None
     assert {"policy", "timeout", "tolerance", "uncertainty"} <= set(ports)
     assert [p.get("name") for p in model.find("Condition[@ID='Near']")] == ["target", "within"]
+
+
+def test_what_is_to_be_learned_is_written_and_its_decorator_declared():
+    tree = authoring.sequence("main", Train(Poke("cup")), Poke("box"))
+    text = trees.tree_to_xml(tree)
+    root = ET.fromstring(text)
+    assert root.find(".//BehaviorTree//Train").attrib == {"name": "train poke cup"}
+    assert root.find(".//Train/Poke").attrib == {"target": "cup"}
+    assert [d.attrib for d in root.findall("TreeNodesModel/Decorator")] == [{"ID": "Train"}]
+    loaded = trees.tree_from_xml(text, NODES)
+    assert trees.same_tree(tree, loaded) and type(loaded.children[0]) is Train
+    explicit = text.replace("<Train ", '<Decorator ID="Train" ').replace("</Train>", "</Decorator>")
+    assert trees.same_tree(tree, trees.tree_from_xml(explicit, NODES))
+    assert "Decorator" not in trees.tree_to_xml(small()), "only what a file holds is declared in it"
+    assert '<Decorator ID="Train"/>' in trees.node_models(NODES), "an editor's palette has it"
 
 
 def test_a_subtree_used_twice_is_written_once():

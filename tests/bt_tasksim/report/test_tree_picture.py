@@ -16,6 +16,7 @@ from bt_tasksim.errors import InputError
 from bt_tasksim.parameters import Direction, Metres, ObjectName, Points
 from bt_tasksim.report.tree_labels import SYMBOLS, WORDS
 from bt_tasksim.report.tree_picture import _arranged, _boxes, node_ids, tree_svg, tree_text
+from bt_tasksim.training.decorator import Train
 from bt_tasksim.world import Command
 from trees.vocabulary import KINDS
 
@@ -85,6 +86,16 @@ def test_labels_are_there_and_escaped():
         "plain",
     ):
         assert expected in texts
+
+
+def test_what_is_to_be_learned_is_marked():
+    root = trees.sequence("root", Train(Poke("cup")), Train(Poke("box"), "Train"))
+    svg = tree_svg(root)
+    assert [g.get("class") for g in groups(svg).values()] == ["control", *("decorator", "concept") * 2]
+    texts = [t.text for t in ET.fromstring(svg).iter(f"{SVG}text")]
+    assert texts.count("✎") == 2 and texts.count("train") == 2, "a sign and a word, named or not"
+    assert "train poke cup" in texts
+    assert tree_text(root).splitlines()[1] == "├─ ✎ train poke cup  (train)"
 
 
 def test_statuses_colour_the_nodes():
