@@ -29,7 +29,9 @@ PAGES = ("README.md", "docs/evaluation.md")
 ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
 KINDS = ("camera", "fromlogs")
-OTHER = ("speed", "decomposition")
+OTHER = ("speed", "decomposition", "learning")
+APART = ("oracle-", "grasp-")
+"""How results begin that have tables of their own, see `benchmarks.learned_tables`."""
 NOT_YET = "not measured yet"
 
 
@@ -40,7 +42,8 @@ def load(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
 
 def names(results: dict[str, Any]) -> list[str]:
     """Names of the rows, in order."""
-    return [*ROWS, *(n for n in results if n not in ROWS and n not in OTHER)]
+    others = (n for n in results if n not in ROWS and n not in OTHER and not n.startswith(APART))
+    return [*ROWS, *others]
 
 
 def parts(name: str) -> tuple[str, str, str]:

@@ -1,0 +1,200 @@
+"""How often a grasp holds: the learned policy beside the programmed one, on held-apart draws.
+
+    python -m benchmarks.grasp --robot panda --policy grasp-panda
+    python -m benchmarks.grasp --robot xarm7_ability --policy grasp-xarm7_ability
+
+Runs ``grasp_then_pick`` on seeds that were never run while anything was built or trained: kinds of objects,
+sizes and shape exponents that no lesson draws. Counts successes of all draws and of those that
+`benchmarks.oracle` found graspable, by kind of shape; failures by kind; and how far a grasp's completion
+signal can be trusted: of the grasps that said "done", how many outlived the pick.
+
+Writes ``benchmarks/results/grasp-<robot>-<noise>-<learned|programmed>.json``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from benchmarks import oracle
+from benchmarks.success import FIRST_SEED, RESULTS
+from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.errors import BtTasksimError
+from bt_tasksim.files import write_text
+from bt_tasksim.policy import PROGRAMMED
+from bt_tasksim.training.evaluation import Evaluation, Job, Outcome, evaluate, wilson
+from trees.scenarios import grasp_then_pick
+
+NOISES = ("original", "hard")
+LEAF, AFTER = "grasp target", "pick target"
+CLOSED = 97
+"""Per cent of closure from which a hand that exceeded a limit had closed on nothing."""
+VERDICTS = {"penetration": "overlap", "not lifted": "dropped", "tilted or turned": "tilted"}
+
+
+def failure(outcome: Outcome) -> str:
+    """A countable kind of failure; empty for a success."""
+    if outcome.success:
+        return ""
+    if outcome.reason == "out of reach" or outcome.status == "INVALID":
+        return outcome.reason
+    if outcome.status == "SUCCESS":
+        return VERDICTS.get(outcome.reason, outcome.reason)
+    leaf, _, said = outcome.why.partition(": ")
+    if leaf == LEAF:
+        if said.startswith("limit violated"):
+            closed = re.search(r"hand (\d+) % closed", said)
+            empty = closed is not None and int(closed[1]) >= CLOSED
+            return "closed on nothing" if empty else "pressed against something"
+        return "not done in time" if said.startswith("not done within") else "could not start"
+    if said.startswith("cannot start"):
+        return "not held when done"
+    return "lost in the pick" if said.startswith("lost") else "pick broken off"
+
+
+def was_done(outcome: Outcome) -> bool:
+    """The grasp's completion signal was given: its leaf ended SUCCESS."""
+    return outcome.status == "SUCCESS" or outcome.why.startswith(f"{AFTER}:")
+
+
+def summary(found: Evaluation, kinds: Mapping[int, str], graspable: Mapping[int, bool]) -> dict[str, Any]:
+    """What is written about one evaluation.
+
+    Args:
+        found: Its outcomes.
+        kinds: Kind of the object, by seed.
+        graspable: What the oracle says, by seed; empty where it was not asked.
+    """
+    outcomes = found.outcomes
+    content = {k: v for k, v in found.to_json().items() if k not in ("outcomes", "seconds")}
+    done = [o for o in outcomes if was_done(o)]
+    content |= {
+        "first_seed": outcomes[0].seed,
+        "failures": dict(Counter(failure(o) for o in outcomes if not o.success).most_common()),
+        "kinds": {
+            kind: counts([o for o in outcomes if kind in (kinds[o.seed], "all")], graspable)
+            for kind in (*sorted(set(kinds.values())), "all")
+        },
+        "completion": {
+            "done": len(done),
+            "right": sum(o.success for o in done),
+            "interval": interval(sum(o.success for o in done), len(done)),
+        },
+    }
+    return content
+
+
+def counts(outcomes: list[Outcome], graspable: Mapping[int, bool]) -> dict[str, Any]:
+    """Draws and successes with their interval, and the same of graspable draws."""
+    wins = sum(o.success for o in outcomes)
+    out: dict[str, Any] = {
+        "draws": len(outcomes),
+        "successes": wins,
+        "interval": interval(wins, len(outcomes)),
+    }
+    if graspable:
+        possible = [o for o in outcomes if graspable[o.seed]]
+        wins = sum(o.success for o in possible)
+        out["graspable"] = {
+            "draws": len(possible),
+            "successes": wins,
+            "interval": interval(wins, len(possible)),
+        }
+    return out
+
+
+def interval(wins: int, n: int) -> list[float]:
+    """Wilson's interval; none of none is anything."""
+    return [round(v, 4) for v in wilson(wins, n)] if n else [0.0, 1.0]
+
+
+def paired(learned: Mapping[str, Any], programmed: Mapping[str, Any]) -> dict[str, Any]:
+    """Both on the same draws: failures of each, of one alone, and their ratio."""
+    a, b = (set(found["failed_seeds"]) for found in (learned, programmed))
+    return {
+        "learned_fails": len(a),
+        "programmed_fails": len(b),
+        "only_learned_fails": len(a - b),
+        "only_programmed_fails": len(b - a),
+        "failures_ratio": len(a) / len(b) if b else None,
+    }
+
+
+def share(found: Mapping[str, Any]) -> str:
+    """``963 of 1000, 96.3 % (94.9 to 97.3)``."""
+    n, wins = found["draws"], found["successes"]
+    low, high = found["interval"]
+    return f"{wins} of {n}, {100 * wins / max(n, 1):.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def text(found: Mapping[str, Any], who: str) -> str:
+    """The tables of one evaluation."""
+    lines = [f"{found['robot']}, {found['perception']}, {who}: {found['policies'][LEAF]}"]
+    for kind, row in found["kinds"].items():
+        possible = f"   of graspable {share(row['graspable'])}" if "graspable" in row else ""
+        lines.append(f"  {kind:16}{share(row):38}{possible}")
+    failed = ", ".join(f"{n} x {kind}" for kind, n in found["failures"].items()) or "none"
+    done = found["completion"]
+    said = {"draws": done["done"], "successes": done["right"], "interval": done["interval"]}
+    lines += [f"  failures: {failed}", f"  called done and right: {share(said)}"]
+    return "\n".join(lines)
+
+
+def measure(robot: str, noise: str, policy: str | None, seeds: range, workers: int) -> Evaluation:
+    """One evaluation; ``policy``: what the grasp leaf takes, None for the pinned one."""
+    policies = (("grasp", policy),) if policy else ()
+    job = Job("grasp_then_pick", robot=robot, options=EngineOptions(noise=noise), policies=policies)
+    return evaluate(job, seeds, workers)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description="Success of the grasp, learned beside programmed.")
+    parser.add_argument("--robot", default="panda")
+    parser.add_argument("--policy", metavar="P", help="the learned policy; by default the pinned one")
+    parser.add_argument("--noise", nargs="+", default=list(NOISES), choices=NOISES)
+    parser.add_argument("--draws", type=int, default=oracle.DRAWS)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=RESULTS)
+    options = parser.parse_args(arguments)
+    seeds = range(FIRST_SEED, FIRST_SEED + options.draws)
+    scene = grasp_then_pick.scene(options.robot)
+    kinds = {seed: scene.sample(seed).objects[0].kind for seed in seeds}
+    try:
+        draws = oracle.load(options.robot)
+        graspable = {seed: bool(draws[seed]["graspable"]) for seed in seeds}
+    except (BtTasksimError, KeyError) as error:
+        print(f"without the oracle: {error}", file=sys.stderr)
+        graspable = {}
+    options.out.mkdir(parents=True, exist_ok=True)
+    for noise in options.noise:
+        both: dict[str, dict[str, Any]] = {}
+        for who, policy in (("learned", options.policy), ("programmed", PROGRAMMED)):
+            found = measure(options.robot, noise, policy, seeds, options.workers)
+            if who == "learned" and found.policies[LEAF] == PROGRAMMED:
+                print("no learned policy is named or pinned: only the programmed one is measured")
+                continue
+            both[who] = summary(found, kinds, graspable)
+            name = f"grasp-{options.robot}-{noise}-{who}.json"
+            write_text(options.out / name, json.dumps(both[who], indent=2) + "\n")
+            print(text(both[who], who), flush=True)
+        if len(both) == 2:
+            n = paired(both["learned"], both["programmed"])
+            ratio = n["failures_ratio"]
+            print(
+                f"  on the same draws: learned fails {n['learned_fails']} times, programmed "
+                f"{n['programmed_fails']}{'' if ratio is None else f', ratio {ratio:.2f}'}; alone "
+                f"{n['only_learned_fails']} and {n['only_programmed_fails']}\n",
+                flush=True,
+            )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
