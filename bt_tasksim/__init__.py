@@ -14,7 +14,11 @@ if TYPE_CHECKING:
     from bt_tasksim.errors import BtTasksimError, InputError, MachineError
     from bt_tasksim.launch import run
     from bt_tasksim.runner import Result, Runner
-    from bt_tasksim.scene import Goal, ObjectSpec, Scene, SpotSpec
+    from bt_tasksim.scene import Goal, HandStart, Lesson, ObjectSpec, Scene, SpotSpec
+    from bt_tasksim.training.config import TrainConfig
+    from bt_tasksim.training.decorator import Train
+    from bt_tasksim.training.episode import EpisodeEnv
+    from bt_tasksim.training.ppo import train
 
 _HOMES = {
     "bt_tasksim.concept": ("ConceptModel", "Condition"),
@@ -22,7 +26,11 @@ _HOMES = {
     "bt_tasksim.errors": ("BtTasksimError", "InputError", "MachineError"),
     "bt_tasksim.launch": ("run",),
     "bt_tasksim.runner": ("Result", "Runner"),
-    "bt_tasksim.scene": ("Goal", "ObjectSpec", "Scene", "SpotSpec"),
+    "bt_tasksim.scene": ("Goal", "HandStart", "Lesson", "ObjectSpec", "Scene", "SpotSpec"),
+    "bt_tasksim.training.config": ("TrainConfig",),
+    "bt_tasksim.training.decorator": ("Train",),
+    "bt_tasksim.training.episode": ("EpisodeEnv",),
+    "bt_tasksim.training.ppo": ("train",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -31,15 +39,21 @@ __all__ = [
     "ConceptModel",
     "Condition",
     "EngineOptions",
+    "EpisodeEnv",
     "Goal",
+    "HandStart",
     "InputError",
+    "Lesson",
     "MachineError",
     "ObjectSpec",
     "Result",
     "Runner",
     "Scene",
     "SpotSpec",
+    "Train",
+    "TrainConfig",
     "run",
+    "train",
 ]
 
 

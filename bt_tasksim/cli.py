@@ -35,8 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         return int(options.command(options) or 0)
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f"interrupted{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
         return 130
     except InputError as error:
         print(f"bt-tasksim: {error}", file=sys.stderr)
@@ -93,6 +93,16 @@ def _parser() -> argparse.ArgumentParser:
     choice = policies.add_mutually_exclusive_group()
     choice.add_argument("--pin", metavar="NAME", help="have leaves take it that name no policy")
     choice.add_argument("--unpin", nargs=2, metavar=("CONCEPT", "ROBOT"), help="undo that")
+
+    train = add("train", _train, "Learn what the Train nodes of a tree mark.")
+    _tree_arguments(train, seed=False)
+    train.add_argument("--steps", type=_count, metavar="N", help="decisions for each node, default 1000000")
+    train.add_argument("--out", type=Path, metavar="DIR", help="the policy's folder, default runs/train-...")
+    train.add_argument("--workers", type=_count, metavar="W", help="processes, default one for each core")
+    train.add_argument("--seed", type=_seed, metavar="S", help="seed, default 0")
+    train.add_argument("--settings", type=Path, metavar="F", help="settings of the learning, .json or .yaml")
+    train.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
+    train.add_argument("--backward", action="store_true", help="then fine-tune them, the last one first")
 
     replay = add("replay", _replay, "Run a logged run again and compare, state by state.")
     replay.add_argument("run", metavar="RUN", type=Path, help="a run's folder or its run.h5")
@@ -316,6 +326,14 @@ def _policies(options: argparse.Namespace) -> int:
     if options.json:
         write_text(options.json, json.dumps([entry.to_json() for entry in found], indent=2) + "\n")
         print(f"wrote {options.json}")
+    return 0
+
+
+def _train(options: argparse.Namespace) -> int:
+    from bt_tasksim.training import command
+
+    asked = {k: v for k, v in vars(options).items() if k != "command"}
+    print(command.run(command.Request(**asked)))
     return 0
 
 

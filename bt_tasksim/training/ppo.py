@@ -106,7 +106,11 @@ def train(
     nodes = train_nodes(tree)
     for node in nodes:
         shared_layout(node, node.learners(), load_robot(scene.robot))
-    root = None if out is None else Path(out)
+    places = {} if out is None else policy_folders(tree, out)
+    if resume and places:
+        beside = training_folder(places[nodes[0]])
+        if not (beside / CHECKPOINT).is_file():
+            raise InputError(f"there is no checkpoint in '{beside}' to go on from: train without resuming")
     trained: dict[str, Policy] = {}
     networks: dict[str, Network] = {}
     first: LearnedPolicy | None = None
@@ -115,7 +119,7 @@ def train(
         fewer = dataclasses.replace(config, steps=max(1, round(FINE_TUNING * config.steps)))
         passes += [(node, fewer, "-backward") for node in reversed(nodes)]
     for node, settings, suffix in passes:
-        folder = None if root is None else (root if len(nodes) == 1 else root / _slug(node.name))
+        folder = places.get(node)
         run = _Run(tree, scene, node, settings, folder, workers, options, dict(trained), name, suffix)
         run.start_from = networks.get(node.name)
         policy = run.go(resume, report)
@@ -125,6 +129,17 @@ def train(
             first = policy
     assert first is not None
     return first
+
+
+def policy_folders(tree: Behaviour, out: str | Path) -> dict[Train, Path]:
+    """Where the policy of each Train node goes: ``out`` itself, or with several nodes a folder in it."""
+    nodes = train_nodes(tree)
+    return {node: Path(out) if len(nodes) == 1 else Path(out) / _slug(node.name) for node in nodes}
+
+
+def training_folder(policy: Path, suffix: str = "") -> Path:
+    """The folder beside a policy's own that keeps checkpoint, history and TensorBoard's events."""
+    return policy.with_name(f"{policy.name}.training{suffix}")
 
 
 class _Run:
@@ -146,7 +161,7 @@ class _Run:
         self.tree, self.scene, self.node, self.config = tree, scene, node, config
         self.out, self.workers, self.options, self.trained = out, workers, options, trained
         self.name = name or tree.name
-        self.folder = None if out is None else out.with_name(f"{out.name}.training{suffix}")
+        self.folder = None if out is None else training_folder(out, suffix)
         self.start_from: Network | None = None
         self.lesson = 0
         self.recent: deque[bool] = deque(maxlen=config.success_window)
@@ -182,6 +197,7 @@ class _Run:
         leaves = self.node.learners()
         layout = shared_layout(self.node, leaves, load_robot(self.scene.robot))
         n, m = sum(layout.values()), leaves[0].actions + 1
+        checkpoint = self._read_checkpoint() if resume else None
         if self.folder is not None:
             self.folder.mkdir(parents=True, exist_ok=True)
         learner = Learner(
@@ -192,10 +208,9 @@ class _Run:
         )
         if self.start_from is not None:
             learner.begin_with(self.start_from)
-        done = resume and self._restore(learner)
-        if resume and not done and self.folder is not None and self.start_from is None:
-            raise InputError(f"there is no checkpoint in '{self.folder}' to go on from")
-        if not done and self.start_from is None:
+        if checkpoint is not None:
+            learner.restore(checkpoint, self.iteration * config.rollout)
+        elif self.start_from is None:
             self._warm_up(pool, learner)
         while self.iteration < config.rollouts:
             began = time.perf_counter()
@@ -325,11 +340,12 @@ class _Run:
             save_file(tensors, path, metadata={"facts": json.dumps(facts)})
         write_text(self.folder / HISTORY, json.dumps(self.history, indent=1) + "\n")
 
-    def _restore(self, learner: Any) -> bool:
+    def _read_checkpoint(self) -> dict[str, Array] | None:
+        """Go back to where the checkpoint was written, and return the learner's part of it."""
         from safetensors import SafetensorError, safe_open
 
         if self.folder is None or not (self.folder / CHECKPOINT).is_file():
-            return False
+            return None
         path = self.folder / CHECKPOINT
         try:
             with safe_open(path, framework="np") as file:
@@ -347,8 +363,7 @@ class _Run:
         self.seconds, self.history = facts["seconds"], facts["history"]
         best = {k.removeprefix("best/"): v for k, v in tensors.items() if k.startswith("best/")}
         self.best = (facts["best"], best) if best else None
-        learner.restore(tensors, self.iteration * self.config.rollout)
-        return True
+        return tensors
 
     def _finish(self, network: Network, layout: Mapping[str, int], actions: int) -> LearnedPolicy:
         leaf = self.node.learners()[0]

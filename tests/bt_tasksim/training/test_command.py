@@ -1,0 +1,218 @@
+"""``bt-tasksim train``: what it writes and says, and one sentence for whatever goes wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from bt_tasksim.cli import main
+from bt_tasksim.errors import InputError
+from bt_tasksim.policy_files import load_card
+from bt_tasksim.training import command
+from bt_tasksim.training.config import TrainConfig
+from bt_tasksim.training.ppo import Progress
+
+TINY = {
+    "steps": 128, "lanes": 2, "lane_steps": 32, "epochs": 1, "minibatch": 32, "evaluate_every": 1,
+    "evaluation_draws": 2, "checkpoint_every": 1,
+}  # fmt: skip
+TWO = """
+from bt_tasksim import Train
+from concept_nodes import Grasp
+from trees import fallback
+from trees.scenarios.grasp_then_pick import scene
+
+def build():
+    return fallback("twice", *(Train(Grasp("target", name=name, timeout=2.0)) for name in ("first", "again")))
+"""
+NEVER = """
+from bt_tasksim import Train
+from concept_nodes import Grasp, Pick
+from trees import sequence
+from trees.scenarios.grasp_then_pick import scene
+
+def build():
+    return sequence("never", Pick("target"), Train(Grasp("target")))
+"""
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def tiny(tmp_path):
+    """Writes settings of a training of a second: ``tiny(**changes)``."""
+
+    def write(**changes) -> Path:
+        path = tmp_path / "tiny.json"
+        path.write_text(json.dumps(TINY | changes))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def call(capsys):
+    def run(*words):
+        capsys.readouterr()
+        try:
+            code = main(["train", *map(str, words)])
+        except SystemExit as end:  # argparse's own
+            code = end.code
+        return code, *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def refused(call, tmp_path):
+    """Exit code 2, one sentence, and no new file."""
+
+    def run(*words) -> str:
+        before = sorted(tmp_path.rglob("*"))
+        code, out, err = call(*words)
+        assert code == 2, err
+        assert out == "" and err.startswith("bt-tasksim: ") and err.count("\n") == 1
+        assert sorted(tmp_path.rglob("*")) == before
+        return err
+
+    return run
+
+
+def test_a_training_leaves_a_policy_and_says_how_to_use_it(call, tiny):
+    code, out, err = call("grasp_then_pick", "--settings", tiny(), "--workers", 2, "--seed", 3)
+    assert code == 0, err
+    folder = Path("runs/train-grasp_then_pick-panda")
+    assert f"--policy grasp={folder}" in out and "of 2 held-apart draws" in out and out.count("\n") == 1
+    card = load_card(folder)
+    assert (card.concept, card.robot, card.steps, card.seeds) == ("grasp", "panda", 128, (3,))
+    assert card.wall_seconds > 0.0 and card.tree == "grasp_then_pick"
+    lines = err.splitlines()
+    assert "64 of 128" in lines[0] and "128 of 128" in lines[-1]
+    assert "held apart" in lines[-1] and "decisions/s" in lines[-1] and "left" in lines[-1]
+    assert {p.name for p in folder.parent.iterdir()} == {folder.name, f"{folder.name}.training"}
+
+
+def test_a_training_goes_on_where_it_was(call, tiny):
+    asked = ("grasp_then_pick", "--settings", tiny(), "--workers", 1, "--out", "p")
+    assert call(*asked)[0] == 0
+    code, out, _ = call(*asked, "--steps", 192, "--resume")
+    assert code == 0 and "192 decisions" in out
+    assert [row["steps"] for row in json.loads(Path("p.training/history.json").read_text())] == [64, 128, 192]
+
+
+def test_a_second_training_does_not_overwrite_the_first(call, refused, tiny):
+    asked = ("grasp_then_pick", "--settings", tiny(), "--workers", 1, "--out", "p")
+    assert call(*asked)[0] == 0
+    assert "--resume" in refused(*asked)
+    other = tiny(learning_rate=1e-3)
+    assert "other settings" in refused("grasp_then_pick", "--settings", other, "--out", "p", "--resume")
+
+
+def test_the_second_node_begins_when_a_resumed_training_gets_there(call, tiny):
+    Path("two.py").write_text(TWO)
+    asked = ("two.py", "--settings", tiny(evaluation_draws=0), "--workers", 2, "--out", "both")
+    code, out, err = call(*asked)
+    assert code == 0, err
+    assert out.count("\n") == 2 and "both/train-first" in out and "both/train-again" in out
+    for file in Path("both/train-again.training").iterdir():
+        file.unlink()
+    code, out, err = call(*asked, "--resume")
+    assert code == 0, err
+    assert "train again: 64 of 128" in err
+
+
+def test_settings_in_yaml():
+    Path("s.yaml").write_text("steps: 500\nhidden: [32]\nreward: {success: 2, gamma: 0.9}\n")
+    found = command.load_settings(Path("s.yaml"))
+    assert (found.steps, found.hidden, found.reward.success, found.reward.gamma) == (500, (32,), 2, 0.9)
+    assert command.load_settings(None) == TrainConfig()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("stepps: 5", "did you mean 'steps'"),
+        ("reward: {sucess: 1}", "did you mean 'success'"),
+        ("reward: 3", "'reward' should be a mapping"),
+        ("steps: many", "'steps' should be a whole number"),
+        ("steps: 0", "'steps' should be a positive whole number"),
+        ("steps: true", "'steps' should be a whole number"),
+        ("hidden: [64.5]", "'hidden' should be a list of whole numbers"),
+        ("learning_rate: fast", "'learning_rate' should be a number"),
+        ("reward: {sufficient: 1}", "'reward.sufficient' should be true or false"),
+        ("- 1", "should be a mapping"),
+        ("a: [", "not YAML"),
+        ("1: 2", "unknown setting '1'"),
+    ],
+)
+def test_settings_that_are_no_good(text, said):
+    Path("s.yaml").write_text(text)
+    with pytest.raises(InputError, match=r"^settings 's.yaml'") as error:
+        command.load_settings(Path("s.yaml"))
+    assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_bad_input_is_one_sentence_and_leaves_nothing(refused, tiny):
+    assert "no Train(...) node" in refused("pick_and_place")
+    assert "no scenario 'grasp_than_pick'" in refused("grasp_than_pick")
+    assert "unknown robot 'pnda'" in refused("grasp_then_pick", "--robot", "pnda")
+    assert "cannot be read" in refused("grasp_then_pick", "--settings", "missing.yaml")
+    assert "no checkpoint" in refused("grasp_then_pick", "--resume")
+    Path("full").mkdir()
+    Path("full/letter.txt").write_text("keep me")
+    assert "it holds other things, such as 'letter.txt'" in refused("grasp_then_pick", "--out", "full")
+    assert "is a file" in refused("grasp_then_pick", "--out", "full/letter.txt/policy")
+
+
+def test_a_tree_whose_node_is_never_reached(refused, tiny):
+    Path("never.py").write_text(NEVER)
+    said = refused("never.py", "--settings", tiny(), "--workers", 1, "--out", "p")
+    assert "'train grasp target' was not reached" in said
+
+
+def test_words_of_a_request_that_goes_on():
+    asked = command.Request("t.xml", robot="panda", out=Path("my policy"), steps=5, backward=True)
+    assert asked.words() == [
+        "bt-tasksim", "train", "t.xml", "--robot", "panda", "--out", "my policy", "--steps", "5",
+        "--backward", "--resume",
+    ]  # fmt: skip
+
+
+def test_progress_in_words():
+    progress = Progress("train grasp", (10, 20), 0.5, (3, 4), "all shapes", 900.0, 7500.0)
+    said = command.describe(progress)
+    assert said == "50 % success, held apart 3 of 4, lesson 'all shapes', 900 decisions/s, 2 h 05 min left"
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_an_interrupt_says_how_to_go_on(tiny, tmp_path, kept):
+    settings = tiny(steps=1_000_000, evaluate_every=0, checkpoint_every=1 if kept else 100_000)
+    words = ["train", "grasp_then_pick", "--out", "p", "--workers", "2", "--settings", settings.name]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "bt_tasksim.cli", *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+        start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    assert process.stderr is not None
+    assert " of 1000000, " in process.stderr.readline()
+    time.sleep(0.3)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    last = err.splitlines()[-1]
+    if kept:
+        assert last == f"interrupted; go on with: bt-tasksim {' '.join(words)} --resume"
+    else:
+        assert last == "interrupted; there was no checkpoint yet, so nothing is kept"
+    assert {p.name for p in tmp_path.iterdir()} == {"tiny.json", *(["p.training"] if kept else [])}
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
