@@ -110,6 +110,14 @@ def norm(v: Array) -> Array:
     return xp.sqrt(xp.sum(v * v, axis=-1))
 
 
+def dot(a: Array, b: Array) -> Array:
+    """Inner product ``(...)`` of vectors ``(..., n)``."""
+    if _single(a) and _single(b):
+        return np.float64(a @ b)
+    xp = array_namespace(a, b)
+    return xp.sum(a * b, axis=-1)
+
+
 def point(pose: list[float], local: list[float]) -> list[float]:
     """A point given in the frame of one pose, in its parent, all in plain floats."""
     x, y, z = _rot(pose[3:], local)

@@ -23,6 +23,10 @@ from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 SETTLED = 3
 """Ticks for which opposing contacts and a still hand must be seen."""
 DOWN = (0.0, 0.0, -1.0)
+PUSHED = 0.06
+"""Metres by which a grasp may push the object, as it is seen."""
+TIPPED = math.radians(10.0)
+"""Radians by which a grasp may tip the object over, as it is seen."""
 
 
 class GraspMemory(NamedTuple):
@@ -32,6 +36,7 @@ class GraspMemory(NamedTuple):
         path: Tool path to the grasp pose.
         begins: Seconds after which the straight approach begins, and with it what is decided by a policy.
         goal: Grasp pose ``(..., 7)`` of the reference motion.
+        delay: Seconds by which the motion is behind the reference.
         offset: Offsets ``(..., 5)`` from the reference motion, see `grasp_features.SCALE`.
         target: Tool pose ``(..., 7)`` that was last commanded.
         closing: Seconds since the hand began to close; negative before.
@@ -43,12 +48,13 @@ class GraspMemory(NamedTuple):
         estimate: What the estimate says ``(..., 4)``: height of the grasp pose and of the object's centre
             above what it stands on, the centre beyond the grasp pose along the approach (units of 50 mm), and
             the cosine between the approach and straight down onto the support.
-        start: Estimated position ``(..., 3)`` of the object at the start.
+        start: Estimated pose ``(..., 7)`` of the object at the start.
     """
 
     path: Path
     begins: Array
     goal: Array
+    delay: Array
     offset: Array
     target: Array
     closing: Array
@@ -121,7 +127,8 @@ class Grasp(ConceptModel):
             path=path,
             begins=_approach_begins(path, self.standoff),
             goal=goal,
-            offset=np.zeros(self.actions),
+            delay=np.float64(0.0),
+            offset=np.zeros(CLOSE + 1),
             target=seen.tool,
             closing=np.float64(-1.0),
             closure=seen.closure,
@@ -130,7 +137,7 @@ class Grasp(ConceptModel):
             touched=np.zeros(len(seen.robot.tips)),
             first=np.float64(0.0),
             estimate=self._estimate(seen, goal, approach),
-            start=seen.object(self.target)[:3],
+            start=seen.object(self.target),
         )
 
     def _estimate(self, seen: Seen, goal: Array, approach: Array) -> Array:
@@ -153,7 +160,7 @@ class Grasp(ConceptModel):
 
     def decides(self, seen: Seen, memory: GraspMemory) -> Array:
         """From the beginning of the straight approach."""
-        return seen.elapsed >= memory.begins
+        return seen.elapsed - memory.delay >= memory.begins
 
     def command(self, action: Array, seen: Seen, memory: GraspMemory) -> Command:
         """Follow the path with the hand open, then close; both moved by the action's offsets."""
@@ -161,17 +168,18 @@ class Grasp(ConceptModel):
         offset = grasp_features.moved_offset(action, memory, seen.world.control_period)
         closing = xp.where(memory.closing >= 0.0, self.grip, memory.preshape) + offset[..., CLOSE]
         return Command(
-            tool=grasp_features.displaced(sample(memory.path, seen.elapsed), offset),
+            tool=grasp_features.displaced(self._reference(action, seen, memory), offset),
             hand=xp.asarray(poses.clip(closing, 0.0, 1.0))[..., None],
         )
 
     def advance(self, action: Array, seen: Seen, memory: GraspMemory) -> GraspMemory:
         """Begin to close when the tool has arrived; count the ticks at which the hand holds still."""
         offset = grasp_features.moved_offset(action, memory, seen.world.control_period)
-        target = grasp_features.displaced(sample(memory.path, seen.elapsed), offset)
+        target = grasp_features.displaced(self._reference(action, seen, memory), offset)
         gap = poses.norm(seen.tool[..., :3] - target[..., :3])
-        arrived = (seen.elapsed >= memory.path.duration) & (gap < self.tolerance)
-        late = seen.elapsed >= memory.path.duration + 1.0
+        delay = memory.delay + grasp_features.delay(action, seen.world.control_period)
+        arrived = (seen.elapsed - delay >= memory.path.duration) & (gap < self.tolerance)
+        late = seen.elapsed - delay >= memory.path.duration + 1.0
         begun = memory.closing >= 0.0
         still = abs(seen.closure - memory.closure) < 0.01
         good = seen.opposed() & still & begun
@@ -181,6 +189,7 @@ class Grasp(ConceptModel):
         fresh = (xp.max(touched, axis=-1) > 0.0) & (xp.max(memory.touched, axis=-1) == 0.0)
         go_on = memory.closing + seen.world.control_period
         return memory._replace(
+            delay=delay,
             offset=offset,
             target=target,
             closing=xp.where(begun, go_on, xp.where(arrived | late, 0.0, memory.closing)),
@@ -190,14 +199,21 @@ class Grasp(ConceptModel):
             first=xp.where(fresh, along, memory.first),
         )
 
+    def _reference(self, action: Array, seen: Seen, memory: GraspMemory) -> Array:
+        """The pose ``(..., 7)`` on the path, as far as its pace lets it be."""
+        behind = memory.delay + grasp_features.delay(action, seen.world.control_period)
+        return sample(memory.path, seen.elapsed - behind)
+
     def done(self, seen: Seen, memory: GraspMemory) -> Array:
         """Opposing contacts and a still hand, some ticks long."""
         return memory.settled >= SETTLED
 
     def violated(self, seen: Seen, memory: GraspMemory) -> Array:
-        """The hand has closed on nothing, or presses against something."""
+        """The hand has closed on nothing, presses against something, or has pushed the object away or over."""
         empty = (memory.closing > 0.8) & (seen.closure > 0.97 * self.grip)
-        return empty | strained(seen, self.force_limit)
+        now = seen.object(self.target)
+        pushed = poses.norm(now[..., :3] - memory.start[..., :3]) > PUSHED
+        return empty | strained(seen, self.force_limit) | pushed | (_tilt(memory.start, now) > TIPPED)
 
     def necessary_cost(self, seen: Seen, memory: GraspMemory) -> Array:
         """How far the hand is from holding the object where it stands, from 0 on.
@@ -208,7 +224,7 @@ class Grasp(ConceptModel):
         gap = seen.observation.tips - seen.observation.contact_points
         xp = array_namespace(gap)
         distance = xp.mean(xp.sqrt(xp.sum(gap * gap, axis=-1)), axis=-1)
-        pushed = poses.norm(seen.object(self.target)[..., :3] - memory.start)
+        pushed = poses.norm(seen.object(self.target)[..., :3] - memory.start[..., :3])
         return distance / 0.1 + xp.where(seen.opposed(), 0.0, 0.3) + pushed / 0.05
 
     def sufficient_cost(self, known: Known, memory: GraspMemory) -> Array:
@@ -226,6 +242,14 @@ class Grasp(ConceptModel):
             f"tool {1000 * float(tool_distance(seen, self.target)):.0f} mm from {self.target}, "
             f"{float(force_at_wrist(seen)):.0f} N at the wrist"
         )
+
+
+def _tilt(before: Array, now: Array) -> Array:
+    """Angle ``(...)`` in radians between the vertical axes of two poses ``(..., 7)`` of an object."""
+    up = poses.constant([0.0, 0.0, 1.0], now)
+    cosine = poses.dot(poses.rotate(before[..., 3:], up), poses.rotate(now[..., 3:], up))
+    xp = array_namespace(now)
+    return xp.acos(poses.clip(cosine, -1.0, 1.0))
 
 
 def _approach_begins(path: Path, standoff: float) -> Array:

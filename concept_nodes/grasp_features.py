@@ -15,8 +15,10 @@ from bt_tasksim.robot import RobotDescription
 if TYPE_CHECKING:
     from concept_nodes.grasp import GraspMemory
 
-SIDE, ACROSS, ALONG, TURN, CLOSE = range(5)
-ACTIONS = ("aside", "across the fingers", "along the approach", "turn about the approach", "close")
+SIDE, ACROSS, ALONG, TURN, CLOSE, PACE = range(6)
+ACTIONS = ("aside", "across the fingers", "along the approach", "turn about the approach", "close", "pace")
+"""The first five are offsets from the reference motion; the last one holds the motion back: 0 and above is its
+own pace, -1 stands still."""
 SCALE = (0.015, 0.025, 0.035, 0.25, 0.5)
 """Largest offsets: metres along the tool's x (aside), y (the fingers' closing axis) and z (the approach),
 radians about z, and of the hand's closure. Source of their order: the released original's grasp training,
@@ -39,7 +41,7 @@ def layout(robot: RobotDescription) -> dict[str, int]:
         "contacts": n_tips,
         "contacts so far": n_tips,
         "first contact along the approach": 1,
-        "time": 3,
+        "time": 4,
         "estimate": 4,
     }
 
@@ -55,7 +57,8 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
     numbers = (
         (seen.closure - memory.closure) / 0.1,
         memory.first / 0.03,
-        poses.clip(seen.elapsed - memory.path.duration, -1.0, 2.0),
+        poses.clip(seen.elapsed - memory.delay - memory.path.duration, -1.0, 2.0),
+        poses.clip(memory.delay, 0.0, 4.0),
         poses.clip(memory.closing, -0.1, 2.0),
         poses.clip(memory.settled / 3.0, 0.0, 2.0),
     )
@@ -85,6 +88,7 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
 
 def moved_offset(action: Array, memory: GraspMemory, period: float) -> Array:
     """The offsets ``(..., 5)`` one control period on: towards the action, no faster than `RATE`."""
+    action = action[..., :PACE]
     if type(action) is np.ndarray:
         step = _RATE * (period / PERIOD)
         gap = np.minimum(np.maximum(action, -1.0), 1.0) * _SCALE - memory.offset
@@ -92,6 +96,11 @@ def moved_offset(action: Array, memory: GraspMemory, period: float) -> Array:
     gap = poses.clip(action, -1.0, 1.0) * constant(SCALE, memory.offset) - memory.offset
     step = constant(RATE, memory.offset) * (period / PERIOD)
     return memory.offset + poses.clip(gap, -step, step)
+
+
+def delay(action: Array, period: float) -> Array:
+    """Seconds ``(...)`` by which the reference motion falls behind within a control period."""
+    return period * poses.clip(-action[..., PACE], 0.0, 1.0)
 
 
 def displaced(reference: Array, offset: Array) -> Array:

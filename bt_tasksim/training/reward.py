@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 
 from bt_tasksim.errors import InputError
@@ -22,7 +23,8 @@ class Reward:
         violated: A limit was exceeded.
         timeout: The concept's own time was over.
         shaping: Weight of the potential.
-        gamma: The learner's discount, for the potential.
+        gamma: The learner's discount, for the potential too. With 0.99 a second of care would cost a fifth of
+            what it may save.
         sufficient: What follows pays; else only shaping and limits do (an ablation).
     """
 
@@ -31,12 +33,15 @@ class Reward:
     violated: float = -1.0
     timeout: float = -1.0
     shaping: float = 0.5
-    gamma: float = 0.99
+    gamma: float = 0.997
     sufficient: bool = True
 
     def __post_init__(self) -> None:
         if not 0.0 < self.gamma <= 1.0:
             raise InputError(f"'gamma' should be above 0 and at most 1, found {self.gamma:g}")
+        paid = (self.success, self.failure, self.violated, self.timeout, self.shaping)
+        if not all(math.isfinite(v) for v in paid):
+            raise InputError(f"a reward's parts should be finite numbers, found {paid}")
         if self.success <= 0.0 or max(self.failure, self.violated, self.timeout) > 0.0:
             raise InputError("success should pay more than nothing, and failures no more than nothing")
         if self.shaping < 0.0:
