@@ -90,6 +90,14 @@ class TrainConfig:
             value = getattr(self, name)
             if not math.isfinite(value) or value <= 0.0:
                 raise InputError(f"training: '{name}' should be positive, found {value!r}")
+        if not 0.0 <= self.gae_lambda <= 1.0:
+            raise InputError(f"training: 'gae_lambda' should be between 0 and 1, found {self.gae_lambda!r}")
+        for name in ("entropy", "log_deviation", "terminate_bias"):
+            value = getattr(self, name)
+            if not math.isfinite(value):
+                raise InputError(f"training: '{name}' should be a finite number, found {value!r}")
+        if not isinstance(self.reward, Reward):
+            raise InputError(f"training: 'reward' should be a Reward, found {self.reward!r}")
         if not self.hidden or any(n < 1 for n in self.hidden):
             raise InputError(f"training: 'hidden' should hold sizes of layers, found {self.hidden!r}")
         if self.lanes * self.lane_steps < 2:

@@ -96,16 +96,17 @@ def _train_nodes(root: Behaviour) -> Iterator[Train]:
 
 
 def judges(leaf: ConceptModel) -> bool:
-    """The concept says what must be true when it has succeeded, and has a policy to get there."""
-    return type(leaf).sufficient_cost is not ConceptModel.sufficient_cost and not leaf.lacks_policy
+    """The concept says what must be true when it has succeeded."""
+    return type(leaf).sufficient_cost is not ConceptModel.sufficient_cost
 
 
 def follower_of(train: Behaviour) -> tuple[Behaviour, Sequence] | None:
     """What judges a Train node, and the sequence in which it follows.
 
     The next sibling in the nearest sequence above, else its parent's next one, and so on up. Siblings without
-    a concept that can judge (conditions, waiting) are passed over. The later children of a selector are
-    fallbacks, and those of a parallel run beside: they follow nothing.
+    a concept that can judge (conditions, waiting) are passed over. One with a leaf that has no policy yet can
+    not be run, nor what comes after it. The later children of a selector are fallbacks, and those of a
+    parallel run beside: they follow nothing.
 
     Returns:
         None where nothing follows.
@@ -115,7 +116,10 @@ def follower_of(train: Behaviour) -> tuple[Behaviour, Sequence] | None:
         parent = node.parent
         if isinstance(parent, Sequence):
             for sibling in parent.children[parent.children.index(node) + 1 :]:
-                if any(judges(leaf) for leaf in concepts_in(sibling)):
+                leaves = concepts_in(sibling)
+                if any(leaf.lacks_policy for leaf in leaves):
+                    return None
+                if any(judges(leaf) for leaf in leaves):
                     return sibling, parent
         node = parent
     return None

@@ -12,10 +12,10 @@ from py_trees.common import Status
 
 from bt_tasksim.concept import TIMED_OUT, VIOLATED, ConceptModel, Decision
 from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import BtTasksimError, InputError
+from bt_tasksim.errors import BtTasksimError, InputError, LeafError
 from bt_tasksim.policy import Policy, split_action
 from bt_tasksim.poses import Array
-from bt_tasksim.runner import LONGEST, Runner, end_all, failed_leaf
+from bt_tasksim.runner import LONGEST, Runner, end_all, failed_leaf, raising_leaf
 from bt_tasksim.scene import Scene
 from bt_tasksim.training.decorator import Train, concepts_in, train_nodes
 from bt_tasksim.training.follower import Judgement, Outcome
@@ -77,8 +77,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         options = options or EngineOptions(noise="original", rendering=render_mode is not None)
         self.train = find_train(tree, train)
         self.learners = self.train.learners()
-        for leaf in self.learners:
-            leaf.under_training = True
+        for leaf in concepts_in(tree):
+            leaf.under_training = leaf in self.learners
         self.runner = Runner(tree, scene, options, longest=longest)
         for leaf in concepts_in(tree):
             if policies and leaf.name in policies and leaf not in self.learners:
@@ -150,6 +150,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         if action.shape != self._action_shape or not np.isfinite(action).all():
             raise InputError(f"an action should be {self._action_shape[0]} finite numbers, found {action}")
         decision.leaf.decide(split_action(action))
+        self._decision = None
         parts = dict.fromkeys(PARTS, 0.0)
         found = self._until_decision()
         if found is not None:
@@ -166,8 +167,10 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         return self.runner.pipeline.render(CAMERA).colour
 
     def close(self) -> None:
-        """Let go of engines."""
+        """Let go of engines; the tree can be run again."""
         self._drop()
+        for leaf in self.learners:
+            leaf.under_training = False
         assert self.runner.pipeline is not None
         self.runner.pipeline.close()
 
@@ -194,12 +197,17 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             if isinstance(node, Decision):
                 if self._activation is None:
                     self._activation = train.activations
+                    if self.judgement.follower is not None:
+                        self.judgement.reset()  # what it did in earlier rounds
                 if train.activations == self._activation:
                     return node
                 self._over = "interrupted"
                 return None
             self.judgement.saw(node)
-            if node is train and self._activation is not None and train.status != Status.RUNNING:
+            if node is train and train.status != Status.RUNNING:
+                if self._activation is None:  # nothing was decided
+                    self.judgement.reset()
+                    continue
                 if train.status == Status.SUCCESS:
                     self._outcome = self._follow()
                 self._over = "ended"
@@ -220,19 +228,22 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         """Run what follows to its end."""
         judgement = self.judgement
         try:
-            outcome = judgement.ended() if judgement.follower is None else None
+            outcome = judgement.ended(self.train)
             while outcome is None:
                 node = self._next_node()
+                if isinstance(node, Decision):
+                    return Outcome(
+                        False, "INVALID", f"'{self.train.name}' began anew before what follows ended"
+                    )
                 judgement.saw(node)
-                if judgement.at(node) or node is None:
-                    outcome = judgement.ended()
+                outcome = judgement.ended(node)
                 if outcome is None and node is None:
                     if self.tree.status != Status.RUNNING:
                         return Outcome(False, "INVALID", "the tree ended before what follows did")
                     if not self._control_period():
                         return Outcome(False, "RUNNING", "what follows did not end in time", discarded=True)
             return outcome
-        except InputError:
+        except (InputError, LeafError):
             raise
         except BtTasksimError as error:
             return Outcome(False, "INVALID", str(error), discarded=True)
@@ -246,10 +257,14 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         except StopIteration:
             self._ticking = None
             return None
-        except BaseException:
+        except BaseException as error:
             self._ticking = None
-            end_all(self.tree, None)
-            raise
+            culprit = raising_leaf(error, self.tree)
+            end_all(self.tree, culprit)
+            if isinstance(error, BtTasksimError) or not isinstance(error, Exception):
+                raise
+            name = culprit.name if culprit is not None else self.tree.name
+            raise LeafError(f"leaf '{name}' raised {type(error).__name__}: {error}") from error
 
     def _control_period(self) -> bool:
         if self._ticks_left <= 0:

@@ -81,24 +81,22 @@ class Judgement:
                     f"{node.name} ended SUCCESS, and its goal is missed by {cost:.2g}",
                 )
 
-    def ended(self) -> Outcome | None:
-        """The outcome, once there is one; asked after each tick."""
-        if self.follower is None:
+    def ended(self, node: Any = None) -> Outcome | None:
+        """The outcome, once there is one.
+
+        Args:
+            node: What a tick has just visited; None at a tick's end. The other nodes' statuses may be those
+                of earlier ticks.
+        """
+        follower, scope = self.follower, self.scope
+        if follower is None:
             return self._outcome(self._train)
-        if self.follower.status in (Status.SUCCESS, Status.FAILURE) and self._begun():
-            return self._outcome(self.follower)
-        scope = self.scope
-        if scope is not None and scope.status != Status.RUNNING:
-            why = _why(scope) or f"'{scope.name}' ended before '{self.follower.name}' began"
-            return Outcome(False, self.follower.status.name, why)
+        if node is follower and follower.status in (Status.SUCCESS, Status.FAILURE):
+            return self._outcome(follower)
+        if scope is not None and (node is None or node is scope) and scope.status != Status.RUNNING:
+            why = _why(scope) or f"'{scope.name}' ended before '{follower.name}' did"
+            return Outcome(False, follower.status.name, why)
         return None
-
-    def at(self, node: Any) -> bool:
-        """The node is what ends the judgement."""
-        return node is (self.follower if self.follower is not None else self._train)
-
-    def _begun(self) -> bool:
-        return bool(self._began)
 
     def _outcome(self, node: Behaviour) -> Outcome:
         name = "" if self.follower is None else node.status.name

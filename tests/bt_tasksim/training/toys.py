@@ -1,0 +1,222 @@
+"""A world without physics and concepts to train in it, also for programs that tests start."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim.concept import ConceptModel, Condition
+from bt_tasksim.context import Known, Seen
+from bt_tasksim.parameters import Flag, Metres, ObjectName, Ratio
+from bt_tasksim.world import Command, Hidden
+
+_spec = importlib.util.spec_from_file_location("toy_world", Path(__file__).parents[2] / "conftest.py")
+_shared = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(_shared)
+SCENE = _shared.SCENE
+
+
+class World(_shared.ToyWorld):
+    """The toy world with a hidden state, which may differ from what is seen.
+
+    Attributes:
+        truth: The tool is really so many metres higher than it seems.
+        error: What a step raises that moves the tool.
+        depth: Overlap of two bodies.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.truth, self.error, self.depth, self.closed = 0.0, None, 0.0, 0
+
+    def step(self, command: Command, *, look: bool = False):
+        if self.error is not None and command.tool is not None:
+            raise self.error
+        return super().step(command, look=look)
+
+    def hidden(self) -> Hidden:
+        n = len(self.now.objects)
+        tool = self.now.tool_pose.copy()
+        tool[2] += self.truth
+        return Hidden(
+            time=self.now.time,
+            objects=self.now.objects,
+            velocities=np.zeros((n, 6)),
+            hand_force=np.zeros(n),
+            hand_distance=np.zeros(n),
+            support=np.zeros((n, n), bool),
+            penetration=np.float64(self.depth),
+            tool_pose=tool,
+        )
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+STEP = 0.02
+"""Metres that a toy leaf moves the tool at a decision, at most."""
+
+
+class Raise(ConceptModel):
+    """Bring the tool to a height: what is learned is where to, and when it is there."""
+
+    height: Metres = 0.45
+    limit: Metres = 2.0
+    is_task_model = False
+    actions = 1
+    default_timeout = 1.5
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.log: list[str] = []
+
+    def begin(self, seen: Seen) -> Any:
+        self.log.append("begin")
+        return 0
+
+    def advance(self, action, seen: Seen, memory: Any) -> Any:
+        return memory + 1
+
+    @classmethod
+    def layout(cls, robot):
+        return {"missing": 1, "cup": 2}
+
+    def features(self, seen: Seen, memory: Any):
+        return np.concatenate([[(self.height - seen.tool[2]) / 0.1], seen.object("cup")[:2] / 0.01])
+
+    def command(self, action, seen: Seen, memory: Any) -> Command:
+        self.log.append(f"command {float(action[0]):g}")
+        tool = seen.tool.copy()
+        tool[2] += STEP * action[0]
+        return Command(tool=tool)
+
+    def programmed_motion(self, seen: Seen, memory: Any):
+        return np.array([np.clip((self.height - seen.tool[2]) / STEP, -1.0, 1.0)])
+
+    def done(self, seen: Seen, memory: Any):
+        return np.abs(self.height - seen.tool[2]) < 0.005
+
+    def violated(self, seen: Seen, memory: Any):
+        return seen.tool[2] > self.limit
+
+    def necessary_cost(self, seen: Seen, memory: Any):
+        return np.abs(self.height - seen.tool[2]) / 0.1
+
+    def sufficient_cost(self, known: Known, memory: Any):
+        return np.abs(self.height - known.hidden.tool_pose[2]) / 0.01
+
+    def explain(self, seen: Seen, memory: Any) -> str:
+        return f"the tool is {1000 * float(seen.tool[2]):.0f} mm high"
+
+
+class Unprogrammed(Raise):
+    """As `Raise`, without a programmed policy."""
+
+    is_programmed = False
+
+
+class Turn(Raise):
+    """Sees other things than `Raise`."""
+
+    @classmethod
+    def layout(cls, robot):
+        return {"missing": 1}
+
+    def features(self, seen: Seen, memory: Any):
+        return super().features(seen, memory)[:1]
+
+
+class Check(ConceptModel):
+    """Follows a `Raise`: holds still for some ticks; it seems well, and truly is where the tool is up."""
+
+    height: Metres = 0.45
+    ticks: Ratio = 0.2
+    blind: Flag = False
+    """It does not see that the tool is at the wrong height."""
+
+    def begin(self, seen: Seen) -> Any:
+        return 0
+
+    def advance(self, action, seen: Seen, memory: Any) -> Any:
+        return memory + 1
+
+    def command(self, action, seen: Seen, memory: Any) -> Command:
+        return Command(tool=seen.tool)
+
+    def violated(self, seen: Seen, memory: Any):
+        return (not self.blind) and abs(self.height - seen.tool[2]) > 0.01
+
+    def done(self, seen: Seen, memory: Any):
+        return np.bool_(memory >= round(10 * self.ticks))
+
+    def sufficient_cost(self, known: Known, memory: Any):
+        return np.abs(self.height - known.hidden.tool_pose[2]) / 0.01
+
+    def explain(self, seen: Seen, memory: Any) -> str:
+        return f"the tool is {1000 * float(seen.tool[2]):.0f} mm high"
+
+
+class Move(ConceptModel):
+    """A programmed concept that says nothing of what must be true: brings the tool to a height at once."""
+
+    height: Metres = 0.3
+
+    def begin(self, seen: Seen) -> Any:
+        return 0
+
+    def advance(self, action, seen: Seen, memory: Any) -> Any:
+        return memory + 1
+
+    def command(self, action, seen: Seen, memory: Any) -> Command:
+        tool = seen.tool.copy()
+        tool[2] = self.height
+        return Command(tool=tool)
+
+    def done(self, seen: Seen, memory: Any):
+        return np.bool_(memory >= 2)
+
+
+class Below(Condition):
+    """The tool is below a height."""
+
+    height: Metres = 0.5
+
+    def holds(self, seen: Seen):
+        return seen.tool[2] < self.height
+
+    def explain(self, seen: Seen) -> str:
+        return f"the tool is {1000 * float(seen.tool[2]):.0f} mm high"
+
+
+class Even(Condition):
+    """Some worlds are so, and some are not."""
+
+    target: ObjectName = "cup"
+
+    def holds(self, seen: Seen):
+        return seen.object(self.target)[0] > 0.5
+
+
+UP, DOWN, STILL, DONE = ([1.0, 0.0], [-1.0, 0.0], [0.0, 0.0], [0.0, 1.0])
+"""Actions of a `Raise`."""
+
+
+def honest(features: Any) -> list[float]:
+    """What brings the tool up, and says so."""
+    missing = 0.1 * float(features[0])
+    return DONE if abs(missing) < 0.005 else [float(np.clip(missing / STEP, -1.0, 1.0)), 0.0]
+
+
+def play(env: Any, decide: Any, seed: int | None = 0) -> tuple[list[float], bool, bool, dict[str, Any]]:
+    """One episode: rewards, how it ended, and what is said of it."""
+    features, info = env.reset(seed=seed)
+    rewards = []
+    for _ in range(2000):
+        features, reward, terminated, truncated, info = env.step(np.array(decide(features)))
+        rewards.append(reward)
+        if terminated or truncated:
+            return rewards, terminated, truncated, info
+    raise AssertionError("the episode does not end")
