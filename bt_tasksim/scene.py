@@ -123,10 +123,11 @@ class Lesson:
         name: Its name.
         objects: Objects that are drawn otherwise than in the scene itself, by name.
         noise: Names of noise models of the estimate; each world has one of them. None: the engine's.
-        hand: Where the hand is at first; None: in its rest posture.
-        tilt: Largest angle in radians between straight down and the direction in which a hand comes to the
-            objects. Half of the worlds have straight down, the others an angle up to this, leaning away from
-            the robot, and aside by up to `ASIDE`.
+        hand: Where the hand is at first, in worlds in which it comes from above; else it is in its rest posture.
+        tilt: Lowest and highest angle in radians between straight down and the direction in which a hand comes
+            to objects on boards, leaning away from the robot, and aside by up to `ASIDE`.
+        scenes: Scenes that worlds are drawn from, each as often, instead of the scene itself; the tree's
+            objects must be in each.
         tolerance: Sufficient cost below which a goal counts as reached: 1 for what is meant in the end.
         until: Share of successes in training from which the next lesson begins; the last one never ends.
     """
@@ -135,7 +136,8 @@ class Lesson:
     objects: Mapping[str, ObjectSpec] = field(default_factory=dict)
     noise: tuple[str, ...] = ()
     hand: HandStart | None = None
-    tilt: float = 0.0
+    tilt: tuple[float, float] | None = None
+    scenes: tuple[Scene, ...] = ()
     tolerance: float = 1.0
     until: float = 0.9
 
@@ -346,7 +348,7 @@ class Scene:
     def __post_init__(self) -> None:
         for lesson in self.lessons:
             for name in (*lesson.objects, *([lesson.hand.over] if lesson.hand else ())):
-                if name not in self.objects:
+                if not all(name in scene.objects for scene in (self, *lesson.scenes)):
                     raise InputError(
                         f"lesson '{lesson.name}' names the object '{name}', which is not in the scene"
                         f"{nearest(name, self.objects)}"
@@ -388,6 +390,12 @@ class Scene:
         if lesson is not None and not 0 <= lesson < len(self.lessons):
             raise InputError(f"scene '{self.name}' has {len(self.lessons)} lessons, and none number {lesson}")
         taught = None if lesson is None else self.lessons[lesson]
+        if taught is not None and taught.scenes:
+            k = int(generator(seed, stream, "variant").integers(len(taught.scenes)))
+            return taught.scenes[k].with_robot(self.robot)._draw(seed, stream, taught)
+        return self._draw(seed, stream, taught)
+
+    def _draw(self, seed: int, stream: str, taught: Lesson | None) -> ActorConfiguration:
         rng = generator(seed, stream, "scene")
         fixtures = tuple(load_fixture(name) for name in self.fixtures)
         places = {p.name: p for f in fixtures for p in f.place_models()}
@@ -398,8 +406,8 @@ class Scene:
             spec = usual if taught is None else taught.objects.get(name, usual)
             assert isinstance(spec, ObjectSpec)
             objects.append(_draw_object(name, spec, places, objects, rng))
-        if taught is not None and taught.tilt > 0.0:
-            _tilt_access(taught, objects, places, generator(seed, stream, "approach"))
+        if taught is not None and taught.tilt is not None:
+            _tilt_access(taught.tilt, objects, places, generator(seed, stream, "approach"))
         disturbance = None
         if self.knock is not None:
             disturbance = _draw_disturbance(self.knock, rng)
@@ -415,7 +423,7 @@ class Scene:
             noise=_draw_noise(taught, seed, stream),
             tolerance=1.0 if taught is None else taught.tolerance,
             lesson="" if taught is None else taught.name,
-            hand_start=_draw_hand(taught, objects, seed, stream),
+            hand_start=_draw_hand(taught, objects, places, seed, stream),
         )
 
 
@@ -538,25 +546,37 @@ def _draw_noise(lesson: Lesson | None, seed: int, stream: str) -> str:
 
 
 def _draw_hand(
-    lesson: Lesson | None, objects: Sequence[ObjectActor], seed: int, stream: str
+    lesson: Lesson | None,
+    objects: Sequence[ObjectActor],
+    places: Mapping[str, PlaceModel],
+    seed: int,
+    stream: str,
 ) -> tuple[float, ...]:
     if lesson is None or lesson.hand is None:
         return ()
     start, rng = lesson.hand, generator(seed, stream, "hand")
-    centre = next(o.pose for o in objects if o.name == start.over)
+    actor = next(o for o in objects if o.name == start.over)
+    if float(places[actor.on].access[2]) > -0.999:
+        return ()
+    centre = actor.pose
     x, y = rng.uniform(-start.aside, start.aside, 2).tolist()
     z, turn = float(rng.uniform(*start.height)), float(rng.uniform(-start.turn, start.turn))
     return centre[0] + x, centre[1] + y, centre[2] + z, turn
 
 
 def _tilt_access(
-    lesson: Lesson, objects: Sequence[ObjectActor], places: dict[str, PlaceModel], rng: np.random.Generator
+    tilt: tuple[float, float],
+    objects: Sequence[ObjectActor],
+    places: dict[str, PlaceModel],
+    rng: np.random.Generator,
 ) -> None:
-    tilt, aside = max(0.0, float(rng.uniform(-lesson.tilt, lesson.tilt))), float(rng.uniform(-ASIDE, ASIDE))
+    angle, aside = float(rng.uniform(*tilt)), float(rng.uniform(-ASIDE, ASIDE))
     for actor in objects:
+        if places[actor.on].kind != "board":
+            continue
         heading = np.arctan2(actor.pose[1], actor.pose[0]) + aside
-        level = np.sin(tilt)
-        access = np.array([level * np.cos(heading), level * np.sin(heading), -np.cos(tilt)])
+        level = np.sin(angle)
+        access = np.array([level * np.cos(heading), level * np.sin(heading), -np.cos(angle)])
         places[actor.on] = dataclasses.replace(places[actor.on], access=access)
 
 

@@ -49,6 +49,7 @@ class GraspMemory(NamedTuple):
             above what it stands on, the centre beyond the grasp pose along the approach (units of 50 mm), and
             the cosine between the approach and straight down onto the support.
         start: Estimated pose ``(..., 7)`` of the object at the start.
+        now: Estimated pose ``(..., 7)`` of the object at the previous tick.
     """
 
     path: Path
@@ -65,6 +66,7 @@ class GraspMemory(NamedTuple):
     first: Array
     estimate: Array
     start: Array
+    now: Array
 
 
 class Grasp(ConceptModel):
@@ -138,6 +140,7 @@ class Grasp(ConceptModel):
             first=np.float64(0.0),
             estimate=self._estimate(seen, goal, approach),
             start=seen.object(self.target),
+            now=seen.object(self.target),
         )
 
     def _estimate(self, seen: Seen, goal: Array, approach: Array) -> Array:
@@ -189,6 +192,7 @@ class Grasp(ConceptModel):
         fresh = (xp.max(touched, axis=-1) > 0.0) & (xp.max(memory.touched, axis=-1) == 0.0)
         go_on = memory.closing + seen.world.control_period
         return memory._replace(
+            now=seen.object(self.target),
             delay=delay,
             offset=offset,
             target=target,

@@ -43,6 +43,7 @@ def layout(robot: RobotDescription) -> dict[str, int]:
         "first contact along the approach": 1,
         "time": 4,
         "estimate": 4,
+        "object pushed": 3,
     }
 
 
@@ -51,6 +52,9 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
     local = poses.multiply(poses.inverse(memory.goal), seen.tool)
     turn = poses.rotation_vector(local[..., 3:])[..., 2:]
     behind = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])
+    pushed = poses.rotate(
+        poses.quat_conjugate(memory.goal[..., 3:]), memory.now[..., :3] - memory.start[..., :3]
+    )
     robot = seen.robot
     opened, span = constant(robot.hand_open, seen.tool), constant(_span(robot), seen.tool)
     joints = (seen.observation.hand_position - opened) / span
@@ -66,7 +70,7 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
         rest = numbers
         parts = [
             local[:3] / 0.03, turn / 0.2, behind / 0.01, memory.offset / _SCALE, joints, rest[:1],
-            seen.contacts, memory.touched, rest[1:], memory.estimate,
+            seen.contacts, memory.touched, rest[1:], memory.estimate, pushed / 0.01,
         ]  # fmt: skip
         return np.concatenate(parts)
     xp = array_namespace(seen.tool)
@@ -82,6 +86,7 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
         memory.touched,
         *columns[1:],
         memory.estimate,
+        pushed / 0.01,
     ]
     return xp.concat(parts, axis=-1)
 

@@ -35,13 +35,13 @@ class TrainConfig:
         hidden: Sizes of the hidden layers; 64 and 64 decide in 15 microseconds.
         log_deviation: Logarithm of the actions' standard deviation at the beginning: 0.5, so that a first
             policy ends an episode at one decision in 40 and not at one in three.
-        final_log_deviation: Largest logarithm of the standard deviation at the end. In between the bound falls
-            linearly: what is rewarded last is nearly what is done without exploration.
+        final_log_deviation: Largest logarithm of the standard deviation at the end. In between the bound
+            falls linearly: what is rewarded last is nearly what is done without exploration.
         terminate_bias: Bias of the completion signal at the beginning, of which `bt_tasksim.policy.TERMINATE`
             is the threshold; see ``log_deviation``.
         success_window: Episodes over which the success rate is taken that ends a lesson.
         evaluate_every: Rollouts between two evaluations on held-apart draws; 0: only at the end.
-        evaluation_draws: Held-apart draws of each; the policy that was best in them is kept.
+        evaluation_draws: Held-apart draws of each, see `bt_tasksim.training.ppo.CLEARLY`.
         checkpoint_every: Rollouts between two checkpoints: what a killed training loses at most.
         reward: What an episode pays.
     """
@@ -92,7 +92,7 @@ class TrainConfig:
                 raise InputError(f"training: '{name}' should be positive, found {value!r}")
         if not 0.0 <= self.gae_lambda <= 1.0:
             raise InputError(f"training: 'gae_lambda' should be between 0 and 1, found {self.gae_lambda!r}")
-        for name in ("entropy", "log_deviation", "terminate_bias"):
+        for name in ("entropy", "log_deviation", "final_log_deviation", "terminate_bias"):
             value = getattr(self, name)
             if not math.isfinite(value):
                 raise InputError(f"training: '{name}' should be a finite number, found {value!r}")

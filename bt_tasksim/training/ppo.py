@@ -34,6 +34,8 @@ CHECKPOINT = "checkpoint.safetensors"
 HISTORY = "history.json"
 FINE_TUNING = 0.25
 """Share of the steps that a backward pass takes for each node."""
+CLEARLY = 0.02
+"""Share of held-apart draws by which an earlier policy must have been better than the last one."""
 WARM_UP = 64
 """Decisions of each lane before the first rollout, from which features are normalised."""
 
@@ -231,8 +233,16 @@ class _Run:
                 self._checkpoint(learner)
             if report is not None:
                 report(self._progress(row))
-        network = learner.network if self.best is None else Network.from_arrays(self.best[1])
+        network = self._chosen(learner)
         return self._finish(network, layout, m - 1)
+
+    def _chosen(self, learner: Any) -> Network:
+        """The last policy, which has seen most, unless an earlier one was clearly better on held-apart draws."""
+        network: Network = learner.network
+        last = self.history[-1].get("held_apart") if self.history else None
+        if self.best is None or not last or last["successes"] / last["draws"] >= self.best[0] - CLEARLY:
+            return network
+        return Network.from_arrays(self.best[1])
 
     # ---- one rollout ------------------------------------------------------------------------------------
 
@@ -352,17 +362,18 @@ class _Run:
                 tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
                 facts = json.loads((file.metadata() or {})["facts"])
             config = TrainConfig.from_dict(facts["config"])
-        except (SafetensorError, KeyError, ValueError) as error:
+            iteration, lesson, recent = facts["iteration"], facts["lesson"], facts["recent"]
+            seconds, history, rate = facts["seconds"], facts["history"], facts["best"]
+        except (SafetensorError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"checkpoint '{path}' is damaged ({error}): remove it and train anew") from error
         if dataclasses.replace(config, steps=self.config.steps) != self.config:
             raise InputError(
                 f"checkpoint '{path}' was written with other settings: resume with the same, or train anew"
             )
-        self.iteration, self.lesson = facts["iteration"], facts["lesson"]
-        self.recent.extend(facts["recent"])
-        self.seconds, self.history = facts["seconds"], facts["history"]
+        self.iteration, self.lesson, self.seconds, self.history = iteration, lesson, seconds, history
+        self.recent.extend(recent)
         best = {k.removeprefix("best/"): v for k, v in tensors.items() if k.startswith("best/")}
-        self.best = (facts["best"], best) if best else None
+        self.best = (rate, best) if best else None
         return tensors
 
     def _finish(self, network: Network, layout: Mapping[str, int], actions: int) -> LearnedPolicy:
