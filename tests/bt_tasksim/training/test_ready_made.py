@@ -1,0 +1,147 @@
+"""The registered environment, with real physics: checkers, any learner, and what never pays."""
+
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from bt_tasksim.errors import InputError
+from bt_tasksim.scene import ObjectSpec
+from bt_tasksim.training.ready_made import grasp_then_pick
+from trees.scenarios import grasp_then_pick as scenario
+
+NAME = "bt_tasksim.training:bt_tasksim/GraspThenPick-v0"
+CUP = ObjectSpec(kinds=("cup",), on="table", mass=(0.1, 0.11), friction=(0.8, 0.81))
+
+
+@pytest.fixture(scope="module")
+def env():
+    """Easy cups, drawn by the registered name."""
+    made = gymnasium.make(NAME, robot="panda", target=CUP, noise="fine")
+    yield made
+    made.close()
+
+
+def idle(env):
+    """No offset from the reference motion, and never done."""
+    return np.zeros(env.action_space.shape[0])
+
+
+def signal(env):
+    """Done."""
+    return np.append(np.zeros(env.action_space.shape[0] - 1), 1.0)
+
+
+def honest(env):
+    """The reference motion, and done when the concept's own goal is seen."""
+    decision = env.unwrapped._decision
+    return signal(env) if decision.leaf.done(decision.seen, decision.memory) else idle(env)
+
+
+def away(env):
+    """All the offset that there is, and never done."""
+    return np.append(np.ones(env.action_space.shape[0] - 1), 0.0)
+
+
+def play(env, decide, seed):
+    env.reset(seed=seed)
+    rewards = []
+    while True:
+        _, reward, terminated, truncated, info = env.step(decide(env))
+        rewards.append(reward)
+        if terminated or truncated:
+            return rewards, info
+
+
+def test_grasping_pays_and_idling_rushing_and_straying_never_do(env):
+    seeds = (1, 2)
+    gamma = env.unwrapped.reward.gamma
+    best = {}
+    for seed in seeds:
+        rewards, info = play(env, honest, seed)
+        assert info["is_success"] and info["follower"] == "SUCCESS", info["why"]
+        assert info["why"] == "pick target succeeded" and len(rewards) > 10
+        best[seed] = sum(rewards)
+        assert best[seed] > 0.5
+    for decide in (idle, signal, away):
+        for seed in seeds:
+            rewards, info = play(env, decide, seed)
+            assert not info["is_success"] and info["why"]
+            assert sum(rewards) <= 0.0 < best[seed]
+            assert sum(gamma**t * r for t, r in enumerate(rewards)) <= 0.0
+            assert info["reward"]["success"] == 0.0
+
+
+def test_a_signal_with_an_empty_hand_is_judged_by_the_pick(env):
+    rewards, info = play(env, signal, 3)
+    assert len(rewards) == 1 and info["status"] == "SUCCESS" and info["reward"]["failure"] == -1.0
+    assert info["follower"] in ("FAILURE", "SUCCESS") and not info["discarded"]
+
+
+def test_the_same_seed_is_the_same_episode_bit_for_bit(env):
+    other = grasp_then_pick("panda", CUP, noise="fine")
+    assert play(env, honest, 5) == play(other, honest, 5)
+    other.close()
+
+
+def test_lessons_and_the_held_apart_draws_can_be_asked_for():
+    lessons = scenario.scene().lessons
+    for lesson, expected in ((-1, len(lessons) - 1), (0, 0), (None, None)):
+        made = grasp_then_pick(lesson=lesson)
+        assert made.lesson == expected and made.scene.lessons == lessons
+        made.close()
+    made = grasp_then_pick(target=CUP, lesson=0)
+    assert made.lesson is None and made.scene.objects == {"target": CUP}
+    made.close()
+    with pytest.raises(InputError, match=r"unknown robot|no robot"):
+        grasp_then_pick("pandah")
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_checkers_pass(env):
+    check_env(env.unwrapped, skip_render_check=True)
+    from stable_baselines3.common.env_checker import check_env as check_for_stable_baselines
+
+    check_for_stable_baselines(env.unwrapped)
+
+
+def test_soft_actor_critic_of_stable_baselines_trains_it(env):
+    import torch
+    from stable_baselines3 import SAC
+
+    torch.set_num_threads(1)
+    model = SAC(
+        "MlpPolicy", env, learning_starts=100, batch_size=32, buffer_size=1000, device="cpu", seed=0,
+        policy_kwargs={"net_arch": [16]},
+    )  # fmt: skip
+    before = [p.detach().clone() for p in model.actor.parameters()]
+    model.learn(300)
+    assert model.num_timesteps == 300 and model.replay_buffer.size() == 300
+    assert any(not bool((a == b).all()) for a, b in zip(before, model.actor.parameters(), strict=True))
+
+
+PLAIN = f"""
+import gymnasium
+env = gymnasium.make({NAME!r})
+observation, info = env.reset(seed=1)
+ended = 0
+for _ in range(40):
+    observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+    assert observation in env.observation_space
+    if terminated or truncated:
+        ended += 1
+        observation, info = env.reset()
+env.close()
+print(ended)
+"""
+
+
+def test_a_loop_that_knows_gymnasium_alone():
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", PLAIN], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout.split()[-1]) >= 1
