@@ -45,9 +45,10 @@ class GraspMemory(NamedTuple):
         preshape: Closure at which the hand comes.
         touched: Which fingertips ``(..., n_tips)`` have touched anything since the approach began, 0 or 1.
         first: How far before the grasp pose the tool was at the first contact, metres; 0 without one.
-        estimate: What the estimate says ``(..., 4)``: height of the grasp pose and of the object's centre
-            above what it stands on, the centre beyond the grasp pose along the approach (units of 50 mm), and
-            the cosine between the approach and straight down onto the support.
+        estimate: What the estimate says ``(..., 5)``: height of the grasp pose and of the object's centre
+            above what it stands on, the centre beyond the grasp pose along the approach (units of 50 mm), the
+            cosine between the approach and straight down onto the support, and how far along the approach the
+            estimate is from where an object of the known size would stand (units of 20 mm).
         start: Estimated pose ``(..., 7)`` of the object at the start.
         now: Estimated pose ``(..., 7)`` of the object at the previous tick.
     """
@@ -147,10 +148,13 @@ class Grasp(ConceptModel):
         centre, place = seen.object(self.target)[:3], resting_place(seen, self.target)
         beyond = float((centre - goal[:3]) @ approach)
         if place is None:
-            return np.array([0.0, 0.0, beyond / 0.05, 0.0])
+            return np.array([0.0, 0.0, beyond / 0.05, 0.0, 0.0])
         up = poses.rotate(place.pose[3:], np.array([0.0, 0.0, 1.0]))
-        heights = [float((p - place.pose[:3]) @ up) / 0.05 for p in (goal[:3], centre)]
-        return np.array([*heights, beyond / 0.05, -float(up @ approach)])
+        onto = -float(up @ approach)
+        goal_height, height = (float((p - place.pose[:3]) @ up) for p in (goal[:3], centre))
+        standing = _half_extent(seen.object(self.target), seen.model(self.target), up)
+        above = (height - standing) / max(onto, 0.3)
+        return np.array([goal_height / 0.05, height / 0.05, beyond / 0.05, onto, above / 0.02])
 
     @classmethod
     def layout(cls, robot: RobotDescription) -> dict[str, int]:
@@ -169,7 +173,7 @@ class Grasp(ConceptModel):
         """Follow the path with the hand open, then close; both moved by the action's offsets."""
         xp = array_namespace(memory.closing)
         offset = grasp_features.moved_offset(action, memory, seen.world.control_period)
-        closing = xp.where(memory.closing >= 0.0, self.grip, memory.preshape) + offset[..., CLOSE]
+        closing = xp.where(memory.closing >= 0.0, self.grip + offset[..., CLOSE], memory.preshape)
         return Command(
             tool=grasp_features.displaced(self._reference(action, seen, memory), offset),
             hand=xp.asarray(poses.clip(closing, 0.0, 1.0))[..., None],

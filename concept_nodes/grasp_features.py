@@ -42,7 +42,7 @@ def layout(robot: RobotDescription) -> dict[str, int]:
         "contacts so far": n_tips,
         "first contact along the approach": 1,
         "time": 4,
-        "estimate": 4,
+        "estimate": 5,
         "object pushed": 3,
     }
 

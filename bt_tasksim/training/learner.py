@@ -153,7 +153,7 @@ class Learner:
         self.ppo._update_current_progress_remaining(iteration, max(config.rollouts, 1))
         with _seeded(config.seed, iteration + 1):
             self.ppo.train()
-        left = 1.0 - iteration / max(config.rollouts, 1)
+        left = min(1.0, 2.0 - 2.0 * iteration / max(config.rollouts, 1))
         bound = config.final_log_deviation + left * (config.log_deviation - config.final_log_deviation)
         with torch.no_grad():
             policy.log_std.clamp_(max=max(bound, config.final_log_deviation))
