@@ -35,8 +35,8 @@ class TrainConfig:
         hidden: Sizes of the hidden layers; 64 and 64 decide in 15 microseconds.
         log_deviation: Logarithm of the actions' standard deviation at the beginning: 0.5, so that a first
             policy ends an episode at one decision in 40 and not at one in three.
-        final_log_deviation: Largest logarithm of the standard deviation at the end. In between the bound
-            falls linearly: what is rewarded last is nearly what is done without exploration.
+        final_log_deviation: Largest logarithm of the standard deviation at the end. The bound falls
+            linearly in the second half: what is rewarded last is nearly what is done without exploration.
         terminate_bias: Bias of the completion signal at the beginning, of which `bt_tasksim.policy.TERMINATE`
             is the threshold; see ``log_deviation``.
         success_window: Episodes over which the success rate is taken that ends a lesson.
@@ -59,7 +59,7 @@ class TrainConfig:
     entropy: float = 0.0
     hidden: tuple[int, ...] = (64, 64)
     log_deviation: float = -0.7
-    final_log_deviation: float = -1.8
+    final_log_deviation: float = -2.0
     terminate_bias: float = -0.5
     success_window: int = 300
     evaluate_every: int = 12

@@ -294,8 +294,11 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             failed = failed_leaf(train)
             why = failed.feedback_message if failed is not None else why
             parts["failure"] = self.reward.failure
-        # The present observation is charged once: there is no state after it.
-        parts["shaping"] = self.reward.shape(self._potential, self._potential)
+        kept = truncated or (outcome is not None and (outcome.success or not self.reward.sufficient))
+        if kept:  # the present observation is charged once: there is no state after it
+            parts["shaping"] = self.reward.shape(self._potential, self._potential)
+        else:
+            parts["shaping"] = self.reward.take_back(self._potential)
         self.discarded += truncated and outcome is not None
         info = {
             "reward": parts,

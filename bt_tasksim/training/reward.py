@@ -32,7 +32,7 @@ class Reward:
     failure: float = -1.0
     violated: float = -1.0
     timeout: float = -1.0
-    shaping: float = 0.5
+    shaping: float = 0.3
     gamma: float = 0.997
     sufficient: bool = True
 
@@ -50,6 +50,13 @@ class Reward:
     def shape(self, before: float, after: float) -> float:
         """Shaping for a change of potential (necessary cost at the start less the present one)."""
         return self.shaping * (self.gamma * after - before)
+
+    def take_back(self, before: float) -> float:
+        """Shaping at an end without success: the potential after it is nothing, so coming near never pays.
+
+        Source: M. Grzes, "Reward shaping in episodic reinforcement learning", AAMAS 2017.
+        """
+        return -self.shaping * before
 
 
 PARTS = tuple(f.name for f in fields(Reward) if f.name not in ("gamma", "sufficient"))
