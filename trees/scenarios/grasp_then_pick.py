@@ -1,13 +1,14 @@
 """Grasp an object of unknown shape, size, mass and friction, and lift it: the tree a grasp is trained in.
 
 The scene itself draws what is never trained on: other kinds of objects, and of superellipsoids other sizes
-and exponents (the odd strips of their ranges). Its lessons draw superellipsoids from the even strips alone, on
-the table, and on a stand to which the hand comes slanted, as to a shelf.
+and exponents (the odd strips of their ranges). Its lessons draw superellipsoids from the even strips alone,
+on the table, and on a stand to which the hand comes slanted, as to a shelf.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 
@@ -62,15 +63,28 @@ def _lesson(
     table = Scene(objects={"target": spec})
     stand = Scene(fixtures=["stand"], objects={"target": raised})
     return Lesson(
-        name, noise=noise, hand=HAND, tilt=TILT, scenes=(table, table, stand), tolerance=tolerance, until=until
+        name,
+        noise=noise,
+        hand=HAND,
+        tilt=TILT,
+        scenes=(table, table, stand),
+        tolerance=tolerance,
+        until=until,
     )
 
 
-LESSONS = (
-    _lesson("near-boxes", BOXES, ("fine", "original"), tolerance=3.0, until=0.6),
-    _lesson("all shapes", SHAPES, NOISE, tolerance=3.0, until=0.65),
-    _lesson("all shapes, held firmly", SHAPES, NOISE),
-)
+def lessons(**changes: Any) -> tuple[Lesson, ...]:
+    """The curriculum.
+
+    Args:
+        changes: Fields of `ObjectSpec` that are other than here, such as ``mass``.
+    """
+    boxes, shapes = (dataclasses.replace(spec, **changes) for spec in (BOXES, SHAPES))
+    return (
+        _lesson("near-boxes", boxes, ("fine", "original"), tolerance=3.0, until=0.6),
+        _lesson("all shapes", shapes, NOISE, tolerance=3.0, until=0.65),
+        _lesson("all shapes, held firmly", shapes, NOISE),
+    )
 
 
 def scene(robot: str = "panda") -> Scene:
@@ -79,7 +93,7 @@ def scene(robot: str = "panda") -> Scene:
         robot,
         objects={"target": UNSEEN},
         goal=Goal("target", "table", relation="lifted", height=LIFT),
-        lessons=LESSONS,
+        lessons=lessons(),
         name="grasp_then_pick",
     )
 

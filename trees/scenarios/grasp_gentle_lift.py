@@ -1,0 +1,44 @@
+"""Grasp a light, fragile object and lift it slowly: what follows a grasp says how firm it should be.
+
+The follower's own goal limits the hand's force on the object, which no policy can see. Shapes, lessons and
+strips are those of `grasp_then_pick`; `grasp_fast_heavy` is the opposite.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.scene import Goal, Scene
+from bt_tasksim.training.decorator import Train
+from concept_nodes import Grasp, Pick
+from trees.authoring import sequence
+from trees.scenarios.grasp_then_pick import UNSEEN, lessons
+
+MASS, FRICTION = (0.05, 0.15), (0.3, 0.9)
+LIFT, SPEED = 0.15, 0.15
+SQUEEZE = 12.0
+"""N, of both fingers together: a cup of 150 g needs about 3."""
+GRIP = 0.7
+"""A policy's offset of at most 0.5 leads from here to a hand that is open as well as to one that is shut."""
+
+
+def scene(robot: str = "panda") -> Scene:
+    """One light object on the table."""
+    return Scene(
+        robot,
+        objects={"target": replace(UNSEEN, mass=MASS, friction=FRICTION)},
+        goal=Goal("target", "table", relation="lifted", height=LIFT),
+        lessons=lessons(mass=MASS, friction=FRICTION),
+        name="grasp_gentle_lift",
+    )
+
+
+def build() -> Behaviour:
+    """The tree."""
+    return sequence(
+        "grasp, gentle lift",
+        Train(Grasp("target", grip=GRIP, timeout=6.0)),
+        Pick("target", distance=LIFT, speed=SPEED, squeeze=SQUEEZE),
+    )
