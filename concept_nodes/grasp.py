@@ -16,7 +16,7 @@ from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.world import Command, ObjectModel, PlaceModel
 from concept_nodes import grasp_features
-from concept_nodes.grasp_features import CLOSE
+from concept_nodes.grasp_features import ALONG, CLOSE
 from concept_nodes.holding import HOLDING, tool_distance
 from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 
@@ -37,6 +37,9 @@ class GraspMemory(NamedTuple):
         begins: Seconds after which the straight approach begins, and with it what is decided by a policy.
         goal: Grasp pose ``(..., 7)`` of the reference motion.
         delay: Seconds by which the motion is behind the reference.
+        middle: Offsets ``(..., 5)`` in units of `grasp_features.SCALE` that the middle of an action stands for:
+            the tool goes on, or stays behind, by as much as the estimate is above or below where the object
+            would stand.
         offset: Offsets ``(..., 5)`` from the reference motion, see `grasp_features.SCALE`.
         target: Tool pose ``(..., 7)`` that was last commanded.
         closing: Seconds since the hand began to close; negative before.
@@ -57,6 +60,7 @@ class GraspMemory(NamedTuple):
     begins: Array
     goal: Array
     delay: Array
+    middle: Array
     offset: Array
     target: Array
     closing: Array
@@ -126,11 +130,15 @@ class Grasp(ConceptModel):
         back = goal.copy()
         back[:3] -= self.standoff * approach
         path = plan([*_way_out(seen, back), back, goal], self.speed, blend=0.03)
+        estimate = self._estimate(seen, goal, approach)
+        middle = np.zeros(CLOSE + 1)
+        middle[ALONG] = min(max(0.02 * estimate[4] / grasp_features.SCALE[ALONG], -1.0), 1.0)
         return GraspMemory(
             path=path,
             begins=_approach_begins(path, self.standoff),
             goal=goal,
             delay=np.float64(0.0),
+            middle=middle,
             offset=np.zeros(CLOSE + 1),
             target=seen.tool,
             closing=np.float64(-1.0),
@@ -139,7 +147,7 @@ class Grasp(ConceptModel):
             preshape=np.float64(0.0),
             touched=np.zeros(len(seen.robot.tips)),
             first=np.float64(0.0),
-            estimate=self._estimate(seen, goal, approach),
+            estimate=estimate,
             start=seen.object(self.target),
             now=seen.object(self.target),
         )
@@ -207,6 +215,11 @@ class Grasp(ConceptModel):
             first=xp.where(fresh, along, memory.first),
         )
 
+    def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:
+        """Where the estimate says: the programmed grasp trusts it."""
+        xp = array_namespace(memory.middle)
+        return xp.concat([-memory.middle, xp.zeros_like(memory.middle[..., :1])], axis=-1)
+
     def _reference(self, action: Array, seen: Seen, memory: GraspMemory) -> Array:
         """The pose ``(..., 7)`` on the path, as far as its pace lets it be."""
         behind = memory.delay + grasp_features.delay(action, seen.world.control_period)
@@ -233,7 +246,7 @@ class Grasp(ConceptModel):
         xp = array_namespace(gap)
         distance = xp.mean(xp.sqrt(xp.sum(gap * gap, axis=-1)), axis=-1)
         pushed = poses.norm(seen.object(self.target)[..., :3] - memory.start[..., :3])
-        return distance / 0.1 + xp.where(seen.opposed(), 0.0, 0.3) + pushed / 0.05
+        return distance / 0.1 + 0.3 * xp.astype(~xp.asarray(seen.opposed()), distance.dtype) + pushed / 0.05
 
     def sufficient_cost(self, known: Known, memory: GraspMemory) -> Array:
         """1 unless the hand presses on the object."""

@@ -93,12 +93,12 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
 
 def moved_offset(action: Array, memory: GraspMemory, period: float) -> Array:
     """The offsets ``(..., 5)`` one control period on: towards the action, no faster than `RATE`."""
-    action = action[..., :PACE]
+    action = poses.clip(action[..., :PACE], -1.0, 1.0) + memory.middle
     if type(action) is np.ndarray:
         step = _RATE * (period / PERIOD)
-        gap = np.minimum(np.maximum(action, -1.0), 1.0) * _SCALE - memory.offset
+        gap = action * _SCALE - memory.offset
         return memory.offset + np.minimum(np.maximum(gap, -step), step)
-    gap = poses.clip(action, -1.0, 1.0) * constant(SCALE, memory.offset) - memory.offset
+    gap = action * constant(SCALE, memory.offset) - memory.offset
     step = constant(RATE, memory.offset) * (period / PERIOD)
     return memory.offset + poses.clip(gap, -step, step)
 
