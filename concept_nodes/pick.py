@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from bt_tasksim.context import Seen
+from bt_tasksim.context import Known, Seen
 from bt_tasksim.motion import plan
 from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName
+from bt_tasksim.poses import Array, array_namespace
 from concept_nodes.carry import Carry, MoveMemory
 from concept_nodes.limits import FORCE_LIMIT
 
@@ -20,6 +21,8 @@ class Pick(Carry):
         distance: How far.
         speed: Peak speed of the tool.
         force_limit: Force at the wrist at which the task is broken off.
+        squeeze: Largest sum of the hand's forces on the object, at the beginning and at the end, with which
+            the goal counts as reached; None: it may be squeezed as hard as one likes.
     """
 
     target: ObjectName
@@ -27,6 +30,7 @@ class Pick(Carry):
     distance: Metres = 0.10
     speed: MetresPerSecond = 0.3
     force_limit: Newtons = FORCE_LIMIT
+    squeeze: Newtons | None = None
 
     default_timeout = 8.0
 
@@ -35,3 +39,15 @@ class Pick(Carry):
         goal = seen.tool.copy()
         goal[:3] += self.distance * np.asarray(self.direction)
         return MoveMemory(plan([seen.tool, goal], self.speed, samples=2))
+
+    def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
+        """As in `Carry`; or the hand's force on the object over ``squeeze``, where that is larger."""
+        cost = super().sufficient_cost(known, memory)
+        if self.squeeze is None:
+            return cost
+        xp = array_namespace(cost)
+        cost = xp.maximum(cost, known.hand_force(self.target) / self.squeeze)
+        if known.began is None:
+            return cost
+        first = Known(known.began, known.world)
+        return xp.maximum(cost, first.hand_force(self.target) / self.squeeze)

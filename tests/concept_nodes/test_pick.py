@@ -47,4 +47,31 @@ def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
 
     decisions = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick]
     cost = [float(d.leaf.sufficient_cost(Known(d.hidden, d.seen.world), d.memory)) for d in decisions]
-    assert cost[0] == 1.0 and cost[-1] == 0.0
+    assert cost[0] == 10.0 and cost[-1] == 0.0
+
+
+def test_what_may_not_be_squeezed_costs_the_hands_force(recorded_run):
+    from bt_tasksim.context import Known
+
+    decision = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick][-1]
+    now = Known(decision.hidden, decision.seen.world)
+    force = float(now.hand_force(decision.leaf.target))
+    assert force > 1.0
+    for squeeze in (force / 2, force / 4):
+        leaf = Pick(decision.leaf.target, squeeze=squeeze)
+        assert float(leaf.sufficient_cost(now, decision.memory)) == pytest.approx(force / squeeze)
+    gentle = Pick(decision.leaf.target, squeeze=1000.0)
+    assert float(gentle.sufficient_cost(now, decision.memory)) < 1.0
+
+
+def test_the_squeeze_counts_at_the_beginning_too(recorded_run):
+    import dataclasses
+
+    from bt_tasksim.context import Known
+
+    decision = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick][-1]
+    hidden = decision.hidden
+    harder = dataclasses.replace(hidden, hand_force=3.0 * hidden.hand_force)
+    leaf = Pick(decision.leaf.target, squeeze=float(hidden.hand_force[0]))
+    cost = leaf.sufficient_cost(Known(hidden, decision.seen.world, harder), decision.memory)
+    assert float(cost) == pytest.approx(3.0)

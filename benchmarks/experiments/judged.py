@@ -1,0 +1,179 @@
+"""Episodes judged as in training: by what follows the grasp, its own sufficient goal included."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.errors import InputError
+from bt_tasksim.network import Network
+from bt_tasksim.policy import PROGRAMMED, LearnedPolicy, Policy, ProgrammedPolicy
+from bt_tasksim.policy_files import load_policy
+from bt_tasksim.policy_library import find_policy
+from bt_tasksim.scene import Scene
+from bt_tasksim.training.episode import EpisodeEnv
+from bt_tasksim.training.evaluation import _one_thread_each, wilson
+from bt_tasksim.training.rollouts import _kind
+
+STREAM = "evaluation"
+
+
+@dataclass(frozen=True)
+class Draw:
+    """What became of one draw.
+
+    Attributes:
+        seed: Its seed.
+        success: The grasp was called done, and what follows agreed.
+        done: The grasp was called done.
+        end: Countable kind of end, as in a training's history.
+        why: One sentence.
+        decisions: How often the policy was asked.
+        force: The hand's force on the object at the end, N.
+    """
+
+    seed: int
+    success: bool
+    done: bool
+    end: str
+    why: str
+    decisions: int
+    force: float
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a worker process needs: how a tree is built, its scene, and the policy of what is under Train.
+
+    Attributes:
+        build: Builds the tree; a function that can be pickled.
+        scene: The scene.
+        policy: ``programmed``, or a policy's name or folder.
+        noise: Noise model of the estimate.
+        lesson: Number of the scene's lesson that worlds are drawn from; None: the scene itself.
+    """
+
+    build: Callable[[], Behaviour]
+    scene: Scene
+    policy: str = PROGRAMMED
+    noise: str = "original"
+    lesson: int | None = None
+
+
+def judge(
+    case: Case, seeds: Sequence[int], workers: int = 1, policy: Policy | None = None, stream: str = STREAM
+) -> list[Draw]:
+    """One episode for each seed, in their order.
+
+    Args:
+        case: What is run.
+        seeds: Seeds of the draws.
+        workers: Worker processes; 1 runs in this process.
+        policy: A policy of one's own instead of the case's; in this process alone.
+        stream: Stream of draws.
+    """
+    if workers <= 1 or policy is not None:
+        env = _env(case, stream)
+        chosen = policy or load(case.policy)
+        try:
+            return [episode(env, chosen, seed) for seed in seeds]
+        finally:
+            env.close()
+    with _one_thread_each():
+        pool = multiprocessing.get_context("spawn").Pool(workers, initializer=_start, initargs=(case, stream))
+    with pool:
+        return list(pool.imap(_work, seeds, chunksize=4))
+
+
+def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
+    """One draw; the policy makes the decisions that an action of the environment stands for."""
+    import numpy as np
+
+    try:
+        env.reset(seed=seed, options={"draw": seed})
+    except InputError as error:
+        return Draw(seed, False, False, "never began", str(error), 0, 0.0)
+    decisions = 0
+    while True:
+        decision = env._decision
+        assert decision is not None
+        action = policy.act(decision.leaf.model, decision.seen, decision.memory)
+        signal = 1.0 if bool(action.terminate) else -1.0
+        motion = np.clip(np.asarray(action.motion, float), -1.0, 1.0)
+        _, _, terminated, truncated, info = env.step(np.append(motion, signal))
+        decisions += 1
+        if terminated or truncated:
+            hidden = env.runner.context.hidden()
+            force = 0.0 if hidden is None else float(hidden.hand_force[0])
+            done = info["status"] == "SUCCESS"
+            return Draw(seed, bool(info["is_success"]), done, _kind(info), info["why"], decisions, force)
+
+
+def load(name: str) -> Policy:
+    """A policy by name or folder, or the programmed one.
+
+    Raises:
+        InputError: There is no such policy.
+    """
+    if name == PROGRAMMED:
+        return ProgrammedPolicy()
+    folder = find_policy(name)
+    network, card = load_policy(folder)
+    return LearnedPolicy(network, f"{folder.resolve().name}@{card.hash}")
+
+
+def learned(network: Network, name: str) -> Policy:
+    """A policy that has no folder."""
+    return LearnedPolicy(network, name)
+
+
+def counts(draws: Iterable[Draw]) -> dict[str, Any]:
+    """Successes, and how far "done" can be trusted, with Wilson's intervals; ends by kind."""
+    rows = list(draws)
+    done = [d for d in rows if d.done]
+    wins = sum(d.success for d in rows)
+    return {
+        "draws": len(rows),
+        "successes": wins,
+        "interval": interval(wins, len(rows)),
+        "done": len(done),
+        "done_right": sum(d.success for d in done),
+        "done_interval": interval(sum(d.success for d in done), len(done)),
+        "ends": dict(Counter(d.end for d in rows if not d.success).most_common()),
+        "failed_seeds": [d.seed for d in rows if not d.success],
+    }
+
+
+def interval(wins: int, n: int) -> list[float]:
+    """Wilson's interval; none of none is anything."""
+    return [round(v, 4) for v in wilson(wins, n)] if n else [0.0, 1.0]
+
+
+def plain(draws: Iterable[Draw]) -> list[dict[str, Any]]:
+    """As plain data."""
+    return [asdict(d) for d in draws]
+
+
+_worker: dict[str, Any] = {}
+
+
+def _env(case: Case, stream: str) -> EpisodeEnv:
+    options = EngineOptions(noise=case.noise)
+    return EpisodeEnv(case.build(), case.scene, options=options, stream=stream, lesson=case.lesson)
+
+
+def _start(case: Case, stream: str) -> None:
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the workers
+    _worker["env"], _worker["policy"] = _env(case, stream), load(case.policy)
+
+
+def _work(seed: int) -> Draw:
+    return episode(_worker["env"], _worker["policy"], seed)
