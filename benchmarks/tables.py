@@ -1,10 +1,14 @@
 """Measured numbers into the documentation: ``python -m benchmarks.tables``.
 
-Reads ``benchmarks/results/*.json`` and writes the tables between the marker comments of README.md and
-docs/evaluation.md, so that no number is typed by hand. Results are what the measurements write:
+Reads ``benchmarks/results/*.json`` and writes the tables between the marker comments of README.md,
+docs/evaluation.md and docs/training.md, so that no number is typed by hand. Results are what the measurements
+write:
 
 - ``<scenario>-<robot>[-camera][-fromlogs].json`` by ``python -m benchmarks.success``, in the format of
   ``bt-tasksim evaluate --json``;
+- ``oracle-<robot>.json`` by ``python -m benchmarks.oracle``;
+- ``grasp-<robot>-<noise>-<learned|programmed>.json`` by ``python -m benchmarks.grasp``;
+- ``learning.json`` by ``python -m benchmarks.learning``;
 - ``speed.json`` by ``bt-tasksim bench --json``;
 - ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
 
@@ -20,12 +24,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from benchmarks import learned_tables
 from benchmarks.success import FIRST_SEED, RESULTS, SCENARIOS
 from benchmarks.success import ROWS as MEASURED
 from bt_tasksim.files import write_text
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ("README.md", "docs/evaluation.md")
+PAGES = ("README.md", "docs/evaluation.md", "docs/training.md")
 ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
 KINDS = ("camera", "fromlogs")
@@ -173,6 +178,7 @@ TABLES = {
     "commands": commands,
     "speed": speed,
     "decomposition": decomposition,
+    **learned_tables.TABLES,
 }
 MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 

@@ -132,7 +132,7 @@ def summary(tree: str, places: Mapping[Any, Path]) -> str:
 
 
 def _best(folder: Path) -> str:
-    """The evaluation in which the kept policy was the best so far."""
+    """The last evaluation, or an earlier one whose policy was clearly better and is kept."""
     from bt_tasksim.training import ppo
 
     for suffix in ("-backward", ""):
@@ -141,9 +141,14 @@ def _best(folder: Path) -> str:
             rows = [row.get("held_apart") for row in json.loads(file.read_text(encoding="utf-8"))]
             held = [row for row in rows if row]
             if held:
-                best = max(held, key=lambda row: float(row["successes"] / row["draws"]))
-                return f", {best['successes']} of {best['draws']} held-apart draws"
+                best = max(held, key=_share)
+                kept = held[-1] if _share(held[-1]) >= _share(best) - ppo.CLEARLY else best
+                return f", {kept['successes']} of {kept['draws']} held-apart draws"
     return ""
+
+
+def _share(held: Mapping[str, Any]) -> float:
+    return float(held["successes"] / held["draws"])
 
 
 def _ppo() -> tuple[Any, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -216,3 +217,16 @@ def test_an_interrupt_says_how_to_go_on(tiny, tmp_path, kept):
     assert {p.name for p in tmp_path.iterdir()} == {"tiny.json", *(["p.training"] if kept else [])}
     with pytest.raises(ProcessLookupError):
         os.killpg(process.pid, 0)
+
+
+def test_the_page_about_training_has_every_setting_with_its_default():
+    page = (Path(__file__).parents[3] / "docs" / "training.md").read_text(encoding="utf-8")
+    page = page.split("## What was measured")[0]
+    rows = dict(re.findall(r"^\| `([\w.]+)` \| ([^|`]+) \|", page, re.M))
+    defaults = {k: v for k, v in TrainConfig().to_dict().items() if k != "reward"}
+    defaults |= {f"reward.{k}": v for k, v in TrainConfig().to_dict()["reward"].items()}
+    assert rows.keys() == defaults.keys()
+    for name, said in rows.items():
+        value = defaults[name]
+        expected = list(value) if isinstance(value, tuple) else value
+        assert json.loads(said) == expected, name
