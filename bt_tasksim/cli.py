@@ -15,6 +15,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from bt_tasksim.arguments import count as _count
+from bt_tasksim.arguments import policy as _policy
+from bt_tasksim.arguments import seed as _seed
 from bt_tasksim.errors import BtTasksimError, InputError
 from bt_tasksim.progress import progress
 
@@ -104,6 +107,17 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
     train.add_argument("--backward", action="store_true", help="then fine-tune them, the last one first")
 
+    check = add("check", _check, "See what is wrong with a concept of one's own.")
+    check.add_argument("file", metavar="FILE", help="the Python file that defines it")
+    check.add_argument(
+        "--tree", metavar="TREE", help="where it is at work, default FILE's own, train_FILE's, or a scenario"
+    )
+
+    new = add("new", _new, "Begin something of one's own: a concept with its training tree and test.")
+    new.add_argument("kind", choices=("concept",), metavar="concept", help="what")
+    new.add_argument("name", metavar="NAME", help="its name, such as push or wipe_table")
+    new.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder, default here")
+
     replay = add("replay", _replay, "Run a logged run again and compare, state by state.")
     replay.add_argument("run", metavar="RUN", type=Path, help="a run's folder or its run.h5")
 
@@ -150,36 +164,6 @@ def _engine_arguments(parser: argparse.ArgumentParser) -> None:
         help="every leaf of a concept takes this policy, whatever the tree says: programmed, or a policy's "
         "name or folder; repeatable",
     )
-
-
-def _policy(text: str) -> tuple[str, str]:
-    concept, _, policy = text.partition("=")
-    if not concept or not policy:
-        raise argparse.ArgumentTypeError(
-            f"should be CONCEPT=POLICY, such as grasp=programmed, found '{text}'"
-        )
-    return concept, policy
-
-
-def _count(text: str) -> int:
-    value = _whole(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"should be a positive whole number, found '{text}'")
-    return value
-
-
-def _seed(text: str) -> int:
-    value = _whole(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"should be zero or a positive whole number, found '{text}'")
-    return value
-
-
-def _whole(text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"should be a whole number, found '{text}'") from None
 
 
 def _options(options: argparse.Namespace, rendering: bool = False) -> Any:
@@ -334,6 +318,22 @@ def _train(options: argparse.Namespace) -> int:
 
     asked = {k: v for k, v in vars(options).items() if k != "command"}
     print(command.run(command.Request(**asked)))
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from bt_tasksim.checking.command import check
+
+    with progress("checking", None):
+        report = check(options.file, options.tree)
+    print("\n".join(report.lines()))
+    return 2 if report.errors else 0
+
+
+def _new(options: argparse.Namespace) -> int:
+    from bt_tasksim.new_concept import write_concept
+
+    print(write_concept(options.name, options.out))
     return 0
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -163,48 +163,20 @@ def act() -> type[Act]:
     return Act
 
 
-class Decision(NamedTuple):
-    """One decision of one leaf in a real run."""
-
-    leaf: ConceptModel
-    seen: Seen
-    memory: Any
-    hidden: Hidden
-
-
-class Spy:
-    """A policy that notes what it is asked and decides as another one does."""
-
-    name = "spy"
-
-    def __init__(self, policy: Any, runner: Runner, notes: list[Decision]) -> None:
-        self.policy, self.runner, self.notes = policy, runner, notes
-
-    def act(self, model: ConceptModel, seen: Seen, memory: Any) -> Any:
-        self.notes.append(Decision(model, seen, memory, self.runner.context.hidden()))
-        return self.policy.act(model, seen, memory)
-
-
 @pytest.fixture(scope="session")
 def recorded_run():
     """Every decision of every concept in a real run: ``recorded_run(scenario, seed)``."""
+    from bt_tasksim.checking.recording import record
     from trees.load import load_source
 
-    kept: dict[tuple[str, int], list[Decision]] = {}
+    kept: dict[tuple[str, int], list[Any]] = {}
 
-    def run(scenario: str, seed: int = 1) -> list[Decision]:
+    def run(scenario: str, seed: int = 1) -> list[Any]:
         if (scenario, seed) not in kept:
             source = load_source(scenario)
-            runner = Runner(source.build(), source.scene)
-            notes: list[Decision] = []
-            leaves = [leaf for leaf in runner.tree.iterate() if isinstance(leaf, ConceptModel)]
-            policies = [leaf.policy_in_use for leaf in leaves]
-            for leaf, policy in zip(leaves, policies, strict=True):
-                leaf._policy = Spy(policy, runner, notes)
-            runner.run(seed)
-            for leaf, policy in zip(leaves, policies, strict=True):
-                leaf._policy = policy
-            kept[scenario, seed] = notes
+            found = record(source.build(), source.scene, seeds=[seed])
+            assert not found.errors, found.errors
+            kept[scenario, seed] = [d for notes in found.decisions.values() for d in notes]
         return kept[scenario, seed]
 
     return run

@@ -250,6 +250,9 @@ def _module(path: Path) -> Any:
         raise InputError(f"there is no tree file '{path}'")
     spec = importlib.util.spec_from_file_location(f"_tree_{path.stem}", path)
     assert spec is not None and spec.loader is not None
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:  # as for a script: it may import what stands beside it
+        sys.path.append(folder)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     _called(spec.loader.exec_module, path, module)

@@ -1,0 +1,228 @@
+"""``bt-tasksim check``: the concepts that a Python file defines, checked in real runs."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim.checking.declaration import check_declaration
+from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case, Finding
+from bt_tasksim.checking.purity import check_batches, check_purity
+from bt_tasksim.checking.recording import Recording, record
+from bt_tasksim.checking.situations import Decision, Situations, numbers
+from bt_tasksim.checking.values import check_values
+from bt_tasksim.checking.watching import check_observables, check_watching
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.errors import InputError
+from bt_tasksim.training.decorator import concepts_in, follower_of, train_nodes
+
+RUNS = 3
+"""Runs from which situations are taken; from the second on, actions explore."""
+MOST = 24
+"""Situations of a concept that are taken from real runs."""
+BESIDE = "train_"
+"""How the file begins, beside a concept's own, that holds its training tree."""
+
+
+@dataclass
+class Report:
+    """What a check has found.
+
+    Attributes:
+        findings: What is wrong.
+        checked: What was checked, a line for each concept.
+    """
+
+    findings: list[Finding] = field(default_factory=list)
+    checked: list[str] = field(default_factory=list)
+
+    @property
+    def errors(self) -> int:
+        """How many findings are errors."""
+        return sum(f.level == ERROR for f in self.findings)
+
+    def lines(self) -> list[str]:
+        """What is printed: a line for each finding, errors first, and what was checked."""
+        order = sorted(self.findings, key=lambda f: (f.concept, f.level != ERROR))
+        counted = f"{_count(self.errors, 'error')}, {_count(len(self.findings) - self.errors, 'warning')}"
+        return [
+            *map(str, order),
+            *(f"{'not ok' if self.errors else 'ok'}: {c}; {counted}" for c in self.checked),
+        ]
+
+
+def check(file: str | Path, tree: str | None = None) -> Report:
+    """Check the concepts that a Python file defines.
+
+    Args:
+        file: The file; one of the shipped concepts' own, too.
+        tree: The tree in which they are seen at work: a scenario, or a ``.py`` or ``.xml`` file. By default
+            the file's own ``build()``, or that of the file ``train_...`` beside it, or a scenario with it.
+
+    Raises:
+        InputError: The file is missing, fails or defines no concept; or the tree is no good.
+    """
+    from trees.load import own_nodes
+
+    path = Path(file)
+    found = own_nodes(str(path)).values()
+    concepts = [c for c in found if issubclass(c, ConceptModel) and not inspect.isabstract(c)]
+    if not concepts:
+        half = [c for c in found if inspect.isabstract(c)]
+        if half:
+            missing = ", ".join(f"{name}()" for name in sorted(half[0].__abstractmethods__))
+            raise InputError(f"'{file}': {half[0].__name__} has no {missing}: write it")
+        raise InputError(f"'{file}' defines no concept: a class that derives from ConceptModel")
+    source = _own_tree(path, concepts[0]) if tree is None else tree
+    report = Report()
+    recorded: dict[str, tuple[Any, Recording]] = {}
+    names: dict[str, list[type[ConceptModel]]] = {}
+    for concept in concepts:
+        names.setdefault(source or _scenario_with(concept), []).append(concept)
+    for name, group in names.items():
+        recorded[name] = _record(name, group) if name else (None, Recording({}, [], []))
+        for concept in group:
+            case, checked = check_concept(concept, name, *recorded[name])
+            report.findings += case.findings
+            report.checked.append(checked)
+    return report
+
+
+def check_concept(concept: type[ConceptModel], name: str, root: Any, runs: Recording) -> tuple[Case, str]:
+    """Check one concept.
+
+    Args:
+        concept: The concept.
+        name: Name or file of the tree in which it was seen at work; empty where there is none.
+        root: That tree's root.
+        runs: What was recorded there.
+
+    Returns:
+        What was found, and what was checked.
+    """
+    leaves = [leaf for leaf in runs.decisions if _same(type(leaf), concept)]
+    leaf = max(leaves, key=lambda leaf: len(runs.decisions[leaf]), default=None)
+    decisions = runs.decisions[leaf] if leaf is not None else []
+    case = Case(type(leaf) if leaf is not None else concept, decisions, _followed(root, leaf))
+    check_declaration(case)
+    if not decisions:
+        _never_acted(case, name, leaves, runs)
+        check_observables(case)
+        return case, f"{concept.__name__}, its declaration alone"
+    chosen = spread(decisions, MOST)
+    situations = Situations(chosen, leaf=case.leaf)
+    compared = ""
+    for part in (check_watching, check_values, check_purity):
+        part(case, situations)
+    if check_batches(case, situations):
+        compared = ", torch"
+    if case.leaf is not None and case.leaf.is_programmed and "done" in case.functions:
+        _check_done(case, runs)
+    programmed = f"{len(case.functions)} functions in {len(situations)} situations of {len(runs.ends)} runs"
+    return case, f"{concept.__name__}, {programmed} of {Path(name).name}, one by one, in batches{compared}"
+
+
+def spread(decisions: Sequence[Decision], n: int) -> list[Decision]:
+    """At most about ``n`` decisions, spread evenly, the first and last ones among them."""
+    step = max(1, len(decisions) // n)
+    chosen = list(decisions[::step])
+    return chosen if chosen[-1] is decisions[-1] else [*chosen, decisions[-1]]
+
+
+def _own_tree(path: Path, concept: type[ConceptModel]) -> str | None:
+    if callable(getattr(sys.modules[concept.__module__], "build", None)):
+        return str(path)
+    beside = path.with_name(f"{BESIDE}{path.name}")
+    return str(beside) if beside.is_file() else None
+
+
+def _scenario_with(concept: type[ConceptModel]) -> str:
+    """A scenario that uses a concept, one that trains it first; empty where none does."""
+    from trees.load import load_source, scenarios
+
+    found = ""
+    for name in scenarios():
+        root = load_source(name).build()
+        if any(_same(type(leaf), concept) for node in train_nodes(root) for leaf in concepts_in(node)):
+            return name
+        if not found and any(_same(type(leaf), concept) for leaf in concepts_in(root)):
+            found = name
+    return found
+
+
+def _record(name: str, concepts: Sequence[type[ConceptModel]]) -> tuple[Any, Recording]:
+    from trees.load import load_source
+
+    source = load_source(name)
+    root = source.build()
+    watched = [type(leaf) for leaf in concepts_in(root) if any(_same(type(leaf), c) for c in concepts)]
+    if not watched:
+        known = ", ".join(sorted({type(leaf).__name__ for leaf in concepts_in(root)})) or "none"
+        wanted = " or ".join(c.__name__ for c in concepts)
+        raise InputError(f"the tree '{name}' has no leaf of {wanted}; its concepts: {known}")
+    stream = "training" if source.scene.lessons else "evaluation"
+    return root, record(root, source.scene, watched, range(1, RUNS + 1), explore=True, stream=stream)
+
+
+def _same(a: type, b: type) -> bool:
+    """Two classes are one, though their file may have been loaded twice."""
+    return a is b or (a.__name__ == b.__name__ and _file(a) == _file(b))
+
+
+def _file(concept: type) -> Path:
+    return Path(inspect.getsourcefile(concept) or "").resolve()
+
+
+def _followed(root: Any, leaf: ConceptModel | None) -> bool:
+    if root is None or leaf is None:
+        return False
+    return any(leaf in concepts_in(node) and follower_of(node) is not None for node in train_nodes(root))
+
+
+def _never_acted(case: Case, name: str, leaves: Sequence[ConceptModel], runs: Recording) -> None:
+    if not name:
+        what = "stands in no tree that is known, so its functions were not run"
+        remedy = f"give the file build() and scene(), or write {BESIDE}{case.file.name}, or name a --tree"
+        case.add(WARNING, "", what, remedy)
+        return
+    for error in runs.errors:
+        cause = error.__cause__ or error
+        blamed = _blamed(cause, case.file)
+        case.raised(blamed, cause)
+    if not runs.errors:
+        case.add(
+            ERROR, "", f"never acted in {len(runs.ends)} runs: {runs.ends[-1]}", "see what stands before it"
+        )
+
+
+def _blamed(error: BaseException, file: Path) -> str:
+    """The function of a concept's file in which an exception was raised."""
+    name, trace = "", error.__traceback__
+    while trace is not None:
+        code = trace.tb_frame.f_code
+        if Path(code.co_filename).resolve() == file.resolve() and not name:
+            name = code.co_name
+        trace = trace.tb_next
+    return name
+
+
+def _check_done(case: Case, runs: Recording) -> None:
+    """The programmed policy ends at least once."""
+    leaf = case.leaf
+    assert leaf is not None
+    for decision in case.decisions:
+        found = case.call("done", lambda d=decision: leaf.done(d.seen, d.memory))  # type: ignore[misc]
+        if found is FAILED or bool(np.any(numbers(found))):
+            return
+    what = f"is never true in {len(runs.ends)} runs (the last one ended: {runs.ends[-1]})"
+    case.add(WARNING, "done", what, "see with bt-tasksim run whether the goal is ever reached")
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"

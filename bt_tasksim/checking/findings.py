@@ -1,0 +1,196 @@
+"""What a check has found, and the calls of a concept's functions that it makes."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import inspect
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from bt_tasksim.checking.situations import Decision, Situation, Situations
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.context import Known, Seen
+
+ERROR, WARNING = "ERROR", "WARNING"
+FAILED: Any = object()
+"""What a call gives that raised."""
+PURE = (
+    "decides", "features", "command", "programmed_motion", "done", "necessary_cost", "violated", "maintained",
+    "advance", "sufficient_cost",
+)  # fmt: skip
+"""The pure functions of a concept."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong.
+
+    Attributes:
+        level: `ERROR` or `WARNING`.
+        concept: Name of the concept.
+        function: Name of its function; empty for the concept itself.
+        what: What is wrong.
+        remedy: What to do.
+        line: Line in the concept's file; 0 where none is to blame.
+        file: Name of that file.
+    """
+
+    level: str
+    concept: str
+    function: str
+    what: str
+    remedy: str
+    line: int = 0
+    file: str = ""
+
+    def __str__(self) -> str:
+        where = f"{self.concept}.{self.function}" if self.function else self.concept
+        line = f" ({self.file}:{self.line})" if self.line else ""
+        return f"{self.level} {where}{line}: {self.what}; {self.remedy}"
+
+
+class OutOfReachError(Exception):
+    """A function of a concept has reached for what it must not know."""
+
+
+class Barred:
+    """Stands for the tree's context, which no pure function may use."""
+
+    def __init__(self) -> None:
+        self.reached: list[str] = []
+
+    def __getattr__(self, name: str) -> Any:
+        self.reached.append(name)
+        raise OutOfReachError(name)
+
+
+class Case:
+    """One concept that is checked, with what is known of it and what was found.
+
+    Args:
+        concept: The concept.
+        decisions: What a leaf of it decided on in real runs; empty where there is no such run.
+        followed: In its tree something follows that judges it.
+    """
+
+    def __init__(
+        self, concept: type[ConceptModel], decisions: Sequence[Decision] = (), followed: bool = False
+    ) -> None:
+        self.concept, self.followed = concept, followed
+        self.decisions = list(decisions)
+        self.file = Path(inspect.getsourcefile(concept) or "")
+        self.findings: list[Finding] = []
+        self._said: set[tuple[str, str]] = set()
+        self.barred = Barred()
+        self.leaf: ConceptModel | None = None
+        if decisions:
+            self.leaf = copy.copy(decisions[0].leaf)
+            self.leaf._model = self.leaf
+            self.leaf._context = self.barred  # type: ignore[assignment]  # on purpose
+            self.leaf._policy = None
+
+    def overrides(self, name: str) -> bool:
+        """The concept has a function of its own by this name."""
+        own, base = getattr(self.concept, name), getattr(ConceptModel, name)
+        return getattr(own, "__func__", own) is not getattr(base, "__func__", base)
+
+    @property
+    def functions(self) -> list[str]:
+        """The pure functions that the concept writes itself."""
+        return [f for f in PURE if self.overrides(f) and (f != "maintained" or self.concept.maintains)]
+
+    def add(self, level: str, function: str, what: str, remedy: str, kind: str = "", line: int = 0) -> None:
+        """Note a finding, unless one of this kind was noted for this function.
+
+        Args:
+            level: See `Finding`.
+            function: See `Finding`.
+            what: See `Finding`.
+            remedy: See `Finding`.
+            kind: What it is about; by default ``what``.
+            line: See `Finding`; 0 for that of the function.
+        """
+        key = function, kind or what
+        if key in self._said:
+            return
+        self._said.add(key)
+        line = line or self._line_of(function)
+        self.findings.append(
+            Finding(level, self.concept.__name__, function, what, remedy, line, self.file.name)
+        )
+
+    def has(self, function: str, kind: str) -> bool:
+        """A finding of this kind was noted."""
+        return (function, kind) in self._said
+
+    def ask(self, name: str, situation: Situation, like: Situations, seen: Seen | None = None) -> Any:
+        """What a function answers; `FAILED`, and a finding, where it raises."""
+        leaf = self.leaf
+        assert leaf is not None
+        if seen is None:
+            seen = Seen(situation.observation, like.world, like.robot, situation.elapsed)
+        memory = situation.memory
+
+        def answer() -> Any:
+            if name == "sufficient_cost":
+                known = Known(situation.hidden, like.world, situation.began)
+                return leaf.sufficient_cost(known, memory)
+            if name in ("command", "advance"):
+                return getattr(leaf, name)(leaf.programmed_motion(seen, memory), seen, memory)
+            if name == "maintained":
+                return leaf.maintained(leaf.maintains[0], seen, memory)
+            return getattr(leaf, name)(seen, memory)
+
+        return self.call(name, answer)
+
+    def call(self, name: str, answer: Callable[[], Any], where: str = "") -> Any:
+        """What a call gives; `FAILED`, and a finding, where it raises.
+
+        Args:
+            name: The function.
+            answer: The call.
+            where: In what case it was made, for the sentence.
+        """
+        before = len(self.barred.reached)
+        try:
+            found = answer()
+        except Exception as error:  # whatever it is, the user is to read it
+            found = FAILED
+            if not isinstance(error, OutOfReachError) and len(self.barred.reached) == before:
+                self.raised(name, error, where)
+        if len(self.barred.reached) > before:
+            self.add(
+                ERROR,
+                name,
+                f"reaches for the tree's context ('{self.barred.reached[-1]}'), where the hidden state is",
+                "a robot does not have it: use what 'seen' and 'memory' hold",
+                "context",
+            )
+        return found
+
+    def raised(self, name: str, error: BaseException, where: str = "") -> None:
+        """Note an exception."""
+        line = 0
+        trace = error.__traceback__
+        while trace is not None:
+            if Path(trace.tb_frame.f_code.co_filename) == self.file:
+                line = trace.tb_lineno
+            trace = trace.tb_next
+        remedy = {
+            " for a batch": "write [..., :3] for [:3], xp.where for if, and xp's functions for those of math",
+            " for tensors": "take functions from poses.array_namespace, and constants from poses.constant",
+        }.get(where, "put it right")
+        text = str(error).split("\n")[0] or "no reason given"
+        self.add(ERROR, name, f"raises {type(error).__name__}{where}: {text}", remedy, f"raises{where}", line)
+
+    def _line_of(self, function: str) -> int:
+        """The line of a function, where it stands in the concept's own file."""
+        try:
+            found: Any = inspect.unwrap(getattr(self.concept, function)) if function else self.concept
+            if Path(inspect.getsourcefile(found) or "") != self.file:
+                return 0
+            return inspect.getsourcelines(found)[1]
+        except (OSError, TypeError, AttributeError):
+            return 0

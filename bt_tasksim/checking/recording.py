@@ -1,0 +1,141 @@
+"""Real runs of a tree, decision by decision."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.checking.situations import Decision
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.context import Seen
+from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.errors import BtTasksimError
+from bt_tasksim.policy import Action, Policy, ProgrammedPolicy
+from bt_tasksim.poses import Array
+from bt_tasksim.runner import Runner
+from bt_tasksim.scene import Scene
+from bt_tasksim.world import Hidden
+
+LONGEST = 60.0
+"""Seconds of a run, at most."""
+HOLD = 6
+"""Control periods for which an exploring action stays what it is."""
+
+
+@dataclasses.dataclass
+class Recording:
+    """What was seen of some runs.
+
+    Attributes:
+        decisions: What each watched leaf decided on, by the leaf.
+        ends: How each run ended, in one sentence.
+        errors: What a run raised.
+    """
+
+    decisions: dict[ConceptModel, list[Decision]]
+    ends: list[str]
+    errors: list[BaseException]
+
+
+class Spy:
+    """A policy that notes what it is asked, and decides as another one does, or with other motions.
+
+    Args:
+        policy: The other one; None: nothing but exploring, with a completion signal now and then.
+        runner: The runner of the tree.
+        notes: Where it writes.
+        explore: Seed of random motions; None: those of the other policy.
+    """
+
+    name = "spy"
+
+    def __init__(
+        self, policy: Policy | None, runner: Runner, notes: list[Decision], explore: int | None = None
+    ) -> None:
+        self.policy, self.runner, self.notes = policy, runner, notes
+        self.run = 0
+        self._rng = None if explore is None else np.random.default_rng(explore)
+        self._motion: Array = np.zeros(0)
+        self._held = 0
+        self._activation = -1
+        self._began: Hidden | None = None
+
+    def act(self, model: ConceptModel, seen: Seen, memory: Any) -> Action:
+        """See `bt_tasksim.policy.Policy.act`."""
+        hidden = self.runner.context.hidden()
+        first = self._activation != model.activations
+        if first:
+            self._activation, self._began = model.activations, hidden
+        if hidden is not None and self._began is not None:
+            self.notes.append(Decision(model, seen, memory, hidden, self._began, first, self.run))
+        if self.policy is not None and self._rng is None:
+            return self.policy.act(model, seen, memory)
+        rng = self._rng or np.random.default_rng(0)
+        if self._held % HOLD == 0:
+            self._motion = rng.uniform(-1.0, 1.0, model.actions)
+        self._held += 1
+        if self.policy is not None:
+            terminate = self.policy.act(model, seen, memory).terminate
+        else:
+            terminate = np.bool_(rng.random() < 0.01)
+        return Action(self._motion, terminate)
+
+
+def record(
+    tree: Behaviour,
+    scene: Scene,
+    watched: Sequence[type[ConceptModel]] | None = None,
+    seeds: Sequence[int] = (1,),
+    explore: bool = False,
+    stream: str = "evaluation",
+    options: EngineOptions | None = None,
+) -> Recording:
+    """Run a tree in draws of its scene, and note what its leaves decide on.
+
+    Args:
+        tree: The tree.
+        scene: The scene.
+        watched: Concepts whose leaves are watched, with their programmed policies; None: all, with the
+            policies that they have.
+        seeds: A run for each.
+        explore: From the second run on, leaves that can learn make random motions.
+        stream: Stream of the draws; those of ``training`` are from the scene's last lesson, where it has any.
+        options: Which engines.
+    """
+    runner = Runner(tree, scene, options or EngineOptions(), longest=LONGEST)
+    leaves = [leaf for leaf in tree.iterate() if isinstance(leaf, ConceptModel)]
+    out = Recording({}, [], [])
+    kept: list[tuple[ConceptModel, Policy]] = []
+    spies: list[Spy] = []
+    for leaf in leaves:
+        if watched is not None and type(leaf) not in watched:
+            continue
+        policy: Policy | None
+        if watched is None:
+            policy = leaf.policy_in_use
+            kept.append((leaf, policy))
+        else:
+            policy = ProgrammedPolicy() if leaf.is_programmed else None
+        notes = out.decisions.setdefault(leaf, [])
+        spies.append(Spy(policy, runner, notes))
+        leaf.use(spies[-1])
+    lesson = len(scene.lessons) - 1 if stream == "training" and scene.lessons else None
+    for number, seed in enumerate(seeds):
+        for spy in spies:
+            spy.run = number
+            if explore and number > 0:
+                spy._rng = np.random.default_rng(seed)
+        try:
+            configuration = scene.sample(seed, stream, lesson)
+            result = runner.finish(configuration, runner.reset(configuration))
+            out.ends.append(result.why)
+        except BtTasksimError as error:
+            out.errors.append(error)
+            out.ends.append(str(error))
+    for leaf, policy in kept:
+        leaf.use(policy)
+    return out

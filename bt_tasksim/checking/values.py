@@ -1,0 +1,313 @@
+"""Shapes, units and sizes of what a concept's functions give, and what its actions do."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
+from bt_tasksim.checking.situations import Situation, Situations, numbers, parts, perturbed
+from bt_tasksim.context import Seen
+from bt_tasksim.poses import Array
+from bt_tasksim.world import Command
+
+FAR = 3.0
+"""Metres from the robot's base beyond which no arm reaches."""
+HUGE = 100.0
+"""Size of a feature beyond which a network has to unlearn it first."""
+UNIT = 1e-3
+"""Deviation from one of a quaternion's length."""
+STEADY = 12
+"""Control periods for which an action is held to see what it does."""
+BOOLEAN = ("done", "violated", "decides", "maintained")
+COSTS = ("necessary_cost", "sufficient_cost")
+
+
+def check_values(case: Case, situations: Situations) -> None:
+    """What the functions give in situations that happen, and in ones near by."""
+    rng = np.random.default_rng(1)
+    real = situations.single[: situations.real]
+    near = [perturbed(s, rng, memory=False) for s in real]
+    for situation in (*real, *near):
+        for name in (n for n in BOOLEAN if n in case.functions):
+            _check_boolean(case, name, case.ask(name, situation, situations))
+        for name in (n for n in COSTS if n in case.functions):
+            _check_cost(case, name, case.ask(name, situation, situations))
+        _check_command(case, case.ask("command", situation, situations), situations)
+        if "advance" in case.functions:
+            _check_memory(case, situation.memory, case.ask("advance", situation, situations))
+    if "features" in case.functions:
+        _check_features(case, situations)
+    _check_begin(case)
+    _check_actions(case, situations)
+    _check_words(case, situations)
+
+
+def _check_boolean(case: Case, name: str, answer: Any) -> None:
+    if answer is FAILED:
+        return
+    found = numbers(answer)
+    if found.dtype != bool or found.shape != ():
+        what = f"gives {found.dtype} of shape {found.shape}"
+        case.add(ERROR, name, what, "give one boolean for each situation: a comparison such as cost < limit")
+
+
+def _check_cost(case: Case, name: str, answer: Any) -> None:
+    if answer is FAILED:
+        return
+    found = numbers(answer)
+    if found.dtype.kind not in "fiu" or found.shape != ():
+        what = f"gives {found.dtype} of shape {found.shape}"
+        case.add(
+            ERROR, name, what, "give one number for each situation: poses.norm(v), or xp.sum(v, axis=-1)"
+        )
+    elif not np.isfinite(found):
+        case.add(
+            ERROR,
+            name,
+            f"gives {found}",
+            "give a finite number, where nothing is known a large one",
+            "finite",
+        )
+    elif found < 0.0:
+        case.add(
+            ERROR,
+            name,
+            f"gives {found:.3g}",
+            "a cost is 0 when the goal is reached, and never negative",
+            "sign",
+        )
+
+
+def _check_command(case: Case, answer: Any, situations: Situations) -> None:
+    if answer is FAILED:
+        return
+    if not isinstance(answer, Command):
+        case.add(ERROR, "command", f"gives a {type(answer).__name__}", "return Command(tool=..., hand=...)")
+        return
+    if answer.tool is not None:
+        _check_tool(case, numbers(answer.tool))
+    if answer.hand is None:
+        return
+    hand, n = numbers(answer.hand), 1 + len(situations.robot.synergies)
+    if hand.shape != (n,):
+        what = f"gives a hand target of shape {hand.shape}"
+        remedy = f"(..., {n}) is the closure and {n - 1} synergies: closure[..., None]"
+        case.add(ERROR, "command", what, remedy, "hand")
+    elif not np.isfinite(hand).all():
+        case.add(
+            ERROR, "command", "gives a hand target that is not finite", "find the division by zero", "hand"
+        )
+    elif not 0.0 <= hand[0] <= 1.0:
+        what = f"gives a closure of {hand[0]:.3g}"
+        case.add(
+            ERROR,
+            "command",
+            what,
+            "closure is 0 for open and 1 for shut: poses.clip(closure, 0.0, 1.0)",
+            "hand",
+        )
+
+
+def _check_tool(case: Case, tool: Array) -> None:
+    if tool.shape != (7,):
+        what = f"gives a tool target of shape {tool.shape}"
+        case.add(
+            ERROR,
+            "command",
+            what,
+            "(..., 7) is position and quaternion w x y z: xp.concat([p, q], axis=-1)",
+            "tool",
+        )
+    elif not np.isfinite(tool).all():
+        case.add(
+            ERROR, "command", "gives a tool target that is not finite", "find the division by zero", "tool"
+        )
+    elif abs(float(np.linalg.norm(tool[3:])) - 1.0) > UNIT:
+        what = f"gives a quaternion of length {np.linalg.norm(tool[3:]):.3g}"
+        case.add(
+            ERROR, "command", what, "its order is w x y z, its length one: poses.normalise(q)", "quaternion"
+        )
+    elif float(np.linalg.norm(tool[:3])) > FAR:
+        what = f"commands the tool {np.linalg.norm(tool[:3]):.3g} m away from the robot's base"
+        case.add(ERROR, "command", what, "positions are in metres, in the robot base frame", "far")
+
+
+def _check_memory(case: Case, before: Any, after: Any) -> None:
+    if after is FAILED:
+        return
+    a, b = _structure(before), _structure(after)
+    if a != b:
+        what = f"loses the memory's structure: {_first_difference(before, after)}"
+        case.add(
+            ERROR, "advance", what, "return a memory of the same kind: memory._replace(...)", "structure"
+        )
+
+
+def _structure(memory: Any) -> Any:
+    inner = parts(memory)
+    if inner is not None:
+        return type(memory).__name__, {k: _structure(v) for k, v in inner.items()}
+    if memory is None or isinstance(memory, str):
+        return type(memory).__name__
+    array = numbers(memory)
+    return array.shape, array.dtype == bool
+
+
+def _first_difference(before: Any, after: Any, name: str = "memory") -> str:
+    a, b = parts(before), parts(after)
+    if a is not None and b is not None and type(before) is type(after) and set(a) == set(b):
+        for k in a:
+            if _structure(a[k]) != _structure(b[k]):
+                return _first_difference(a[k], b[k], f"{name}.{k}")
+    if a is None and b is None and before is not None and after is not None:
+        was, now = numbers(before), numbers(after)
+        return f"{name} was {was.dtype} {was.shape}, and is {now.dtype} {now.shape}"
+    return f"{name} was a {type(before).__name__}, and is a {type(after).__name__}"
+
+
+def _check_features(case: Case, situations: Situations) -> None:
+    leaf = case.leaf
+    assert leaf is not None
+    layout = case.call("layout", lambda: dict(type(leaf).layout(situations.robot)))
+    if layout is FAILED:
+        return
+    rows = []
+    for situation in situations.single[: situations.real]:
+        found = case.ask("features", situation, situations)
+        if found is FAILED:
+            return
+        row = numbers(found)
+        if row.shape != (sum(layout.values()),):
+            what = f"gives the shape {row.shape}, and layout says ({sum(layout.values())},)"
+            case.add(ERROR, "features", what, "have both hold the same things in the same order", "shape")
+            return
+        if not np.isfinite(row).all():
+            where = _named(layout, int(np.flatnonzero(~np.isfinite(row))[0]))
+            case.add(ERROR, "features", f"{where} is not finite", "find the division by zero", "finite")
+            return
+        rows.append(row.astype(float))
+    table = np.array(rows)
+    for column in np.flatnonzero(np.abs(table).max(axis=0) > HUGE):
+        what = f"{_named(layout, int(column))} is as large as {np.abs(table[:, column]).max():.3g}"
+        remedy = "divide it by what is usual, so that it is of the order of one"
+        case.add(WARNING, "features", what, remedy, f"large {_named(layout, int(column))}")
+    if len(_decided(case, situations)) > 4:
+        chosen = np.array(
+            [numbers(case.ask("features", s, situations)) for s in _decided(case, situations)], float
+        )
+        for column in np.flatnonzero(np.ptp(chosen, axis=0) == 0.0):
+            what = f"{_named(layout, int(column))} was always {chosen[0, column]:.3g}"
+            remedy = "leave it out, or see whether it says what it should"
+            case.add(WARNING, "features", what, remedy, f"constant {_named(layout, int(column))}")
+
+
+def _decided(case: Case, situations: Situations) -> list[Situation]:
+    """The real situations in which a learned policy is asked."""
+    real = situations.single[: situations.real]
+    if "decides" not in case.functions:
+        return real
+    return [s for s in real if (d := case.ask("decides", s, situations)) is not FAILED and bool(d)]
+
+
+def _named(layout: dict[str, int], column: int) -> str:
+    for name, size in layout.items():
+        if column < size:
+            return f"'{name}'" if size == 1 else f"'{name}'[{column}]"
+        column -= size
+    return f"number {column}"
+
+
+def _check_begin(case: Case) -> None:
+    """The first memory comes from what is seen alone."""
+    leaf = case.leaf
+    assert leaf is not None
+    for decision in [d for d in case.decisions if d.first][:3]:
+        seen = decision.seen
+        why = case.call("initial_state", lambda seen=seen: leaf.initial_state(seen))  # type: ignore[misc]
+        if why is not FAILED and not isinstance(why, str):
+            what = f"gives {why!r}"
+            case.add(
+                ERROR,
+                "initial_state",
+                what,
+                "give the reason why it cannot start, and '' where it can",
+                "text",
+            )
+        case.call("begin", lambda seen=seen: leaf.begin(seen))  # type: ignore[misc]
+
+
+def _check_words(case: Case, situations: Situations) -> None:
+    leaf = case.leaf
+    assert leaf is not None
+    for situation in situations.single[: situations.real]:
+        seen = Seen(situation.observation, situations.world, situations.robot, situation.elapsed)
+        said = case.call("explain", lambda seen=seen, m=situation.memory: leaf.explain(seen, m))  # type: ignore[misc]
+        if said is not FAILED and not isinstance(said, str):
+            case.add(
+                ERROR,
+                "explain",
+                f"gives a {type(said).__name__}",
+                "give a sentence with numbers and units",
+                "text",
+            )
+
+
+def _check_actions(case: Case, situations: Situations) -> None:
+    """Every action does something, and more of it does more."""
+    decided = _decided(case, situations)
+    chosen = decided[:: max(1, len(decided) // 8)]
+    for k in range(case.concept.actions):
+        effect, half = False, False
+        for situation in chosen:
+            found = [_held(case, situation, situations, k, size) for size in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+            if any(f is None for f in found):
+                return
+            low, less, none, more, high = found
+            effect |= not _close(low, none) or not _close(high, none)
+            half |= not _close(low, less) or not _close(high, more)
+        if not chosen:
+            return
+        if not effect:
+            what = f"action {k} changes nothing"
+            case.add(
+                ERROR,
+                "command",
+                what,
+                f"use it in command or advance, or say actions = {case.concept.actions - 1}",
+                what,
+            )
+        elif not half:
+            what = f"action {k} at 0.5 does as much as at 1"
+            case.add(
+                WARNING, "command", what, "scale it so that 1 is the most: it is clipped too early", what
+            )
+
+
+def _held(case: Case, situation: Situation, situations: Situations, k: int, size: float) -> Array | None:
+    """The commands of an action that is held for a while."""
+    leaf = case.leaf
+    assert leaf is not None
+    action = np.zeros(case.concept.actions)
+    action[k] = size
+    memory, given = situation.memory, []
+    for tick in range(STEADY):
+        elapsed = situation.elapsed + tick * situations.world.control_period
+        seen = Seen(situation.observation, situations.world, situations.robot, np.float64(elapsed))
+        command = case.call("command", lambda s=seen, m=memory: leaf.command(action, s, m))  # type: ignore[misc]
+        memory = case.call("advance", lambda s=seen, m=memory: leaf.advance(action, s, m))  # type: ignore[misc]
+        if command is FAILED or memory is FAILED or not isinstance(command, Command):
+            return None
+        given += [numbers(p).ravel() for p in (command.tool, command.hand) if p is not None]
+    return np.concatenate(given) if given else np.zeros(0)
+
+
+def _close(a: Array | None, b: Array | None) -> bool:
+    return a is not None and b is not None and a.shape == b.shape and np.allclose(a, b, rtol=0.0, atol=1e-9)
+
+
+def degrees_like(value: Any) -> bool:
+    """A number that is hardly an angle in radians."""
+    return isinstance(value, int | float) and math.isfinite(value) and abs(value) > 2 * math.pi + 1e-9

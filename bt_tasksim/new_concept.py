@@ -1,0 +1,92 @@
+"""``bt-tasksim new concept``: a concept of one's own to begin with, its training tree and its test."""
+
+from __future__ import annotations
+
+import importlib.util
+import keyword
+import re
+from pathlib import Path
+
+from bt_tasksim.errors import InputError
+from bt_tasksim.files import write_text
+from bt_tasksim.policy import concept_name
+from bt_tasksim.resources import asset
+
+FILES = {"concept.py.txt": "{}.py", "train.py.txt": "train_{}.py", "test.py.txt": "test_{}.py"}
+"""Templates, and what they become."""
+TAKEN = ("train_", "test_")
+"""How the names of the other files begin."""
+
+
+def write_concept(name: str, folder: str | Path = ".") -> str:
+    """Write a concept that runs as it is, with its training tree and its test.
+
+    Args:
+        name: Its name, lower-case words joined by underscores.
+        folder: Where to.
+
+    Returns:
+        What was written, and what to do next.
+
+    Raises:
+        InputError: The name is no good or taken, the folder is missing, or a file is there already; then
+            nothing is written.
+        MachineError: The disk is full or not writable; what was written is removed.
+    """
+    folder = Path(folder)
+    class_name = "".join(word.capitalize() for word in name.split("_"))
+    paths = {template: folder / file.format(name) for template, file in FILES.items()}
+    _check_name(name, class_name)
+    if not folder.is_dir():
+        raise InputError(f"there is no folder '{folder}': make it first, or name another one with --out")
+    for path in paths.values():
+        if path.exists() or path.is_symlink():
+            raise InputError(f"'{path}' is there already: remove it, or choose another name or --out")
+    _check_free(name)
+    texts = {template: _filled(template, name, class_name) for template in paths}
+    written: list[Path] = []
+    try:
+        for template, path in paths.items():
+            write_text(path, texts[template])
+            written.append(path)
+    except BaseException:
+        for path in written:
+            path.unlink(missing_ok=True)
+        raise
+    concept, tree, _ = paths.values()
+    return (
+        f"wrote {', '.join(map(str, paths.values()))}\n"
+        f"next: bt-tasksim check {concept}; bt-tasksim run {tree} --video; bt-tasksim train {tree}"
+    )
+
+
+def _check_name(name: str, class_name: str) -> None:
+    from bt_tasksim.concept import ConceptModel
+    from concept_nodes import catalogue
+
+    good = re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name) and not keyword.iskeyword(name)
+    if not good or name.startswith(TAKEN):
+        raise InputError(
+            f"a concept's name should be lower-case words joined by '_', such as push or wipe_table, "
+            f"and begin neither with 'train_' nor with 'test_': found '{name}'"
+        )
+    known = {concept_name(c): n for n, c in catalogue().items() if issubclass(c, ConceptModel)}
+    if class_name.lower() in known:
+        raise InputError(f"there is a concept {known[class_name.lower()]} already: choose another name")
+
+
+def _check_free(name: str) -> None:
+    """No module of this name can be imported that the new files would meet instead of each other."""
+    try:
+        found = importlib.util.find_spec(name)
+    except (ImportError, ValueError):
+        found = None
+    if found is not None:
+        raise InputError(f"a Python module '{name}' is installed already: choose another name")
+
+
+def _filled(template: str, name: str, class_name: str) -> str:
+    text = asset("new_concept", template).read_text(encoding="utf-8")
+    return (
+        text.replace("@name@", name).replace("@Class@", class_name).replace("@words@", name.replace("_", " "))
+    )

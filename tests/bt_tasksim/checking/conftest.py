@@ -1,0 +1,79 @@
+"""A sound concept, situations of it without physics, and what the check says of it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from bt_tasksim import poses
+from bt_tasksim.checking.command import check_concept
+from bt_tasksim.checking.recording import Recording
+from bt_tasksim.checking.situations import Decision
+from bt_tasksim.context import Seen
+from bt_tasksim.world import Hidden
+
+
+def hidden_of(observation, closure=0.0):
+    n = len(observation.objects)
+    return Hidden(
+        time=observation.time,
+        objects=observation.objects,
+        velocities=np.full((n, 6), 0.01),
+        hand_force=np.full(n, closure),
+        hand_distance=np.zeros(n),
+        support=np.ones((n, n), bool),
+        penetration=np.float64(0.0),
+        tool_pose=observation.tool_pose,
+    )
+
+
+@pytest.fixture
+def decisions(toy):
+    """What a leaf decides on in a toy world: ``decisions(leaf, n=5)``."""
+
+    def make(leaf, n=5):
+        stage = toy(leaf)
+        world, rng = stage.context.world, np.random.default_rng(0)
+        first, found, memory = stage.context.observation, [], None
+        for k in range(n):
+            objects = first.objects.copy()
+            objects[:, 0] += 0.01 * k
+            observation = dataclasses.replace(
+                first,
+                time=np.float64(0.05 * k),
+                tool_pose=poses.pose(first.tool_pose[:3] + 0.01 * k, first.tool_pose[3:]),
+                tips=rng.normal(size=first.tips.shape),
+                closure=np.float64(0.1 * k),
+                contacts=rng.random(first.contacts.shape) < 0.5,
+                contact_force=rng.normal(size=first.contact_force.shape),
+                wrench=rng.normal(size=6),
+                arm_velocity=rng.normal(size=first.arm_velocity.shape),
+                objects=objects,
+            )
+            seen = Seen(observation, world, stage.runner.robot, np.float64(0.05 * k))
+            if k == 0:
+                try:
+                    memory = leaf.begin(seen)
+                except Exception:
+                    memory = None
+            hidden = hidden_of(observation, 0.1 * k)
+            found.append(Decision(leaf, seen, memory, hidden, hidden_of(first), k == 0))
+        return found
+
+    return make
+
+
+@pytest.fixture
+def found(decisions):
+    """What the check says of a concept, line by line: ``found(Concept)``."""
+
+    def ask(concept, **arguments):
+        leaf = concept("cup", **arguments)
+        runs = Recording({leaf: decisions(leaf)}, ["it ended"], [])
+        case, checked = check_concept(concept, "toy", None, runs)
+        assert concept.__name__ in checked
+        return [str(f) for f in case.findings]
+
+    return ask

@@ -1,0 +1,91 @@
+"""``bt-tasksim new concept``: what it writes runs as it is; bad names and places write nothing."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bt_tasksim import new_concept
+from bt_tasksim.cli import main
+from bt_tasksim.errors import InputError, MachineError
+
+FILES = ["push.py", "test_push.py", "train_push.py"]
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def here():
+    return sorted(os.listdir())
+
+
+def test_it_says_what_it_wrote_and_what_to_do_next(capsys):
+    assert main(["new", "concept", "push"]) == 0
+    assert here() == FILES
+    out = capsys.readouterr().out
+    assert out.startswith("wrote push.py, train_push.py, test_push.py\nnext: bt-tasksim check push.py; ")
+    assert "@" not in Path("push.py").read_text().replace("@classmethod", "").replace("@property", "")
+
+
+def test_its_own_tests_pass_and_its_style_is_clean():
+    new_concept.write_concept("wipe_table")
+    text = Path("wipe_table.py").read_text()
+    assert "class WipeTable(ConceptModel):" in text and "WipeTableMemory" in text
+    rules = ["--select", "E,F,W,I,D,UP,B", "--ignore", "D103,D105,D107,D203,D213,D407,D413"]
+    ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--line-length", "110", *rules, "."]
+    done = subprocess.run(ruff, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    own = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "."]
+    done = subprocess.run(own, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "3 passed" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Push", "lower-case words"),
+        ("push-cup", "lower-case words"),
+        ("2push", "lower-case words"),
+        ("../push", "lower-case words"),
+        ("", "lower-case words"),
+        ("class", "lower-case words"),
+        ("test_push", "lower-case words"),
+        ("grasp", "there is a concept Grasp already"),
+        ("json", "a Python module 'json' is installed already"),
+    ],
+)
+def test_bad_names(name, words, capsys):
+    assert main(["new", "concept", name]) == 2
+    err = capsys.readouterr().err
+    assert words in err and err.count("\n") == 1 and here() == []
+
+
+def test_missing_folder_and_files_that_are_there(capsys):
+    assert main(["new", "concept", "push", "--out", "nowhere"]) == 2
+    assert "there is no folder 'nowhere'" in capsys.readouterr().err and here() == []
+    Path("test_push.py").touch()
+    with pytest.raises(InputError, match=r"'test_push\.py' is there already"):
+        new_concept.write_concept("push")
+    assert here() == ["test_push.py"] and Path("test_push.py").read_text() == ""
+
+
+def test_nothing_stays_half_written(monkeypatch):
+    whole, count = new_concept.write_text, []
+
+    def full(path, text):
+        count.append(path)
+        if len(count) == 3:
+            raise MachineError("the disk is full")
+        whole(path, text)
+
+    monkeypatch.setattr(new_concept, "write_text", full)
+    with pytest.raises(MachineError):
+        new_concept.write_concept("push")
+    assert len(count) == 3 and here() == []
