@@ -9,7 +9,7 @@ from bt_tasksim.network import Network
 from bt_tasksim.policy_files import check_fits, load_policy
 from bt_tasksim.policy_library import PROGRAMMED as PROGRAMMED
 from bt_tasksim.policy_library import find_policy, folder_of_pinned, source_of
-from bt_tasksim.poses import Array, array_namespace
+from bt_tasksim.poses import Array, array_namespace, clip
 
 if TYPE_CHECKING:
     from bt_tasksim.concept import ConceptModel
@@ -84,8 +84,7 @@ class LearnedPolicy:
 
 def split_action(output: Array) -> Action:
     """The action ``n`` and completion signal in the outputs ``(..., n + 1)`` of a network."""
-    xp = array_namespace(output)
-    return Action(xp.clip(output[..., :-1], -1.0, 1.0), output[..., -1] > TERMINATE)
+    return Action(clip(output[..., :-1], -1.0, 1.0), output[..., -1] > TERMINATE)
 
 
 def resolve_policy(model: ConceptModel, robot: RobotDescription) -> Policy:

@@ -98,6 +98,9 @@ def quat_multiply(a: Array, b: Array) -> Array:
 
 def quat_conjugate(q: Array) -> Array:
     """Inverse of unit quaternions ``(..., 4)``."""
+    if _single(q):
+        w, x, y, z = q.tolist()
+        return np.array([w, -x, -y, -z])
     xp = array_namespace(q)
     return xp.concat([q[..., :1], -q[..., 1:]], axis=-1)
 
@@ -212,6 +215,9 @@ def from_rotation_vector(v: Array) -> Array:
 def angle_between(a: Array, b: Array) -> Array:
     """Smallest rotation angle ``(...)`` in radians between unit quaternions ``(..., 4)``."""
     v = rotation_vector(quat_multiply(quat_conjugate(a), b))
+    if _single(v):
+        x, y, z = v.tolist()
+        return np.float64(math.sqrt(x * x + y * y + z * z))
     xp = array_namespace(v)
     return xp.sqrt(xp.sum(v * v, axis=-1))
 

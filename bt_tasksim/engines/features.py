@@ -47,7 +47,7 @@ class ObservationBuilder:
             self._robot.closure(hand),
             state.tool_pose,
             state.tips,
-            np.einsum("ij,ij->i", force, force) > TOUCH * TOUCH,
+            np.array([x * x + y * y + z * z > TOUCH * TOUCH for x, y, z in force.tolist()]),
             force,
             state.wrench,
             estimate,

@@ -73,6 +73,7 @@ class PinocchioKinematics:
         self._frame = self._model.getFrameId("tool", pin.FrameType.OP_FRAME)
         self._full_frame = self._full.getFrameId("tool", pin.FrameType.OP_FRAME)
         self._lower, self._upper, self._rest = robot.arm_lower, robot.arm_upper, robot.rest
+        self._limits = (self._lower.tolist(), self._upper.tolist())
         self._rows = np.flatnonzero(robot.task_mask > 0.0)
         self._masked = len(self._rows) < 6
         self._weights = (robot.task_mask * ([1.0] * 3 + [_LENGTH] * 3))[self._rows]
@@ -249,7 +250,7 @@ class PinocchioKinematics:
             The joints, within their limits, and the largest component of the remaining error (m, rad).
         """
         model, data, frame = self._model, self._data, self._frame
-        lower, upper, column = self._lower, self._upper, self._column
+        lower, upper, column = self._limits[0], self._limits[1], self._column
         error, worst = np.empty(6), np.inf
         for k in range(iterations + 1):
             pin.computeJointJacobians(model, data, q)
@@ -270,7 +271,7 @@ class PinocchioKinematics:
             if largest > 0.5:
                 step *= 0.5 / largest
             kept = q + step
-            if not (lower <= kept).all() or not (kept <= upper).all():
+            if any(not low <= x <= high for low, x, high in zip(lower, kept.tolist(), upper, strict=True)):
                 kept = self._saturate(q, J, e, damping, pull)
                 if pull is None and float(np.abs(kept - q).max()) < 1e-7:
                     break  # as near as the limits allow
