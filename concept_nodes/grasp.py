@@ -23,6 +23,9 @@ from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 SETTLED = 3
 """Ticks for which opposing contacts and a still hand must be seen."""
 DOWN = (0.0, 0.0, -1.0)
+SLANTED = 0.01
+"""Metres by which the middle of an action is deeper for a horizontal approach than for one from above: where a
+slanted hand meets an object's edge first, its fingers are still before the object's middle."""
 PUSHED = 0.06
 """Metres by which a grasp may push the object, as it is seen."""
 TIPPED = math.radians(10.0)
@@ -39,7 +42,7 @@ class GraspMemory(NamedTuple):
         delay: Seconds by which the motion is behind the reference.
         middle: Offsets ``(..., 5)`` in units of `grasp_features.SCALE` that the middle of an action stands for:
             the tool goes on, or stays behind, by as much as the estimate is above or below where the object
-            would stand.
+            would stand, and goes deeper where it comes slanted.
         offset: Offsets ``(..., 5)`` from the reference motion, see `grasp_features.SCALE`.
         target: Tool pose ``(..., 7)`` that was last commanded.
         closing: Seconds since the hand began to close; negative before.
@@ -132,7 +135,8 @@ class Grasp(ConceptModel):
         path = plan([*_way_out(seen, back), back, goal], self.speed, blend=0.03)
         estimate = self._estimate(seen, goal, approach)
         middle = np.zeros(CLOSE + 1)
-        middle[ALONG] = min(max(0.02 * estimate[4] / grasp_features.SCALE[ALONG], -1.0), 1.0)
+        deeper = SLANTED * math.sqrt(max(0.0, 1.0 - estimate[3] ** 2))
+        middle[ALONG] = min(max((0.02 * estimate[4] + deeper) / grasp_features.SCALE[ALONG], -1.0), 1.0)
         return GraspMemory(
             path=path,
             begins=_approach_begins(path, self.standoff),
@@ -156,7 +160,7 @@ class Grasp(ConceptModel):
         centre, place = seen.object(self.target)[:3], resting_place(seen, self.target)
         beyond = float((centre - goal[:3]) @ approach)
         if place is None:
-            return np.array([0.0, 0.0, beyond / 0.05, 0.0, 0.0])
+            return np.array([0.0, 0.0, beyond / 0.05, 1.0, 0.0])
         up = poses.rotate(place.pose[3:], np.array([0.0, 0.0, 1.0]))
         onto = -float(up @ approach)
         goal_height, height = (float((p - place.pose[:3]) @ up) for p in (goal[:3], centre))
