@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import random
 import sys
+import warnings
 from typing import Any
 
 import numpy as np
@@ -158,7 +159,9 @@ def _check_two_dimensions(case: Case, name: str, situations: Situations, many: A
 def _check_torch(case: Case, name: str, situations: Situations, one: list[Any], n: int) -> None:
     import torch
 
-    answer = case.call(name, lambda: situations.ask(name, situations.torch, case.leaf), " for tensors")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # torch's words about read-only constants are none of the user's
+        answer = case.call(name, lambda: situations.ask(name, situations.torch, case.leaf), " for tensors")
     if answer is FAILED or _single_is_fine(name, answer) or case.has(name, "batch"):
         return
     for text in different("the answer", one, answer, n, library=torch.Tensor)[:1]:

@@ -86,7 +86,7 @@ def check_watching(case: Case, situations: Situations) -> None:
     concept = case.concept
     check_observables(case)
     read = _read(case, situations)
-    for name in sorted(read - set(concept.observables)):
+    for name in sorted(n for n in read - set(concept.observables) if _depends(case, situations, n)):
         what = f"reads '{name}', which is not declared"
         if GAPS[name].startswith(LARGE):
             why = f"{what}, and of which simulation and reality differ ({_why(name)})"
@@ -133,6 +133,28 @@ def _read(case: Case, situations: Situations) -> set[str]:
                     f"looks for {missed}",
                 )
     return read
+
+
+def _depends(case: Case, situations: Situations, name: str) -> bool:
+    """The answer of features is another one where an observable is; it may be read for its type alone."""
+    real = situations.single[: situations.real]
+    for k, situation in enumerate(real):
+        usual = _features(case, situation, situations)
+        if usual is FAILED:
+            return True
+        value: Array = np.asarray(getattr(situation.observation, name))
+        others: list[Any] = [getattr(real[k - 1].observation, name)]
+        others += [~value] if value.dtype == bool else [np.zeros_like(value), 1e3 * value + 1.0]
+        for other in others:
+            if name == "time":
+                changed = situation._replace(elapsed=situation.elapsed + 0.5)
+            else:
+                shown = dataclasses.replace(situation.observation, **{name: other})
+                changed = situation._replace(observation=shown)
+            answer = _features(case, changed, situations)
+            if answer is not FAILED and not np.allclose(answer, usual, rtol=0.0, atol=1e-9, equal_nan=True):
+                return True
+    return False
 
 
 def _through_memory(case: Case, situations: Situations, names: list[str]) -> list[str]:

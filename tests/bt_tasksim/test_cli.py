@@ -19,7 +19,19 @@ from bt_tasksim.resources import asset
 
 ROOT = Path(__file__).resolve().parents[2]
 LOG = asset("demonstrations", "pick_and_place", "00.h5")
-COMMANDS = ("demo", "decompose", "show", "run", "policies", "train", "replay", "evaluate", "bench")
+COMMANDS = (
+    "demo",
+    "decompose",
+    "show",
+    "run",
+    "policies",
+    "train",
+    "check",
+    "new",
+    "replay",
+    "evaluate",
+    "bench",
+)
 HEAVY = ("torch", "sapien", "mani_skill", "pinocchio", "mujoco", "ray", "cv2", "scipy", "h5py", "networkx")
 
 TREE = """

@@ -18,10 +18,10 @@ FUNCTIONS = (
 class Near(Situations):
     """Situations of a leaf that tests make claims about."""
 
-    def check(self, name: str, leaf: Any = None) -> list[Any]:
+    def check(self, name: str, leaf: Any = None, tolerance: float = TOLERANCE) -> list[Any]:
         """One by one, as a batch and as a batch in torch the answers are the same, and nothing changes."""
         before = frozen((self.single, self.batch, self.torch))
-        assert not self.differences(name, leaf, TOLERANCE)
+        assert not self.differences(name, leaf, tolerance)
         answers = [self.ask(name, s, leaf) for s in self.single]
         assert frozen((self.single, self.batch, self.torch)) == before, f"{name} changed what it was given"
         return answers

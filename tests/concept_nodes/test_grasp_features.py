@@ -1,0 +1,116 @@
+"""What a learned grasp sees and does: as laid out, the same in batches, bounded in size and speed."""
+
+import numpy as np
+import pytest
+
+from bt_tasksim import poses
+from bt_tasksim.checking.situations import stacked
+from concept_nodes import Grasp, grasp_features
+from concept_nodes.grasp_features import ACTIONS, CLOSE, PACE, PERIOD, RATE, SCALE
+
+SCENARIOS = ("pick_and_place", "shelf_to_shelf")
+
+
+@pytest.fixture(params=SCENARIOS)
+def near(request, situations):
+    return situations(Grasp, request.param)
+
+
+def instant(near, k=0):
+    from bt_tasksim.context import Seen
+
+    s = near.single[k]
+    return Seen(s.observation, near.world, near.robot, s.elapsed), s.memory
+
+
+@pytest.mark.parametrize("name", ["features", "decides", "programmed_motion"])
+def test_one_by_one_and_in_batches_are_the_same(near, name):
+    near.check(name, tolerance=1e-6)  # a count of ticks over three is in single precision in torch
+
+
+def test_an_action_in_batches_is_the_same_one_by_one(near):
+    """With exploring actions, too: command and advance."""
+    torch = pytest.importorskip("torch")
+    from bt_tasksim.checking.situations import different
+    from bt_tasksim.context import Seen
+
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1.5, 1.5, (len(near), len(ACTIONS)))
+    for name in ("command", "advance"):
+        one = []
+        for s, action in zip(near.single, actions, strict=True):
+            seen = Seen(s.observation, near.world, near.robot, s.elapsed)
+            one.append(getattr(near.leaf, name)(action, seen, s.memory))
+        for s, many in ((near.batch, actions), (near.torch, torch.from_numpy(actions))):
+            seen = Seen(s.observation, near.world, near.robot, s.elapsed)
+            answer = getattr(near.leaf, name)(many, seen, s.memory)
+            assert not different(name, one, answer, len(near), 1e-9)
+
+
+def test_features_are_as_long_as_the_layout_and_of_the_order_of_one(near):
+    size = sum(Grasp.layout(near.robot).values())
+    for k in range(near.real):
+        found = grasp_features.features(*instant(near, k))
+        assert found.shape == (size,) and np.isfinite(found).all()
+        assert np.abs(found).max() < 60.0
+
+
+def test_parts_of_the_features_stand_where_the_layout_says(near):
+    seen, memory = instant(near, near.real - 1)
+    layout, at, places = Grasp.layout(near.robot), 0, {}
+    for name, size in layout.items():
+        places[name] = slice(at, at + size)
+        at += size
+    found = grasp_features.features(seen, memory)
+    assert np.array_equal(found[places["contacts"]], seen.contacts)
+    assert np.allclose(found[places["offsets"]], memory.offset / np.array(SCALE))
+    assert np.allclose(found[places["contacts so far"]], memory.touched)
+    assert np.allclose(found[places["estimate"]], memory.estimate)
+    local = poses.transform(poses.inverse(memory.goal), seen.tool[:3])
+    assert np.allclose(found[places["tool from grasp pose"]][:3], local / 0.03)
+
+
+def test_the_programmed_action_is_the_reference_motion(near):
+    for k in range(near.real):
+        seen, memory = instant(near, k)
+        memory = memory._replace(offset=np.zeros(CLOSE + 1))
+        action = near.leaf.programmed_motion(seen, memory)
+        assert np.allclose(grasp_features.moved_offset(action, memory, PERIOD), 0.0, atol=1e-12)
+        assert float(grasp_features.delay(action, PERIOD)) == 0.0
+    reference = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.3))
+    assert grasp_features.displaced(reference, np.zeros(CLOSE + 1)) is reference
+
+
+def test_offsets_change_no_faster_than_their_rate_and_go_no_farther_than_their_scale(near):
+    _, memory = instant(near)
+    memory = memory._replace(offset=np.zeros(CLOSE + 1), middle=np.zeros(CLOSE + 1))
+    far = np.full(len(ACTIONS), 9.0)
+    first = grasp_features.moved_offset(far, memory, PERIOD)
+    assert np.allclose(first, RATE)
+    assert np.allclose(grasp_features.moved_offset(far, memory, PERIOD / 2), np.array(RATE) / 2)
+    assert np.allclose(grasp_features.moved_offset(-far, memory, PERIOD), -np.array(RATE))
+    for _ in range(20):
+        memory = memory._replace(offset=grasp_features.moved_offset(far, memory, PERIOD))
+    assert np.allclose(memory.offset, SCALE)
+
+
+@pytest.mark.parametrize(
+    ("pace", "share"), [(2.0, 0.0), (1.0, 0.0), (0.0, 0.0), (-0.5, 0.5), (-1.0, 1.0), (-3.0, 1.0)]
+)
+def test_pace_only_holds_the_motion_back(pace, share):
+    action = np.zeros(len(ACTIONS))
+    action[PACE] = pace
+    assert float(grasp_features.delay(action, PERIOD)) == pytest.approx(share * PERIOD)
+
+
+def test_displacements_are_in_the_tools_frame():
+    reference = poses.pose(
+        [0.4, 0.1, 0.2], poses.frame_from_axes(np.array([0.0, 0, -1]), np.array([0.0, 1, 0]))
+    )
+    offset = np.array([0.01, 0.02, 0.03, 0.2, 0.4])
+    moved = grasp_features.displaced(reference, offset)
+    local = poses.multiply(poses.inverse(reference), moved)
+    assert np.allclose(local[:3], offset[:3])
+    assert np.allclose(poses.rotation_vector(local[3:]), [0.0, 0.0, 0.2])
+    many = grasp_features.displaced(stacked([reference, reference]), stacked([offset, 0.0 * offset]))
+    assert np.allclose(many, [moved, reference])
