@@ -68,12 +68,16 @@ class Train(Decorator):
                 f'is_task_model = False, and its leaf does not say policy="programmed"'
             )
         for leaf in found:
-            if type(leaf).features is ConceptModel.features or type(leaf).layout is ConceptModel.layout:
+            if type(leaf).features is ConceptModel.features or _inherits_layout(type(leaf)):
                 raise InputError(
                     f"'{leaf.name}' below '{self.name}' cannot learn: "
                     f"{type(leaf).__name__} has no features() with its layout()"
                 )
         return found
+
+
+def _inherits_layout(cls: type[ConceptModel]) -> bool:
+    return not any("layout" in vars(base) for base in cls.__mro__[: cls.__mro__.index(ConceptModel)])
 
 
 def concepts_in(root: Behaviour) -> list[ConceptModel]:
