@@ -1,14 +1,15 @@
 """Measured numbers into the documentation: ``python -m benchmarks.tables``.
 
 Reads ``benchmarks/results/*.json`` and writes the tables between the marker comments of README.md,
-docs/evaluation.md and docs/training.md, so that no number is typed by hand. Results are what the measurements
-write:
+docs/evaluation.md, docs/training.md and docs/experiments.md, so that no number is typed by hand. Results are
+what the measurements write:
 
 - ``<scenario>-<robot>[-camera][-fromlogs].json`` by ``python -m benchmarks.success``, in the format of
   ``bt-tasksim evaluate --json``;
 - ``oracle-<robot>.json`` by ``python -m benchmarks.oracle``;
 - ``grasp-<robot>-<noise>-<learned|programmed>.json`` by ``python -m benchmarks.grasp``;
 - ``learning.json`` by ``python -m benchmarks.learning``;
+- ``experiment-<letter>.json`` by ``python -m benchmarks.experiments <letter>``;
 - ``speed.json`` by ``bt-tasksim bench --json``;
 - ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
 
@@ -25,18 +26,19 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import learned_tables
+from benchmarks.experiments import pages as experiment_tables
 from benchmarks.success import FIRST_SEED, RESULTS, SCENARIOS
 from benchmarks.success import ROWS as MEASURED
 from bt_tasksim.files import write_text
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ("README.md", "docs/evaluation.md", "docs/training.md")
+PAGES = ("README.md", "docs/evaluation.md", "docs/training.md", "docs/experiments.md")
 ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
 KINDS = ("camera", "fromlogs")
 OTHER = ("speed", "decomposition", "learning")
-APART = ("oracle-", "grasp-")
-"""How results begin that have tables of their own, see `benchmarks.learned_tables`."""
+APART = ("oracle-", "grasp-", "experiment-", "training-")
+"""How results begin that have tables of their own: `benchmarks.learned_tables`, `benchmarks.experiments.pages`."""
 NOT_YET = "not measured yet"
 
 
@@ -179,6 +181,7 @@ TABLES = {
     "speed": speed,
     "decomposition": decomposition,
     **learned_tables.TABLES,
+    **experiment_tables.TABLES,
 }
 MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 

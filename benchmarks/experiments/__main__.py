@@ -8,16 +8,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.experiments.common import PICTURES, RESULTS, Request, read, write
+from benchmarks.experiments.common import EXPERIMENTS, PICTURES, RESULTS, Request, read, write
 
-EXPERIMENTS = {
-    "A": "learning",
-    "B": "shapes",
-    "C": "robot",
-    "D": "sequences",
-    "E": "follower",
-    "F": "ablations",
-}
 QUICK_DRAWS, QUICK_STEPS = 8, 8192
 
 
@@ -27,6 +19,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("experiment", choices=EXPERIMENTS)
     parser.add_argument("--train", action="store_true", help="train what it needs (E, F); finished runs stay")
     parser.add_argument("--draw", action="store_true", help="pictures alone, from the results that are there")
+    parser.add_argument("--frames", action="store_true", help="draw frames of runs (B, C, D), from results")
     parser.add_argument("--policy", help="name or folder of the learned policy; by default the shipped one")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--draws", type=int, help="draws of each measurement")
@@ -56,12 +49,18 @@ def main(arguments: list[str] | None = None) -> int:
             parser.error(f"experiment {options.experiment} trains nothing of its own")
         module.train(request)
         return 0
-    found = read(options.experiment, request.results) if options.draw else module.measure(request)
+    if options.frames and not hasattr(module, "film"):
+        parser.error(f"experiment {options.experiment} has no frames")
+    there = options.draw or options.frames
+    found = read(options.experiment, request.results) if there else module.measure(request)
     if found is None:
         parser.error(f"there are no results of experiment {options.experiment} to draw yet")
-    if not options.draw:
+    if not there:
         write(request, options.experiment, found)
     request.pictures.mkdir(parents=True, exist_ok=True)
+    if options.frames:
+        module.film(found, request)
+        return 0
     module.draw(found, request.pictures)
     print(module.table(found))
     return 0

@@ -35,6 +35,7 @@ from trees.scenarios import grasp_then_pick
 VARIANTS = ("full", "fixed time", "shaping alone")
 SEEDS = (0, 1, 2)
 STEPS, DRAWS = 200_000, 300
+NOISES = ("original", "hard")
 HOLDS = (0.2, 0.4, 0.6, 0.8, 1.2)
 """Seconds of closing from which the fixed time is chosen, on training draws."""
 HOLD_FILE = "hold.json"
@@ -128,14 +129,15 @@ def measure(request: Request) -> dict[str, Any]:
     seeds = request.seeds(DRAWS)
     out: list[dict[str, Any]] = []
     wanted = [(v, s, str(p), p) for v, s, p in runs(request) if finished(p)]
-    for variant, seed, policy, folder in [*wanted, ("programmed", 0, PROGRAMMED, None)]:
-        build = functools.partial(tree, variant, hold)
-        found = judged.counts(judged.judge(judged.Case(build, scene(), policy), seeds, request.workers))
+    for variant, seed, policy, folder in [("programmed", 0, PROGRAMMED, None), *wanted]:
+        row: dict[str, Any] = {"variant": variant, "seed": seed}
+        for noise in NOISES:
+            case = judged.Case(functools.partial(tree, variant, hold), scene(), policy, noise)
+            row[noise] = judged.counts(judged.judge(case, seeds, request.workers))
+            said = f"{share(row[noise])}   done {row[noise]['done_right']} of {row[noise]['done']}"
+            print(f"{variant:16}{seed}  {noise:10}{said}", flush=True)
         curve = history(folder.with_name(f"{folder.name}.json")) if folder is not None else []
-        out.append({"variant": variant, "seed": seed, **found, "curve": slim(curve)})
-        print(
-            f"{variant:16}{seed}  {share(found)}   done {found['done_right']} of {found['done']}", flush=True
-        )
+        out.append({**row, "curve": slim(curve)})
     return {"hold": hold, "runs": out}
 
 
@@ -149,24 +151,25 @@ def slim(rows: list[dict[str, Any]]) -> list[list[Any]]:
 
 
 def table(found: dict[str, Any]) -> str:
-    """By variant and seed."""
+    """By noise, variant and seed."""
     lines = [
-        "| variant | seed | succeeded | called done, of which survive the pick | how it fails |",
-        "|---|---|---|---|---|",
+        "| noise | variant | seed | succeeded | called done, of which survive the pick | how it fails |",
+        "|---|---|---|---|---|---|",
     ]
-    for row in sorted(
-        found["runs"], key=lambda r: ([*VARIANTS, "programmed"].index(r["variant"]), r["seed"])
-    ):
-        done = {"draws": row["done"], "successes": row["done_right"], "interval": row["done_interval"]}
-        ends = ", ".join(f"{n} x {kind}" for kind, n in row["ends"].items()) or "none"
-        seed = row["seed"] if row["variant"] != "programmed" else "-"
-        lines.append(f"| {row['variant']} | {seed} | {share(row)} | {share(done)} | {ends} |")
+    order = ["programmed", *VARIANTS]
+    for noise in NOISES:
+        for run in sorted(found["runs"], key=lambda r: (order.index(r["variant"]), r["seed"])):
+            row, learned = run[noise], run["variant"] != "programmed"
+            done = {"draws": row["done"], "successes": row["done_right"], "interval": row["done_interval"]}
+            ends = ", ".join(f"{n} x {kind}" for kind, n in row["ends"].items()) or "none"
+            seed = run["seed"] if learned else ""
+            lines.append(f"| `{noise}` | {run['variant']} | {seed} | {share(row)} | {share(done)} | {ends} |")
     return "\n".join(lines)
 
 
 def draw(found: dict[str, Any], folder: Path) -> None:
     """The learning curves of all runs, with the programmed grasp's line."""
-    programmed = [r for r in found["runs"] if r["variant"] == "programmed"]
+    programmed = [r for r in found["runs"] if r["variant"] == "programmed"][:1]
     pictures.curves(
         folder / "F-learning.svg",
         "Success on held-apart draws",
@@ -175,6 +178,6 @@ def draw(found: dict[str, Any], folder: Path) -> None:
             for r in found["runs"]
             if r["variant"] != "programmed"
         },
-        lines={"programmed": r["successes"] / r["draws"] for r in programmed},
+        lines={r["variant"]: r[NOISES[0]]["successes"] / r[NOISES[0]]["draws"] for r in programmed},
         groups=VARIANTS,
     )

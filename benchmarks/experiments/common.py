@@ -10,9 +10,19 @@ from typing import Any
 
 from benchmarks.success import FIRST_SEED, RESULTS
 from bt_tasksim.files import write_text
+from bt_tasksim.resources import asset
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "images" / "experiments"
+EXPERIMENTS = {
+    "A": "learning",
+    "B": "shapes",
+    "C": "robot",
+    "D": "sequences",
+    "E": "follower",
+    "F": "ablations",
+}
+"""Module of each."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +50,11 @@ class Request:
     def seeds(self, draws: int) -> range:
         """Seeds of held-apart draws."""
         return range(FIRST_SEED, FIRST_SEED + (self.draws or draws))
+
+
+def policy_of(request: Request, robot: str) -> Path:
+    """The folder of the learned grasp for a robot: what was asked for, or the shipped one."""
+    return Path(request.policy) if request.policy else asset("policies", f"grasp-{robot}")
 
 
 def share(found: Mapping[str, Any]) -> str:

@@ -86,7 +86,7 @@ def judge(
         finally:
             env.close()
     with _one_thread_each():
-        pool = multiprocessing.get_context("spawn").Pool(workers, initializer=_start, initargs=(case, stream))
+        pool = multiprocessing.get_context("fork").Pool(workers, initializer=_start, initargs=(case, stream))
     with pool:
         return list(pool.imap(_work, seeds, chunksize=4))
 

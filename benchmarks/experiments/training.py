@@ -76,12 +76,6 @@ def compact(rows: list[dict[str, Any]]) -> str:
     return "[\n" + ",\n".join(json.dumps(row) for row in short) + "\n]\n"
 
 
-def programmed_beside(rows: list[dict[str, Any]]) -> list[tuple[int, int, int]]:
-    """Decisions, successes and draws of the evaluations on held-apart draws."""
-    found = [(row["steps"], row.get("held_apart")) for row in rows]
-    return [(steps, held["successes"], held["draws"]) for steps, held in found if held]
-
-
 _last = {"time": 0.0}
 
 
