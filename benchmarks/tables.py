@@ -38,7 +38,7 @@ ROWS = tuple(row.name for row in MEASURED)
 KINDS = ("camera", "fromlogs")
 OTHER = ("speed", "decomposition", "learning")
 APART = ("oracle-", "grasp-", "experiment-", "training-")
-"""How results begin that have tables of their own: `benchmarks.learned_tables`, `benchmarks.experiments.pages`."""
+"""How results begin that have tables of their own: see `benchmarks.learned_tables`, `experiments.pages`."""
 NOT_YET = "not measured yet"
 
 
