@@ -23,7 +23,7 @@ from bt_tasksim.training.reward import PARTS, Reward
 
 REDRAWS = 50
 """Draws in a row in which the subtree may stay inactive."""
-CAMERA = "front"
+CAMERA = "overview"
 
 
 class EpisodeEnv(gymnasium.Env[Array, Array]):
