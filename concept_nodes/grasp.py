@@ -222,7 +222,8 @@ class Grasp(ConceptModel):
     def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:
         """Where the estimate says: the programmed grasp trusts it."""
         xp = array_namespace(memory.middle)
-        return xp.concat([-memory.middle, xp.zeros_like(memory.middle[..., :1])], axis=-1)
+        back = -xp.sign(memory.middle) * xp.sqrt(abs(memory.middle))
+        return xp.concat([back, xp.zeros_like(memory.middle[..., :1])], axis=-1)
 
     def _reference(self, action: Array, seen: Seen, memory: GraspMemory) -> Array:
         """The pose ``(..., 7)`` on the path, as far as its pace lets it be."""
