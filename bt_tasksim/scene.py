@@ -123,9 +123,9 @@ class Lesson:
         name: Its name.
         objects: Objects that are drawn otherwise than in the scene itself, by name.
         noise: Names of noise models of the estimate; each world has one of them. None: the engine's.
-        hand: Where the hand is at first, in worlds in which it comes from above; else it is in its rest posture.
-        tilt: Lowest and highest angle in radians between straight down and the direction in which a hand comes
-            to objects on boards, leaning away from the robot, and aside by up to `ASIDE`.
+        hand: Where the hand is at first, in worlds in which it comes from above; else in its rest posture.
+        tilt: Lowest and highest angle in radians between straight down and the direction in which a hand
+            comes to objects on boards, leaning away from the robot, and aside by up to `ASIDE`.
         scenes: Scenes that worlds are drawn from, each as often, instead of the scene itself; the tree's
             objects must be in each.
         tolerance: Sufficient cost below which a goal counts as reached: 1 for what is meant in the end.

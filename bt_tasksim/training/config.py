@@ -33,8 +33,8 @@ class TrainConfig:
         clip: Largest relative change of a decision's probability.
         entropy: Weight of the entropy; none, since the deviation below only shrinks when that pays.
         hidden: Sizes of the hidden layers; 64 and 64 decide in 15 microseconds.
-        log_deviation: Logarithm of the actions' standard deviation at the beginning: 0.37. The reference motion
-            is nearly right already, and wider exploration hides what small changes are worth.
+        log_deviation: Logarithm of the actions' standard deviation at the beginning: 0.37. The reference
+            motion is nearly right already, and wider exploration hides what small changes are worth.
         final_log_deviation: Largest logarithm of the standard deviation at the end. The bound falls
             linearly in the second half: what is rewarded last is nearly what is done without exploration.
         terminate_bias: Bias of the completion signal at the beginning, of which `bt_tasksim.policy.TERMINATE`

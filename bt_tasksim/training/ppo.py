@@ -237,7 +237,7 @@ class _Run:
         return self._finish(network, layout, m - 1)
 
     def _chosen(self, learner: Any) -> Network:
-        """The last policy, which has seen most, unless an earlier one was clearly better on held-apart draws."""
+        """The last policy, which has seen most, unless an earlier one was clearly better on other draws."""
         network: Network = learner.network
         last = self.history[-1].get("held_apart") if self.history else None
         if self.best is None or not last or last["successes"] / last["draws"] >= self.best[0] - CLEARLY:
