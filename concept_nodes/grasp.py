@@ -24,8 +24,8 @@ SETTLED = 3
 """Ticks for which opposing contacts and a still hand must be seen."""
 DOWN = (0.0, 0.0, -1.0)
 SLANTED = 0.01
-"""Metres by which the middle of an action is deeper for a horizontal approach than for one from above: where a
-slanted hand meets an object's edge first, its fingers are still before the object's middle."""
+"""Metres by which the middle of an action is deeper for a horizontal approach than for one from above: where
+a slanted hand meets an object's edge first, its fingers are still before the object's middle."""
 PUSHED = 0.06
 """Metres by which a grasp may push the object, as it is seen."""
 TIPPED = math.radians(10.0)
@@ -40,9 +40,9 @@ class GraspMemory(NamedTuple):
         begins: Seconds after which the straight approach begins, and with it what is decided by a policy.
         goal: Grasp pose ``(..., 7)`` of the reference motion.
         delay: Seconds by which the motion is behind the reference.
-        middle: Offsets ``(..., 5)`` in units of `grasp_features.SCALE` that the middle of an action stands for:
-            the tool goes on, or stays behind, by as much as the estimate is above or below where the object
-            would stand, and goes deeper where it comes slanted.
+        middle: Offsets ``(..., 5)`` in units of `grasp_features.SCALE` that the middle of an action stands
+            for: the tool goes on, or stays behind, by as much as the estimate is above or below where the
+            object would stand, and goes deeper where it comes slanted.
         offset: Offsets ``(..., 5)`` from the reference motion, see `grasp_features.SCALE`.
         target: Tool pose ``(..., 7)`` that was last commanded.
         closing: Seconds since the hand began to close; negative before.
@@ -235,7 +235,7 @@ class Grasp(ConceptModel):
         return memory.settled >= SETTLED
 
     def violated(self, seen: Seen, memory: GraspMemory) -> Array:
-        """The hand has closed on nothing, presses against something, or has pushed the object away or over."""
+        """The hand has closed on nothing, presses too hard, or has pushed the object away or over."""
         empty = (memory.closing > 0.8) & (seen.closure > 0.97 * self.grip)
         now = seen.object(self.target)
         pushed = poses.norm(now[..., :3] - memory.start[..., :3]) > PUSHED

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 SIDE, ACROSS, ALONG, TURN, CLOSE, PACE = range(6)
 ACTIONS = ("aside", "across the fingers", "along the approach", "turn about the approach", "close", "pace")
-"""The first five are offsets from the reference motion; the last one holds the motion back: 0 and above is its
-own pace, -1 stands still."""
+"""The first five are offsets from the reference motion; the last one holds the motion back: 0 and above is
+its own pace, -1 stands still."""
 SCALE = (0.015, 0.025, 0.035, 0.25, 0.5)
 """Largest offsets: metres along the tool's x (aside), y (the fingers' closing axis) and z (the approach),
 radians about z, and of the hand's closure. Source of their order: the released original's grasp training,

@@ -196,7 +196,7 @@ def test_a_concept_must_say_what_it_commands_and_when_it_is_done():
 
 
 def test_unknown_policies_are_refused_when_the_tree_is_set_up(toy):
-    with pytest.raises(InputError, match="leaf 'grasp cup': no policy 'clever'; known: .*programmed"):
+    with pytest.raises(InputError, match=r"leaf 'grasp cup': no policy 'clever'; known: .*programmed"):
         toy(Grasp("cup", policy="clever"))
 
 
