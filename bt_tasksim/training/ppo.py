@@ -238,7 +238,7 @@ class _Run:
 
     def _chosen(self, learner: Any) -> Network:
         """The last policy, which has seen most, unless an earlier one was clearly better on other draws."""
-        network: Network = learner.network
+        network: Network = learner.decisive
         last = self.history[-1].get("held_apart") if self.history else None
         if self.best is None or not last or last["successes"] / last["draws"] >= self.best[0] - CLEARLY:
             return network
@@ -264,7 +264,7 @@ class _Run:
 
     def _evaluate(self, pool: Workers, learner: Any) -> dict[str, Any]:
         """Successes on held-apart draws, the same ones each time; keeps the best policy so far."""
-        arrays = learner.network.arrays()
+        arrays = learner.decisive.arrays()
         tasks = [
             Task("draw", arrays, learner.deviation, (), 0, None, draw=k)
             for k in range(self.config.evaluation_draws)
