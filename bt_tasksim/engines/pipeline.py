@@ -130,7 +130,7 @@ class EnginePipeline:
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> Observation:
         """Begin an episode; returns its first observation."""
         self.kinematics.reset(configuration)
-        if configuration.hand_start:
+        if configuration is not None and configuration.hand_start:
             posture: Any = self.kinematics
             joints = posture.joints_of_hand_start(configuration.hand_start)
             configuration = replace(configuration, joint_position=joints)

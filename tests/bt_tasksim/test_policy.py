@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from py_trees.common import Status
 
 from bt_tasksim.errors import InputError
 from bt_tasksim.network import Network
@@ -170,8 +171,9 @@ def test_a_learned_policy_runs_in_physics_and_is_named(policy, tmp_path):
     programmed = Runner(build("programmed"), scene).run(3)
     assert learned.policies["grasp target"].startswith("mine@")
     assert learned.policies["pick target"] == "programmed"
-    # The network by hand says what the programmed policy says, so the episodes are the same.
-    assert learned.control_steps == programmed.control_steps and learned.verdict == programmed.verdict
+    # The network by hand does nothing but say "done", and the grasp's reference motion is enough here.
+    assert learned.status == programmed.status == Status.SUCCESS
+    assert learned.verdict is not None and learned.verdict.position_error < 0.03
     assert learned.policies["grasp target"] in files.paths["report.html"].read_text()
 
 

@@ -185,8 +185,8 @@ def test_the_motion_counts_for_nothing_when_it_is_done(env_of):
     assert terminated and leaf.log == ["begin", "command 1"]
     assert env.runner.pipeline.now.tool_pose[2] == pytest.approx(HERE + STEP)
     gained = STEP / 0.1
-    assert info["reward"]["shaping"] == pytest.approx(Reward().shape(gained, gained)), "charged once"
-    assert reward == pytest.approx(-1.0 + Reward().shape(gained, gained))
+    assert info["reward"]["shaping"] == pytest.approx(Reward().take_back(gained)), "failed: nothing is kept"
+    assert reward == pytest.approx(-1.0 + Reward().take_back(gained))
 
 
 def test_shaping_is_the_change_of_the_necessary_cost(env_of):

@@ -53,8 +53,9 @@ def test_workers_take_the_policies_of_the_job(policy):
     one, two = evaluate(job, [3, 4]), evaluate(job, [3, 4], workers=2)
     assert one.policies == two.policies and one.policies["grasp target"].startswith("mine@")
     assert {v for k, v in one.policies.items() if k != "grasp target"} == {"programmed"}
-    # The policy by hand says what the programmed one says.
-    assert timeless(one.outcomes) == timeless(two.outcomes) == timeless(programmed.outcomes)
+    # The policy by hand does nothing but say "done", and the grasp's reference motion is enough here.
+    assert timeless(one.outcomes) == timeless(two.outcomes)
+    assert one.successes == programmed.successes == 2
 
 
 def test_a_policy_that_never_says_done_fails(policy):

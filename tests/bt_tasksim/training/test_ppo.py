@@ -196,7 +196,7 @@ def test_it_learns_what_pays(tmp_path):
     """A signal in time, before the tool has strayed: three centimetres are near enough."""
     config = TrainConfig(
         lanes=4, lane_steps=64, steps=4 * 64 * 10, epochs=8, minibatch=64, hidden=(16,), learning_rate=3e-3,
-        terminate_bias=0.0, evaluate_every=0, evaluation_draws=0, seed=1,
+        terminate_bias=0.0, log_deviation=-0.7, evaluate_every=0, evaluation_draws=0, seed=1,
     )  # fmt: skip
     scene = dataclasses.replace(SCENE, lessons=(Lesson("easy", tolerance=3.0),))
     out = tmp_path / "p"
