@@ -119,8 +119,8 @@ class Learner:
         """The present policy as it decides for good.
 
         With exploration it says "done" sooner or later where the signal's mean is a little below the
-        threshold; without, it never would. So the signal is raised by one standard deviation: it is done where
-        exploring it would be within some six decisions.
+        threshold; without, it never would. So the signal is raised by one standard deviation: it is done
+        where exploring it would be within some six decisions.
         """
         network = self.network
         *hidden, (w, b) = network.layers
