@@ -196,7 +196,7 @@ class Grasp(ConceptModel):
         offset = grasp_features.moved_offset(action, memory, seen.world.control_period)
         target = grasp_features.displaced(self._reference(action, seen, memory), offset)
         gap = poses.norm(seen.tool[..., :3] - target[..., :3])
-        delay = memory.delay + grasp_features.delay(action, seen.world.control_period)
+        delay = memory.delay + grasp_features.delay(action, seen, memory)
         arrived = (seen.elapsed - delay >= memory.path.duration) & (gap < self.tolerance)
         late = seen.elapsed - delay >= memory.path.duration + 1.0
         begun = memory.closing >= 0.0
@@ -223,11 +223,11 @@ class Grasp(ConceptModel):
         """Where the estimate says: the programmed grasp trusts it."""
         xp = array_namespace(memory.middle)
         back = -xp.sign(memory.middle) * xp.sqrt(abs(memory.middle))
-        return xp.concat([back, xp.zeros_like(memory.middle[..., :1])], axis=-1)
+        return xp.concat([back, xp.ones_like(memory.middle[..., :1])], axis=-1)
 
     def _reference(self, action: Array, seen: Seen, memory: GraspMemory) -> Array:
         """The pose ``(..., 7)`` on the path, as far as its pace lets it be."""
-        behind = memory.delay + grasp_features.delay(action, seen.world.control_period)
+        behind = memory.delay + grasp_features.delay(action, seen, memory)
         return sample(memory.path, seen.elapsed - behind)
 
     def done(self, seen: Seen, memory: GraspMemory) -> Array:

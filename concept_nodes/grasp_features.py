@@ -17,8 +17,13 @@ if TYPE_CHECKING:
 
 SIDE, ACROSS, ALONG, TURN, CLOSE, PACE = range(6)
 ACTIONS = ("aside", "across the fingers", "along the approach", "turn about the approach", "close", "pace")
-"""The first five are offsets from the reference motion; the last one holds the motion back: 0 and above is
-its own pace, -1 stands still."""
+"""The first five are offsets from the reference motion; the last one is that motion's pace, see `delay`."""
+CAREFUL, WITHDRAWS = 0.25, -0.5
+"""Paces, of the reference motion's own, that the middle of an action stands for: a slow approach, in which a
+first contact can be felt before it presses hard, and the way back, while a finger stands on something."""
+OBSTRUCTED = 0.0015
+"""Metres by which a hand that touches something is held up along the approach: it stands on it. Measured:
+-2 to 1 mm at the instant of a first contact at `CAREFUL` pace, 2 to 6 mm one control period later."""
 SCALE = (0.015, 0.025, 0.035, 0.25, 0.5)
 """Largest offsets: metres along the tool's x (aside), y (the fingers' closing axis) and z (the approach),
 radians about z, and of the hand's closure. Source of their order: the released original's grasp training,
@@ -108,9 +113,22 @@ def moved_offset(action: Array, memory: GraspMemory, period: float) -> Array:
     return memory.offset + poses.clip(gap, -step, step)
 
 
-def delay(action: Array, period: float) -> Array:
-    """Seconds ``(...)`` by which the reference motion falls behind within a control period."""
-    return period * poses.clip(-action[..., PACE], 0.0, 1.0)
+def delay(action: Array, seen: Seen, memory: GraspMemory) -> Array:
+    """Seconds ``(...)`` by which the reference motion falls behind within a control period.
+
+    None before the straight approach. Then the pace is 1 for an action of 1, and for the middle one
+    `CAREFUL`, or `WITHDRAWS` while the open hand stands on something; never below -1, and never back beyond
+    where the straight approach began.
+    """
+    xp = array_namespace(memory.delay)
+    period = seen.world.control_period
+    ahead = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])[..., 2]
+    touching = xp.any(xp.astype(seen.contacts, xp.bool), axis=-1)
+    stands = touching & (ahead < -OBSTRUCTED) & (memory.closing < 0.0)
+    middle = xp.where(stands, WITHDRAWS, CAREFUL)
+    pace = poses.clip(middle + (1.0 - middle) * action[..., PACE], -1.0, 1.0)
+    within = seen.elapsed - memory.delay - memory.begins
+    return xp.where(within >= 0.0, xp.minimum(period * (1.0 - pace), within + period), 0.0)
 
 
 def displaced(reference: Array, offset: Array) -> Array:

@@ -29,7 +29,7 @@ class TrainConfig:
         minibatch: Decisions in a gradient step.
         learning_rate: At the beginning.
         final_learning_rate: At the end; in between it falls linearly, so that the last policy is settled.
-        gae_lambda: Of the generalised advantage estimation.
+        gae_lambda: Of the generalised advantage estimation: a reward that comes once, 40 decisions later.
         clip: Largest relative change of a decision's probability.
         entropy: Weight of the entropy; none, since the deviation below only shrinks when that pays.
         hidden: Sizes of the hidden layers; 64 and 64 decide in 15 microseconds.
@@ -38,7 +38,7 @@ class TrainConfig:
         final_log_deviation: Largest logarithm of the standard deviation at the end. The bound falls
             linearly in the second half: what is rewarded last is nearly what is done without exploration.
         terminate_bias: Bias of the completion signal at the beginning, of which `bt_tasksim.policy.TERMINATE`
-            is the threshold: a first policy ends an episode at one decision in 30.
+            is the threshold: a first policy ends an episode at one decision in 60.
         success_window: Episodes over which the success rate is taken that ends a lesson.
         evaluate_every: Rollouts between two evaluations on held-apart draws; 0: only at the end.
         evaluation_draws: Held-apart draws of each, see `bt_tasksim.training.ppo.CLEARLY`.
@@ -54,13 +54,13 @@ class TrainConfig:
     minibatch: int = 512
     learning_rate: float = 4e-4
     final_learning_rate: float = 2e-5
-    gae_lambda: float = 0.95
+    gae_lambda: float = 0.97
     clip: float = 0.2
     entropy: float = 0.0
     hidden: tuple[int, ...] = (64, 64)
     log_deviation: float = -1.0
     final_log_deviation: float = -2.2
-    terminate_bias: float = -0.2
+    terminate_bias: float = -0.3
     success_window: int = 300
     evaluate_every: int = 12
     evaluation_draws: int = 200

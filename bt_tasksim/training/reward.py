@@ -33,7 +33,7 @@ class Reward:
     violated: float = -1.0
     timeout: float = -1.0
     shaping: float = 0.3
-    gamma: float = 0.997
+    gamma: float = 0.999
     sufficient: bool = True
 
     def __post_init__(self) -> None:

@@ -1,12 +1,16 @@
 """What a learned grasp sees and does: as laid out, the same in batches, bounded in size and speed."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from bt_tasksim import poses
 from bt_tasksim.checking.situations import stacked
+from bt_tasksim.context import Seen
+from bt_tasksim.world import Observation
 from concept_nodes import Grasp, grasp_features
-from concept_nodes.grasp_features import ACTIONS, CLOSE, PACE, PERIOD, RATE, SCALE
+from concept_nodes.grasp_features import ACTIONS, CAREFUL, CLOSE, PACE, PERIOD, RATE, SCALE, WITHDRAWS
 
 SCENARIOS = ("pick_and_place", "shelf_to_shelf")
 
@@ -17,8 +21,6 @@ def near(request, situations):
 
 
 def instant(near, k=0):
-    from bt_tasksim.context import Seen
-
     s = near.single[k]
     return Seen(s.observation, near.world, near.robot, s.elapsed), s.memory
 
@@ -32,7 +34,6 @@ def test_an_action_in_batches_is_the_same_one_by_one(near):
     """With exploring actions, too: command and advance."""
     torch = pytest.importorskip("torch")
     from bt_tasksim.checking.situations import different
-    from bt_tasksim.context import Seen
 
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1.5, 1.5, (len(near), len(ACTIONS)))
@@ -76,7 +77,7 @@ def test_the_programmed_action_is_the_reference_motion(near):
         memory = memory._replace(offset=np.zeros(CLOSE + 1))
         action = near.leaf.programmed_motion(seen, memory)
         assert np.allclose(grasp_features.moved_offset(action, memory, PERIOD), 0.0, atol=1e-12)
-        assert float(grasp_features.delay(action, PERIOD)) == 0.0
+        assert float(grasp_features.delay(action, seen, memory)) == 0.0
     reference = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.3))
     assert grasp_features.displaced(reference, np.zeros(CLOSE + 1)) is reference
 
@@ -94,13 +95,51 @@ def test_offsets_change_no_faster_than_their_rate_and_go_no_farther_than_their_s
     assert np.allclose(memory.offset, SCALE)
 
 
-@pytest.mark.parametrize(
-    ("pace", "share"), [(2.0, 0.0), (1.0, 0.0), (0.0, 0.0), (-0.5, 0.5), (-1.0, 1.0), (-3.0, 1.0)]
-)
-def test_pace_only_holds_the_motion_back(pace, share):
+def approaching(near, within=0.5, contact=False, behind=0.0):
+    """An open hand ``within`` seconds of its straight approach, ``behind`` metres from where it should be."""
+    seen, memory = instant(near)
+    tips = np.zeros(len(near.robot.tips), bool)
+    tips[0] = contact
+    found = {f.name: getattr(seen.observation, f.name) for f in dataclasses.fields(Observation)}
+    seen = Seen(Observation(**found | {"contacts": tips}), near.world, near.robot, memory.begins + within)
+    ahead = poses.multiply(seen.tool, poses.pose([0.0, 0.0, behind], [1.0, 0.0, 0.0, 0.0]))
+    return seen, memory._replace(target=ahead, closing=np.float64(-1.0), delay=np.float64(0.0))
+
+
+def paced(pace):
     action = np.zeros(len(ACTIONS))
     action[PACE] = pace
-    assert float(grasp_features.delay(action, PERIOD)) == pytest.approx(share * PERIOD)
+    return action
+
+
+@pytest.mark.parametrize(
+    ("pace", "share"), [(2.0, 1.0), (1.0, 1.0), (0.0, CAREFUL), (-1 / 3, 0.0), (-9.0, -1.0)]
+)
+def test_the_middle_of_the_pace_is_a_careful_approach(near, pace, share):
+    late = grasp_features.delay(paced(pace), *approaching(near))
+    assert float(late) == pytest.approx((1.0 - share) * near.world.control_period)
+
+
+@pytest.mark.parametrize(
+    ("contact", "behind", "share"),
+    [(True, 0.004, WITHDRAWS), (True, 0.001, CAREFUL), (False, 0.004, CAREFUL), (True, -0.004, CAREFUL)],
+)
+def test_a_hand_that_stands_on_something_goes_back_unless_told_otherwise(near, contact, behind, share):
+    there = approaching(near, contact=contact, behind=behind)
+    period = near.world.control_period
+    assert float(grasp_features.delay(paced(0.0), *there)) == pytest.approx((1.0 - share) * period)
+    assert float(grasp_features.delay(paced(1.0), *there)) == 0.0
+    closing = there[1]._replace(closing=np.float64(0.1))
+    assert float(grasp_features.delay(paced(0.0), there[0], closing)) == pytest.approx(
+        (1.0 - CAREFUL) * period
+    )
+
+
+def test_it_never_goes_back_beyond_where_the_straight_approach_began(near):
+    period = near.world.control_period
+    late = grasp_features.delay(paced(-9.0), *approaching(near, within=0.3 * period))
+    assert float(late) == pytest.approx(1.3 * period)
+    assert float(grasp_features.delay(paced(-9.0), *approaching(near, within=-0.1))) == 0.0
 
 
 def test_displacements_are_in_the_tools_frame():
