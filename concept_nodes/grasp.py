@@ -16,7 +16,7 @@ from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.world import Command, ObjectModel, PlaceModel
 from concept_nodes import grasp_features
-from concept_nodes.grasp_features import ALONG, CLOSE
+from concept_nodes.grasp_features import ALONG, CLOSE, HASTE
 from concept_nodes.holding import HOLDING, tool_distance
 from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 
@@ -46,6 +46,7 @@ class GraspMemory(NamedTuple):
         offset: Offsets ``(..., 5)`` from the reference motion, see `grasp_features.SCALE`.
         target: Tool pose ``(..., 7)`` that was last commanded.
         closing: Seconds since the hand began to close; negative before.
+        closed: Closure that was last commanded.
         closure: Closure at the previous tick.
         settled: Ticks in a row with opposing contacts and a still hand.
         preshape: Closure at which the hand comes.
@@ -67,6 +68,7 @@ class GraspMemory(NamedTuple):
     offset: Array
     target: Array
     closing: Array
+    closed: Array
     closure: Array
     settled: Array
     preshape: Array
@@ -75,6 +77,24 @@ class GraspMemory(NamedTuple):
     estimate: Array
     start: Array
     now: Array
+
+
+class Motion(NamedTuple):
+    """What an action makes of the reference motion at a tick; batch dimensions ``(...)``.
+
+    Attributes:
+        delay: Seconds by which the motion is behind the reference.
+        offset: Offsets ``(..., 5)`` from it.
+        middle: Offsets that the middle of an action stands for from now on.
+        target: Tool pose ``(..., 7)`` to command.
+        closed: Closure to command.
+    """
+
+    delay: Array
+    offset: Array
+    middle: Array
+    target: Array
+    closed: Array
 
 
 class Grasp(ConceptModel):
@@ -146,6 +166,7 @@ class Grasp(ConceptModel):
             offset=np.zeros(CLOSE + 1),
             target=seen.tool,
             closing=np.float64(-1.0),
+            closed=np.float64(0.0),
             closure=seen.closure,
             settled=np.int64(0),
             preshape=np.float64(0.0),
@@ -183,20 +204,14 @@ class Grasp(ConceptModel):
 
     def command(self, action: Array, seen: Seen, memory: GraspMemory) -> Command:
         """Follow the path with the hand open, then close; both moved by the action's offsets."""
-        xp = array_namespace(memory.closing)
-        offset = grasp_features.moved_offset(action, memory, seen.world.control_period)
-        closing = xp.where(memory.closing >= 0.0, self.grip + offset[..., CLOSE], memory.preshape)
-        return Command(
-            tool=grasp_features.displaced(self._reference(action, seen, memory), offset),
-            hand=xp.asarray(poses.clip(closing, 0.0, 1.0))[..., None],
-        )
+        motion = self._motion(action, seen, memory)
+        return Command(tool=motion.target, hand=motion.closed[..., None])
 
     def advance(self, action: Array, seen: Seen, memory: GraspMemory) -> GraspMemory:
         """Begin to close when the tool has arrived; count the ticks at which the hand holds still."""
-        offset = grasp_features.moved_offset(action, memory, seen.world.control_period)
-        target = grasp_features.displaced(self._reference(action, seen, memory), offset)
+        motion = self._motion(action, seen, memory)
+        delay, target = motion.delay, motion.target
         gap = poses.norm(seen.tool[..., :3] - target[..., :3])
-        delay = memory.delay + grasp_features.delay(action, seen, memory)
         arrived = (seen.elapsed - delay >= memory.path.duration) & (gap < self.tolerance)
         late = seen.elapsed - delay >= memory.path.duration + 1.0
         begun = memory.closing >= 0.0
@@ -210,8 +225,10 @@ class Grasp(ConceptModel):
         return memory._replace(
             now=seen.object(self.target),
             delay=delay,
-            offset=offset,
+            offset=motion.offset,
+            middle=motion.middle,
             target=target,
+            closed=motion.closed,
             closing=xp.where(begun, go_on, xp.where(arrived | late, 0.0, memory.closing)),
             closure=seen.closure,
             settled=xp.where(good, memory.settled + 1, 0),
@@ -219,16 +236,23 @@ class Grasp(ConceptModel):
             first=xp.where(fresh, along, memory.first),
         )
 
+    def _motion(self, action: Array, seen: Seen, memory: GraspMemory) -> Motion:
+        """What an action makes of the reference motion at this tick."""
+        pace = grasp_features.pace(action, seen, memory)
+        delay = memory.delay + seen.world.control_period * (1.0 - pace)
+        offset = grasp_features.moved_offset(action, seen, memory)
+        target = grasp_features.displaced(sample(memory.path, seen.elapsed - delay), offset)
+        asked = poses.clip(self.grip + offset[..., CLOSE], 0.0, 1.0)
+        xp = array_namespace(memory.closing)
+        closed = grasp_features.closed(pace, asked, seen, memory)
+        middle = grasp_features.found_middle(action, offset, seen, memory)
+        return Motion(delay, offset, middle, target, xp.where(memory.closing >= 0.0, closed, memory.preshape))
+
     def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:
         """Where the estimate says: the programmed grasp trusts it."""
         xp = array_namespace(memory.middle)
         back = -xp.sign(memory.middle) * xp.sqrt(abs(memory.middle))
-        return xp.concat([back, xp.ones_like(memory.middle[..., :1])], axis=-1)
-
-    def _reference(self, action: Array, seen: Seen, memory: GraspMemory) -> Array:
-        """The pose ``(..., 7)`` on the path, as far as its pace lets it be."""
-        behind = memory.delay + grasp_features.delay(action, seen, memory)
-        return sample(memory.path, seen.elapsed - behind)
+        return xp.concat([back, xp.full_like(memory.middle[..., :1], HASTE)], axis=-1)
 
     def done(self, seen: Seen, memory: GraspMemory) -> Array:
         """Opposing contacts and a still hand, some ticks long."""

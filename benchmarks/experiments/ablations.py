@@ -24,11 +24,13 @@ from bt_tasksim.context import Seen
 from bt_tasksim.files import write_text
 from bt_tasksim.parameters import Seconds
 from bt_tasksim.policy import PROGRAMMED, Action
+from bt_tasksim.poses import Array
 from bt_tasksim.scene import Scene
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.decorator import Train
 from bt_tasksim.training.reward import Reward
 from concept_nodes import Grasp, Pick
+from concept_nodes.grasp import GraspMemory
 from trees.authoring import sequence
 from trees.scenarios import grasp_then_pick
 
@@ -36,7 +38,7 @@ VARIANTS = ("full", "fixed time", "shaping alone")
 SEEDS = (0, 1, 2)
 STEPS, DRAWS = 200_000, 300
 NOISES = ("original", "hard")
-HOLDS = (0.2, 0.4, 0.6, 0.8, 1.2)
+HOLDS = (0.4, 0.8, 1.2, 1.6, 2.0, 2.4)
 """Seconds of closing from which the fixed time is chosen, on training draws."""
 HOLD_FILE = "hold.json"
 WINDOW = 1000
@@ -50,19 +52,23 @@ class FixedTimeGrasp(Grasp):
         hold: That time.
     """
 
-    hold: Seconds = 0.6
+    hold: Seconds = 1.2
+
+    def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:
+        """The middle of a learned action, careful and slow, from which training begins."""
+        return np.zeros((*np.shape(memory.closing), self.actions))
 
     def _act(self, action: Action, seen: Seen) -> Status:
         return super()._act(Action(action.motion, np.bool_(self.memory.closing > self.hold)), seen)
 
 
-def tree(variant: str, hold: float = 0.6) -> Behaviour:
+def tree(variant: str, hold: float = 1.2) -> Behaviour:
     """The tree of a variant; ``grasp_then_pick`` but for the completion signal."""
     if variant != "fixed time":
         return grasp_then_pick.build()
     return sequence(
         "grasp for a fixed time, then pick",
-        Train(FixedTimeGrasp("target", hold=hold, timeout=6.0)),
+        Train(FixedTimeGrasp("target", hold=hold, timeout=10.0)),
         Pick("target", distance=grasp_then_pick.LIFT, speed=0.5),
     )
 
@@ -109,7 +115,7 @@ def train(request: Request) -> None:
 
 
 def best_hold(request: Request) -> float:
-    """The fixed time with which the programmed motion succeeds most often on draws of the last lesson."""
+    """The fixed time with which the middle of a learned action succeeds most often in the last lesson."""
     path = folder_of(request) / HOLD_FILE
     if not path.is_file():
         path.parent.mkdir(parents=True, exist_ok=True)

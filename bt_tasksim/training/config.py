@@ -38,7 +38,7 @@ class TrainConfig:
         final_log_deviation: Largest logarithm of the standard deviation at the end. The bound falls
             linearly in the second half: what is rewarded last is nearly what is done without exploration.
         terminate_bias: Bias of the completion signal at the beginning, of which `bt_tasksim.policy.TERMINATE`
-            is the threshold: a first policy ends an episode at one decision in 60.
+            is the threshold: a first policy ends an episode at one decision in 100.
         success_window: Episodes over which the success rate is taken that ends a lesson.
         evaluate_every: Rollouts between two evaluations on held-apart draws; 0: only at the end.
         evaluation_draws: Held-apart draws of each, see `bt_tasksim.training.ppo.CLEARLY`.
@@ -60,7 +60,7 @@ class TrainConfig:
     hidden: tuple[int, ...] = (64, 64)
     log_deviation: float = -1.0
     final_log_deviation: float = -2.2
-    terminate_bias: float = -0.3
+    terminate_bias: float = -0.35
     success_window: int = 300
     evaluate_every: int = 12
     evaluation_draws: int = 200

@@ -10,7 +10,19 @@ from bt_tasksim.checking.situations import stacked
 from bt_tasksim.context import Seen
 from bt_tasksim.world import Observation
 from concept_nodes import Grasp, grasp_features
-from concept_nodes.grasp_features import ACTIONS, CAREFUL, CLOSE, PACE, PERIOD, RATE, SCALE, WITHDRAWS
+from concept_nodes.grasp_features import (
+    ACTIONS,
+    ALONG,
+    BACK_RATE,
+    CAREFUL,
+    CLOSE,
+    EAGER,
+    HASTE,
+    PACE,
+    PERIOD,
+    RATE,
+    SCALE,
+)
 
 SCENARIOS = ("pick_and_place", "shelf_to_shelf")
 
@@ -76,30 +88,32 @@ def test_the_programmed_action_is_the_reference_motion(near):
         seen, memory = instant(near, k)
         memory = memory._replace(offset=np.zeros(CLOSE + 1))
         action = near.leaf.programmed_motion(seen, memory)
-        assert np.allclose(grasp_features.moved_offset(action, memory, PERIOD), 0.0, atol=1e-12)
-        assert float(grasp_features.delay(action, seen, memory)) == 0.0
+        assert np.allclose(grasp_features.moved_offset(action, seen, memory), 0.0, atol=1e-12)
+        assert float(grasp_features.pace(action, seen, memory)) == 1.0
     reference = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.3))
     assert grasp_features.displaced(reference, np.zeros(CLOSE + 1)) is reference
 
 
 def test_offsets_change_no_faster_than_their_rate_and_go_no_farther_than_their_scale(near):
-    _, memory = instant(near)
+    seen, memory = approaching(near)
+    share = near.world.control_period / PERIOD
     memory = memory._replace(offset=np.zeros(CLOSE + 1), middle=np.zeros(CLOSE + 1))
     far = np.full(len(ACTIONS), 9.0)
-    first = grasp_features.moved_offset(far, memory, PERIOD)
-    assert np.allclose(first, RATE)
-    assert np.allclose(grasp_features.moved_offset(far, memory, PERIOD / 2), np.array(RATE) / 2)
-    assert np.allclose(grasp_features.moved_offset(-far, memory, PERIOD), -np.array(RATE))
-    for _ in range(20):
-        memory = memory._replace(offset=grasp_features.moved_offset(far, memory, PERIOD))
+    rate = share * np.array(RATE)
+    assert np.allclose(grasp_features.moved_offset(far, seen, memory), rate)
+    rate[ALONG] = share * BACK_RATE
+    assert np.allclose(grasp_features.moved_offset(-far, seen, memory), -rate)
+    for _ in range(60):
+        memory = memory._replace(offset=grasp_features.moved_offset(far, seen, memory))
     assert np.allclose(memory.offset, SCALE)
 
 
-def approaching(near, within=0.5, contact=False, behind=0.0):
-    """An open hand ``within`` seconds of its straight approach, ``behind`` metres from where it should be."""
+def approaching(near, within=0.5, contact=0, behind=0.0):
+    """An open hand ``within`` seconds of its straight approach, ``behind`` metres from where it should be,
+    ``contact`` of its fingertips touching."""
     seen, memory = instant(near)
     tips = np.zeros(len(near.robot.tips), bool)
-    tips[0] = contact
+    tips[:contact] = True
     found = {f.name: getattr(seen.observation, f.name) for f in dataclasses.fields(Observation)}
     seen = Seen(Observation(**found | {"contacts": tips}), near.world, near.robot, memory.begins + within)
     ahead = poses.multiply(seen.tool, poses.pose([0.0, 0.0, behind], [1.0, 0.0, 0.0, 0.0]))
@@ -113,33 +127,46 @@ def paced(pace):
 
 
 @pytest.mark.parametrize(
-    ("pace", "share"), [(2.0, 1.0), (1.0, 1.0), (0.0, CAREFUL), (-1 / 3, 0.0), (-9.0, -1.0)]
+    ("asked", "share"),
+    [(HASTE, 1.0), (99.0, 1.0), (0.0, CAREFUL), (1.0, CAREFUL + EAGER), (-1.0, CAREFUL - EAGER)],
 )
-def test_the_middle_of_the_pace_is_a_careful_approach(near, pace, share):
-    late = grasp_features.delay(paced(pace), *approaching(near))
-    assert float(late) == pytest.approx((1.0 - share) * near.world.control_period)
+def test_the_middle_of_the_pace_is_a_careful_approach(near, asked, share):
+    seen, memory = approaching(near)
+    assert float(grasp_features.pace(paced(asked), seen, memory)) == pytest.approx(share)
+    after = near.leaf.advance(paced(asked), seen, memory)
+    assert float(after.delay) == pytest.approx((1.0 - share) * near.world.control_period)
+    before, _ = approaching(near, within=-0.1)
+    assert float(grasp_features.pace(paced(asked), before, memory)) == 1.0
 
 
 @pytest.mark.parametrize(
-    ("contact", "behind", "share"),
-    [(True, 0.004, WITHDRAWS), (True, 0.001, CAREFUL), (False, 0.004, CAREFUL), (True, -0.004, CAREFUL)],
+    ("contact", "behind", "stands"),
+    [(1, 0.004, True), (1, 0.001, False), (0, 0.004, False), (1, -0.004, False)],
 )
-def test_a_hand_that_stands_on_something_goes_back_unless_told_otherwise(near, contact, behind, share):
-    there = approaching(near, contact=contact, behind=behind)
-    period = near.world.control_period
-    assert float(grasp_features.delay(paced(0.0), *there)) == pytest.approx((1.0 - share) * period)
-    assert float(grasp_features.delay(paced(1.0), *there)) == 0.0
-    closing = there[1]._replace(closing=np.float64(0.1))
-    assert float(grasp_features.delay(paced(0.0), there[0], closing)) == pytest.approx(
-        (1.0 - CAREFUL) * period
-    )
+def test_a_hand_that_stands_on_something_goes_back(near, contact, behind, stands):
+    seen, memory = approaching(near, contact=contact, behind=behind)
+    memory = memory._replace(offset=np.zeros(CLOSE + 1), middle=np.zeros(CLOSE + 1))
+    along = grasp_features.moved_offset(paced(0.0), seen, memory)[ALONG]
+    assert bool(grasp_features.stands(paced(0.0), seen, memory)) == stands
+    assert along == pytest.approx(-BACK_RATE if stands else 0.0)
+    assert float(grasp_features.pace(paced(0.0), seen, memory)) == (0.0 if stands else CAREFUL)
+    assert not grasp_features.stands(paced(HASTE), seen, memory)
+    assert not grasp_features.stands(paced(0.0), seen, memory._replace(closing=np.float64(0.1)))
 
 
-def test_it_never_goes_back_beyond_where_the_straight_approach_began(near):
-    period = near.world.control_period
-    late = grasp_features.delay(paced(-9.0), *approaching(near, within=0.3 * period))
-    assert float(late) == pytest.approx(1.3 * period)
-    assert float(grasp_features.delay(paced(-9.0), *approaching(near, within=-0.1))) == 0.0
+def test_fingers_come_as_slowly_as_the_pace_until_opposing_ones_touch(near):
+    seen, memory = approaching(near, contact=1)
+    memory = memory._replace(closing=np.float64(0.1), closed=np.float64(0.2))
+    step = near.robot.hand_speed * near.world.control_period
+
+    def closed(pace, asked=1.0, seen=seen):
+        return float(grasp_features.closed(np.float64(pace), np.float64(asked), seen, memory))
+
+    assert closed(0.25) == pytest.approx(0.2 + 0.25 * step)
+    assert closed(0.25, asked=0.21) == 0.21 and closed(0.25, asked=0.1) == 0.1
+    assert closed(1.0) == 1.0 and closed(0.0) == pytest.approx(0.2)
+    both, _ = approaching(near, contact=len(near.robot.tips))
+    assert closed(0.25, seen=both) == 1.0
 
 
 def test_displacements_are_in_the_tools_frame():

@@ -39,6 +39,6 @@ def build() -> Behaviour:
     """The tree."""
     return sequence(
         "grasp, gentle lift",
-        Train(Grasp("target", grip=GRIP, timeout=8.0)),
+        Train(Grasp("target", grip=GRIP, timeout=10.0)),
         Pick("target", distance=LIFT, speed=SPEED, squeeze=SQUEEZE),
     )

@@ -102,6 +102,6 @@ def build() -> Behaviour:
     """The tree."""
     return sequence(
         "grasp then pick",
-        Train(Grasp("target", timeout=8.0)),
+        Train(Grasp("target", timeout=10.0)),
         Pick("target", distance=LIFT, speed=0.5),
     )
