@@ -1,4 +1,4 @@
-"""How often a grasp holds: the learned policy beside the programmed one, on held-apart draws.
+"""How often a grasp holds: the learned policy beside the programmed and the untrained one, held-apart draws.
 
     python -m benchmarks.grasp --robot panda --policy grasp-panda
     python -m benchmarks.grasp --robot xarm7_ability --policy grasp-xarm7_ability
@@ -8,7 +8,7 @@ sizes and shape exponents that no lesson draws. Counts successes of all draws an
 `benchmarks.oracle` found graspable, by kind of shape; failures by kind; and how far a grasp's completion
 signal can be trusted: of the grasps that said "done", how many outlived the pick.
 
-Writes ``benchmarks/results/grasp-<robot>-<noise>-<learned|programmed>.json``.
+Writes ``benchmarks/results/grasp-<robot>-<noise>-<learned|untrained|programmed>.json``.
 """
 
 from __future__ import annotations
@@ -17,21 +17,29 @@ import argparse
 import json
 import re
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from benchmarks import oracle
 from benchmarks.success import FIRST_SEED, RESULTS
 from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import BtTasksimError
 from bt_tasksim.files import write_text
+from bt_tasksim.network import Network
 from bt_tasksim.policy import PROGRAMMED
+from bt_tasksim.policy_files import PolicyCard, save_policy
+from bt_tasksim.robot import load_robot
 from bt_tasksim.training.evaluation import Evaluation, Job, Outcome, evaluate, wilson
+from concept_nodes import Grasp
 from trees.scenarios import grasp_then_pick
 
 NOISES = ("original", "hard")
+WHO = ("learned", "untrained", "programmed")
 LEAF, AFTER = "grasp target", "pick target"
 CLOSED = 97
 """Per cent of closure from which a hand that exceeded a limit had closed on nothing."""
@@ -146,6 +154,21 @@ def text(found: Mapping[str, Any], who: str) -> str:
     return "\n".join(lines)
 
 
+def untrained(robot: str) -> Network:
+    """The middle of a learned action, careful and slow; done when the hand has held still.
+
+    It is as large as a policy that is learned, so that it takes as long.
+    """
+    layout = Grasp.layout(load_robot(robot))
+    names = list(layout)
+    settled = sum(layout[n] for n in names[: names.index("time") + 1]) - 1
+    n = sum(layout.values())
+    first, second, last = np.zeros((64, n)), np.zeros((64, 64)), np.zeros((Grasp.actions + 1, 64))
+    # Of 1, after three ticks of a still hand, tanh twice makes 0.61, and of 2/3 it makes 0.49.
+    first[0, settled], second[0, 0], last[-1, 0] = 0.9, 1.0, 1.0
+    return Network(np.zeros(n), np.ones(n), [(w, np.zeros(len(w))) for w in (first, second, last)])
+
+
 def measure(robot: str, noise: str, policy: str | None, seeds: range, workers: int) -> Evaluation:
     """One evaluation; ``policy``: what the grasp leaf takes, None for the pinned one."""
     policies = (("grasp", policy),) if policy else ()
@@ -159,6 +182,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--robot", default="panda")
     parser.add_argument("--policy", metavar="P", help="the learned policy; by default the pinned one")
     parser.add_argument("--noise", nargs="+", default=list(NOISES), choices=NOISES)
+    parser.add_argument("--only", nargs="+", choices=WHO, help="whom to measure; by default all")
     parser.add_argument("--draws", type=int, default=oracle.DRAWS)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=RESULTS)
@@ -175,8 +199,15 @@ def main(arguments: list[str] | None = None) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     for noise in options.noise:
         both: dict[str, dict[str, Any]] = {}
-        for who, policy in (("learned", options.policy), ("programmed", PROGRAMMED)):
-            found = measure(options.robot, noise, policy, seeds, options.workers)
+        for who in options.only or WHO:
+            with tempfile.TemporaryDirectory() as folder:
+                policy = {"learned": options.policy, "programmed": PROGRAMMED, "untrained": folder}[who]
+                if who == "untrained":
+                    policy = f"{folder}/grasp-untrained"
+                    layout = tuple(Grasp.layout(load_robot(options.robot)).items())
+                    card = PolicyCard("grasp", options.robot, layout, Grasp.actions, "none")
+                    save_policy(policy, untrained(options.robot), card)
+                found = measure(options.robot, noise, policy, seeds, options.workers)
             if who == "learned" and found.policies[LEAF] == PROGRAMMED:
                 print("no learned policy is named or pinned: only the programmed one is measured")
                 continue
@@ -184,7 +215,7 @@ def main(arguments: list[str] | None = None) -> int:
             name = f"grasp-{options.robot}-{noise}-{who}.json"
             write_text(options.out / name, json.dumps(both[who], indent=2) + "\n")
             print(text(both[who], who), flush=True)
-        if len(both) == 2:
+        if {"learned", "programmed"} <= set(both):
             n = paired(both["learned"], both["programmed"])
             ratio = n["failures_ratio"]
             print(

@@ -25,18 +25,20 @@ def oracle(results: Results) -> str:
 
 
 def grasp(results: Results) -> str:
-    """Learned beside programmed, on the same draws."""
+    """Learned beside untrained and programmed, on the same graspable draws."""
     lines = [
-        "| robot | noise | learned | programmed | graspable draws, learned | programmed | failures, ratio |",
-        "|---|---|---|---|---|---|---|",
+        "| robot | noise | learned | untrained | programmed | failures, learned and programmed |",
+        "|---|---|---|---|---|---|",
     ]
     for robot, noise, learned, programmed in _pairs(results):
         if not learned or not programmed:
-            lines.append(f"| `{robot}` | `{noise}` | {NOT_YET} | | | | |")
+            lines.append(f"| `{robot}` | `{noise}` | {NOT_YET} | | | |")
             continue
-        rows = [found["kinds"]["all"] for found in (learned, programmed)]
-        cells = [share(row) for row in rows]
-        cells += [share(row["graspable"]) if "graspable" in row else "" for row in rows]
+        middle = results.get(f"grasp-{robot}-{noise}-untrained")
+        cells = [
+            share(found["kinds"]["all"].get("graspable", found["kinds"]["all"])) if found else NOT_YET
+            for found in (learned, middle, programmed)
+        ]
         n = paired(learned, programmed)
         ratio = "" if n["failures_ratio"] is None else f", {n['failures_ratio']:.2f}"
         failures = f"{n['learned_fails']} of {n['programmed_fails']}{ratio}"

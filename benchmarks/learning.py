@@ -29,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.grasp import untrained
 from benchmarks.peer_maniskill import Peer
 from benchmarks.success import RESULTS
 from bt_tasksim.files import write_text
@@ -42,6 +43,8 @@ from trees.scenarios import grasp_then_pick
 
 LANE = 256
 """Decisions of a lane."""
+DEVIATION = 0.165
+"""Standard deviation of the noise on the actions, as in the middle of a training."""
 
 
 @dataclass(frozen=True)
@@ -74,32 +77,13 @@ ROWS = (
 )
 
 
-def reference_network(deviates: float = 0.165) -> tuple[Network, Any]:
-    """A policy that leaves the reference motion as it is and is done when the hand has held still.
-
-    Returns:
-        The network, and the standard deviation of the noise on its outputs.
-    """
-    robot = EpisodeEnv(grasp_then_pick.build(), grasp_then_pick.scene()).runner.robot
-    layout = Grasp.layout(robot)
-    names = list(layout)
-    settled = sum(layout[n] for n in names[: names.index("time") + 1]) - 1
-    n = sum(layout.values())
-    # As large as one that is learned, so that it takes as long.
-    first, second = np.zeros((64, n)), np.zeros((64, 64))
-    last = np.zeros((Grasp.actions + 1, 64))
-    first[0, settled], second[0, 0], last[-1, 0] = 1.0, 1.0, 1.0
-    layers = [(w, np.zeros(len(w))) for w in (first, second, last)]
-    deviation = np.full(Grasp.actions + 1, deviates, np.float32)
-    deviation[-1] = 0.0
-    return Network(np.zeros(n), np.ones(n), layers), deviation
-
-
 class Ours:
     """``grasp_then_pick`` with the reference policy; control periods are counted over processes."""
 
     def __init__(self) -> None:
-        self.network, self.deviation = reference_network()
+        self.network = untrained(grasp_then_pick.scene().robot)
+        self.deviation = np.full(Grasp.actions + 1, DEVIATION, np.float32)
+        self.deviation[-1] = 0.0
         self._periods = multiprocessing.get_context("fork").Value("q", 0)
         self._env: Any = None
         self._pool: Workers | None = None

@@ -238,14 +238,15 @@ class Grasp(ConceptModel):
 
     def _motion(self, action: Array, seen: Seen, memory: GraspMemory) -> Motion:
         """What an action makes of the reference motion at this tick."""
-        pace = grasp_features.pace(action, seen, memory)
+        met = grasp_features.met(action, seen, memory)
+        pace = grasp_features.pace(action, met, seen, memory)
         delay = memory.delay + seen.world.control_period * (1.0 - pace)
-        offset = grasp_features.moved_offset(action, seen, memory)
+        offset = grasp_features.moved_offset(action, met, seen, memory)
+        middle = grasp_features.found_middle(offset, met, memory)
         target = grasp_features.displaced(sample(memory.path, seen.elapsed - delay), offset)
         asked = poses.clip(self.grip + offset[..., CLOSE], 0.0, 1.0)
         xp = array_namespace(memory.closing)
         closed = grasp_features.closed(pace, asked, seen, memory)
-        middle = grasp_features.found_middle(action, offset, seen, memory)
         return Motion(delay, offset, middle, target, xp.where(memory.closing >= 0.0, closed, memory.preshape))
 
     def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -107,74 +107,80 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
     return xp.concat(parts, axis=-1)
 
 
-def moved_offset(action: Array, seen: Seen, memory: GraspMemory) -> Array:
+class Met(NamedTuple):
+    """What a motion that takes care has met; booleans ``(...)``.
+
+    Attributes:
+        stands: A finger of the open hand stands on something: it touches, and is held up.
+        searches: It does, or a finger touches alone while the hand closes.
+    """
+
+    stands: Array
+    searches: Array
+
+
+def met(action: Array, seen: Seen, memory: GraspMemory) -> Met:
+    """See `Met`; nothing for an action in `HASTE`, and before the straight approach."""
+    xp = array_namespace(memory.delay)
+    touching = xp.any(xp.astype(seen.contacts, xp.bool), axis=-1)
+    begun = seen.elapsed - memory.delay >= memory.begins
+    feels = begun & touching & (action[..., PACE] < HASTE)
+    if feels.ndim == 0 and not feels:
+        return Met(feels, feels)
+    ahead = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])[..., 2]
+    closing = memory.closing >= 0.0
+    stands = feels & ~closing & (ahead < -OBSTRUCTED)
+    return Met(stands, stands | (feels & closing & ~xp.asarray(seen.opposed())))
+
+
+def moved_offset(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Array:
     """The offsets ``(..., 5)`` one control period on: towards the action, no faster than `RATE`.
 
     They grow with the square of the action: around its middle a hand that should go straight does, to within
     a fraction of a millimetre, and is not led astray by exploration either. While a finger stands on
-    something the hand goes back, towards `WITHDRAWS`. While it `searches`, the action across the fingers says
-    how fast it goes aside, and what it has gone stays (`GraspMemory.middle`).
+    something the hand goes back, towards `WITHDRAWS`. While it searches, the action across the fingers says
+    how fast it goes aside, and what it has gone stays (`found_middle`).
     """
-    xp = array_namespace(memory.offset)
     asked = poses.clip(action[..., :PACE], -1.0, 1.0)
-    back, aside = stands(action, seen, memory), searches(action, seen, memory)
     share = seen.world.control_period / PERIOD
     if type(action) is np.ndarray and action.ndim == 1:
         gap = (asked * abs(asked) + memory.middle) * _SCALE - memory.offset
-        if back:
+        if met.stands:
             gap[ALONG] -= WITHDRAWS
-        if aside:
+        if met.searches:
             gap[ACROSS] = asked[ACROSS] * RATE[ACROSS] * share
         return memory.offset + np.minimum(np.maximum(gap, -_BACK_RATE * share), _RATE * share)
+    xp = array_namespace(memory.offset)
     back_rate, rate = constant(_BACK_RATE, memory.offset), constant(RATE, memory.offset)
     gap = (asked * abs(asked) + memory.middle) * constant(SCALE, memory.offset) - memory.offset
-    gap = gap - xp.astype(back, gap.dtype)[..., None] * constant(_BACK, gap)
-    gap = xp.where(aside[..., None] & (constant(_BESIDE, gap) > 0.0), asked * rate * share, gap)
+    gap = gap - xp.astype(met.stands, gap.dtype)[..., None] * constant(_BACK, gap)
+    gap = xp.where(met.searches[..., None] & (constant(_BESIDE, gap) > 0.0), asked * rate * share, gap)
     return memory.offset + poses.clip(gap, -back_rate * share, rate * share)
 
 
-def found_middle(action: Array, offset: Array, seen: Seen, memory: GraspMemory) -> Array:
+def found_middle(offset: Array, met: Met, memory: GraspMemory) -> Array:
     """The middle ``(..., 5)`` of an action from now on: what a search aside has gone is added to it.
 
     Args:
-        action: The action ``(..., 6)``.
-        offset: The offsets that it leads to, see `moved_offset`.
-        seen: What is seen.
+        offset: The offsets ``(..., 5)`` from now on, see `moved_offset`.
+        met: What was met.
         memory: The grasp's memory.
     """
+    if met.searches.ndim == 0 and not met.searches:
+        return memory.middle
     xp = array_namespace(memory.offset)
     gone = (offset - memory.offset) / constant(SCALE, memory.offset) * constant(_BESIDE, memory.offset)
-    aside = searches(action, seen, memory)
-    return poses.clip(memory.middle + xp.astype(aside, gone.dtype)[..., None] * gone, -1.0, 1.0)
+    return xp.where(met.searches[..., None], poses.clip(memory.middle + gone, -1.0, 1.0), memory.middle)
 
 
-def searches(action: Array, seen: Seen, memory: GraspMemory) -> Array:
-    """Boolean ``(...)``: a finger stands on something, or touches it alone while the hand closes."""
-    xp = array_namespace(memory.delay)
-    touching = xp.any(xp.astype(seen.contacts, xp.bool), axis=-1)
-    alone = (memory.closing >= 0.0) & touching & ~xp.asarray(seen.opposed()) & (action[..., PACE] < HASTE)
-    return stands(action, seen, memory) | alone
-
-
-def stands(action: Array, seen: Seen, memory: GraspMemory) -> Array:
-    """Boolean ``(...)``: the open hand is held up by what it touches, in a motion that takes care."""
-    xp = array_namespace(memory.delay)
-    ahead = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])[..., 2]
-    touching = xp.any(xp.astype(seen.contacts, xp.bool), axis=-1)
-    begun = seen.elapsed - memory.delay >= memory.begins
-    takes_care = begun & (memory.closing < 0.0) & (action[..., PACE] < HASTE)
-    return takes_care & touching & (ahead < -OBSTRUCTED)
-
-
-def pace(action: Array, seen: Seen, memory: GraspMemory) -> Array:
+def pace(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Array:
     """Pace ``(...)`` of the motion, of the reference's own: 1 before the straight approach.
 
     Then it is 1 for `HASTE`, and for the middle of an action `CAREFUL`, or 0 while a finger stands on
     something.
     """
     xp = array_namespace(memory.delay)
-    middle = xp.where(stands(action, seen, memory), 0.0, CAREFUL)
-    asked = poses.clip(middle + EAGER * action[..., PACE], 0.0, 1.0)
+    asked = poses.clip(xp.where(met.stands, 0.0, CAREFUL) + EAGER * action[..., PACE], 0.0, 1.0)
     return xp.where(seen.elapsed - memory.delay >= memory.begins, asked, 1.0)
 
 

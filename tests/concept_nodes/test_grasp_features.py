@@ -11,6 +11,7 @@ from bt_tasksim.context import Seen
 from bt_tasksim.world import Observation
 from concept_nodes import Grasp, grasp_features
 from concept_nodes.grasp_features import (
+    ACROSS,
     ACTIONS,
     ALONG,
     BACK_RATE,
@@ -88,8 +89,8 @@ def test_the_programmed_action_is_the_reference_motion(near):
         seen, memory = instant(near, k)
         memory = memory._replace(offset=np.zeros(CLOSE + 1))
         action = near.leaf.programmed_motion(seen, memory)
-        assert np.allclose(grasp_features.moved_offset(action, seen, memory), 0.0, atol=1e-12)
-        assert float(grasp_features.pace(action, seen, memory)) == 1.0
+        assert np.allclose(offsets(action, seen, memory), 0.0, atol=1e-12)
+        assert pace(action, seen, memory) == 1.0
     reference = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.3))
     assert grasp_features.displaced(reference, np.zeros(CLOSE + 1)) is reference
 
@@ -100,11 +101,11 @@ def test_offsets_change_no_faster_than_their_rate_and_go_no_farther_than_their_s
     memory = memory._replace(offset=np.zeros(CLOSE + 1), middle=np.zeros(CLOSE + 1))
     far = np.full(len(ACTIONS), 9.0)
     rate = share * np.array(RATE)
-    assert np.allclose(grasp_features.moved_offset(far, seen, memory), rate)
+    assert np.allclose(offsets(far, seen, memory), rate)
     rate[ALONG] = share * BACK_RATE
-    assert np.allclose(grasp_features.moved_offset(-far, seen, memory), -rate)
+    assert np.allclose(offsets(-far, seen, memory), -rate)
     for _ in range(60):
-        memory = memory._replace(offset=grasp_features.moved_offset(far, seen, memory))
+        memory = memory._replace(offset=offsets(far, seen, memory))
     assert np.allclose(memory.offset, SCALE)
 
 
@@ -120,6 +121,14 @@ def approaching(near, within=0.5, contact=0, behind=0.0):
     return seen, memory._replace(target=ahead, closing=np.float64(-1.0), delay=np.float64(0.0))
 
 
+def offsets(action, seen, memory):
+    return grasp_features.moved_offset(action, grasp_features.met(action, seen, memory), seen, memory)
+
+
+def pace(action, seen, memory):
+    return float(grasp_features.pace(action, grasp_features.met(action, seen, memory), seen, memory))
+
+
 def paced(pace):
     action = np.zeros(len(ACTIONS))
     action[PACE] = pace
@@ -132,11 +141,11 @@ def paced(pace):
 )
 def test_the_middle_of_the_pace_is_a_careful_approach(near, asked, share):
     seen, memory = approaching(near)
-    assert float(grasp_features.pace(paced(asked), seen, memory)) == pytest.approx(share)
+    assert pace(paced(asked), seen, memory) == pytest.approx(share)
     after = near.leaf.advance(paced(asked), seen, memory)
     assert float(after.delay) == pytest.approx((1.0 - share) * near.world.control_period)
     before, _ = approaching(near, within=-0.1)
-    assert float(grasp_features.pace(paced(asked), before, memory)) == 1.0
+    assert pace(paced(asked), before, memory) == 1.0
 
 
 @pytest.mark.parametrize(
@@ -146,12 +155,48 @@ def test_the_middle_of_the_pace_is_a_careful_approach(near, asked, share):
 def test_a_hand_that_stands_on_something_goes_back(near, contact, behind, stands):
     seen, memory = approaching(near, contact=contact, behind=behind)
     memory = memory._replace(offset=np.zeros(CLOSE + 1), middle=np.zeros(CLOSE + 1))
-    along = grasp_features.moved_offset(paced(0.0), seen, memory)[ALONG]
-    assert bool(grasp_features.stands(paced(0.0), seen, memory)) == stands
+    along = offsets(paced(0.0), seen, memory)[ALONG]
+    assert bool(grasp_features.met(paced(0.0), seen, memory).stands) == stands
     assert along == pytest.approx(-BACK_RATE if stands else 0.0)
-    assert float(grasp_features.pace(paced(0.0), seen, memory)) == (0.0 if stands else CAREFUL)
-    assert not grasp_features.stands(paced(HASTE), seen, memory)
-    assert not grasp_features.stands(paced(0.0), seen, memory._replace(closing=np.float64(0.1)))
+    assert pace(paced(0.0), seen, memory) == (0.0 if stands else CAREFUL)
+    assert not grasp_features.met(paced(HASTE), seen, memory).stands
+    assert not grasp_features.met(paced(0.0), seen, memory._replace(closing=np.float64(0.1))).stands
+
+
+def across(speed):
+    action = paced(0.0)
+    action[ACROSS] = speed
+    return action
+
+
+@pytest.mark.parametrize(
+    ("contact", "behind", "closing", "searches"),
+    [
+        (1, 0.004, -1.0, True),
+        (1, 0.0, -1.0, False),
+        (1, 0.0, 0.1, True),
+        (2, 0.0, 0.1, False),
+        (0, 0.0, 0.1, False),
+    ],
+)
+def test_a_search_aside_stays_where_it_has_come(near, contact, behind, closing, searches):
+    seen, memory = approaching(near, contact=contact, behind=behind)
+    zero = np.zeros(CLOSE + 1)
+    memory = memory._replace(offset=zero, middle=zero, closing=np.float64(closing))
+    action = across(-0.5)
+    assert bool(grasp_features.met(action, seen, memory).searches) == searches
+    after = near.leaf.advance(action, seen, memory)
+    share = near.world.control_period / PERIOD
+    expected = -0.5 * share * RATE[ACROSS] if searches else max(-0.25 * SCALE[ACROSS], -share * RATE[ACROSS])
+    assert after.offset[ACROSS] == pytest.approx(expected)
+    assert after.middle[ACROSS] * SCALE[ACROSS] == pytest.approx(expected if searches else 0.0)
+    calm, _ = approaching(near)
+    later = after._replace(closing=np.float64(-1.0), target=memory.target)
+    stays = offsets(across(0.0), calm, later)[ACROSS]
+    assert stays == pytest.approx(expected if searches else 0.0)
+    hurried = action.copy()
+    hurried[PACE] = HASTE
+    assert not grasp_features.met(hurried, seen, memory).searches
 
 
 def test_fingers_come_as_slowly_as_the_pace_until_opposing_ones_touch(near):
