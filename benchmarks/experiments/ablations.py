@@ -41,7 +41,7 @@ NOISES = ("original", "hard")
 HOLDS = (0.4, 0.8, 1.2, 1.6, 2.0, 2.4)
 """Seconds of closing from which the fixed time is chosen, on training draws."""
 HOLD_FILE = "hold.json"
-WINDOW = 1000
+WINDOW = 600
 """Episodes of each lesson but the last: the same for all variants, whatever they succeed in."""
 
 
@@ -85,6 +85,7 @@ def config(variant: str, seed: int, steps: int) -> TrainConfig:
         steps=steps,
         seed=seed,
         success_window=WINDOW,
+        lesson_share=1.0,
         evaluate_every=6,
         evaluation_draws=100,
         reward=Reward(sufficient=variant != "shaping alone"),

@@ -39,6 +39,8 @@ class TrainConfig:
             linearly in the second half: what is rewarded last is nearly what is done without exploration.
         terminate_bias: Bias of the completion signal at the beginning, of which `bt_tasksim.policy.TERMINATE`
             is the threshold: a first policy ends an episode at one decision in 100.
+        lesson_share: A lesson ends after this share of the steps at the latest, whatever it came to: what it
+            was to teach may be beyond a robot's reach, and the last lesson is what counts.
         success_window: Episodes over which the success rate is taken that ends a lesson.
         evaluate_every: Rollouts between two evaluations on held-apart draws; 0: only at the end.
         evaluation_draws: Held-apart draws of each, see `bt_tasksim.training.ppo.CLEARLY`.
@@ -61,6 +63,7 @@ class TrainConfig:
     log_deviation: float = -1.0
     final_log_deviation: float = -2.2
     terminate_bias: float = -0.35
+    lesson_share: float = 0.25
     success_window: int = 300
     evaluate_every: int = 12
     evaluation_draws: int = 200
@@ -92,6 +95,10 @@ class TrainConfig:
                 raise InputError(f"training: '{name}' should be positive, found {value!r}")
         if not 0.0 <= self.gae_lambda <= 1.0:
             raise InputError(f"training: 'gae_lambda' should be between 0 and 1, found {self.gae_lambda!r}")
+        if not 0.0 < self.lesson_share <= 1.0:
+            raise InputError(
+                f"training: 'lesson_share' should be above 0 and at most 1, found {self.lesson_share!r}"
+            )
         for name in ("entropy", "log_deviation", "final_log_deviation", "terminate_bias"):
             value = getattr(self, name)
             if not math.isfinite(value):

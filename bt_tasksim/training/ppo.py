@@ -295,9 +295,13 @@ class _Run:
 
     def _next_lesson(self) -> None:
         lessons = self.scene.lessons
-        if not lessons or self.lesson >= len(lessons) - 1 or len(self.recent) < self.recent.maxlen:  # type: ignore[operator]
+        if not lessons or self.lesson >= len(lessons) - 1:
             return
-        if float(np.mean(self.recent)) >= lessons[self.lesson].until:
+        lesson = lessons[self.lesson]
+        spent = sum(row["lesson"] == lesson.name for row in self.history)
+        late = spent >= self.config.lesson_share * self.config.rollouts
+        enough = len(self.recent) >= self.config.success_window
+        if late or (enough and float(np.mean(self.recent)) >= lesson.until):
             self.lesson += 1
             self.recent.clear()
 

@@ -55,35 +55,46 @@ TILT = (0.2, 1.05)
 NOISE = ("original", "hard")
 
 
+BROAD = ("xarm7_ability",)
+"""Robots whose hand is too broad for the stand: its fingers meet the stand, or what is on it, too early. Of 39
+such draws halfway through a training none succeeded."""
+
+
 def _lesson(
-    name: str, spec: ObjectSpec, noise: tuple[str, ...], tolerance: float = 1.0, until: float = 0.9
+    name: str,
+    spec: ObjectSpec,
+    noise: tuple[str, ...],
+    slanted: bool,
+    tolerance: float = 1.0,
+    until: float = 0.9,
 ) -> Lesson:
-    """Two worlds of three on the table, and one on the stand."""
-    raised = dataclasses.replace(spec, on="stand", area=(0.02, 0.04))
+    """On the table alone; or one world of three on the stand, to which the hand comes slanted."""
     table = Scene(objects={"target": spec})
+    raised = dataclasses.replace(spec, on="stand", area=(0.02, 0.04))
     stand = Scene(fixtures=["stand"], objects={"target": raised})
     return Lesson(
         name,
         noise=noise,
         hand=HAND,
-        tilt=TILT,
-        scenes=(table, table, stand),
+        tilt=TILT if slanted else None,
+        scenes=(table, table, stand) if slanted else (table,),
         tolerance=tolerance,
         until=until,
     )
 
 
-def lessons(**changes: Any) -> tuple[Lesson, ...]:
+def lessons(slanted: bool = True, **changes: Any) -> tuple[Lesson, ...]:
     """The curriculum.
 
     Args:
+        slanted: In one world of three the hand comes slanted.
         changes: Fields of `ObjectSpec` that are other than here, such as ``mass``.
     """
     boxes, shapes = (dataclasses.replace(spec, **changes) for spec in (BOXES, SHAPES))
     return (
-        _lesson("near-boxes", boxes, ("fine", "original"), tolerance=3.0, until=0.6),
-        _lesson("all shapes", shapes, NOISE, tolerance=3.0, until=0.65),
-        _lesson("all shapes, held firmly", shapes, NOISE),
+        _lesson("near-boxes", boxes, ("fine", "original"), slanted, tolerance=3.0, until=0.6),
+        _lesson("all shapes", shapes, NOISE, slanted, tolerance=3.0, until=0.65),
+        _lesson("all shapes, held firmly", shapes, NOISE, slanted),
     )
 
 
@@ -93,7 +104,7 @@ def scene(robot: str = "panda") -> Scene:
         robot,
         objects={"target": UNSEEN},
         goal=Goal("target", "table", relation="lifted", height=LIFT),
-        lessons=lessons(),
+        lessons=lessons(slanted=robot not in BROAD),
         name="grasp_then_pick",
     )
 
