@@ -33,8 +33,9 @@ class TrainConfig:
         clip: Largest relative change of a decision's probability.
         entropy: Weight of the entropy; none, since the deviation below only shrinks when that pays.
         hidden: Sizes of the hidden layers; 64 and 64 decide in 15 microseconds.
-        log_deviation: Logarithm of the actions' standard deviation at the beginning: 0.37. The reference
-            motion is nearly right already, and wider exploration hides what small changes are worth.
+        log_deviation: Logarithm of the actions' standard deviation at the beginning: 0.22. The reference
+            motion is nearly right already: wider exploration hides what small changes are worth, and teaches
+            to keep away from what only exploring makes dangerous.
         final_log_deviation: Largest logarithm of the standard deviation at the end. The bound falls
             linearly in the second half: what is rewarded last is nearly what is done without exploration.
         terminate_bias: Bias of the completion signal at the beginning, of which `bt_tasksim.policy.TERMINATE`
@@ -60,9 +61,9 @@ class TrainConfig:
     clip: float = 0.2
     entropy: float = 0.0
     hidden: tuple[int, ...] = (64, 64)
-    log_deviation: float = -1.0
+    log_deviation: float = -1.5
     final_log_deviation: float = -2.2
-    terminate_bias: float = -0.35
+    terminate_bias: float = 0.0
     lesson_share: float = 0.25
     success_window: int = 300
     evaluate_every: int = 12

@@ -56,8 +56,8 @@ NOISE = ("original", "hard")
 
 
 BROAD = ("xarm7_ability",)
-"""Robots whose hand is too broad for the stand: its fingers meet the stand, or what is on it, too early. Of 39
-such draws halfway through a training none succeeded."""
+"""Robots whose hand is too broad for the stand: its fingers meet the stand, or what is on it, too early.
+Of 39 such draws halfway through a training none succeeded."""
 
 
 def _lesson(

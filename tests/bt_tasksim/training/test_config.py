@@ -55,6 +55,7 @@ def test_rollouts_reach_the_steps_and_no_further_than_they_must(config):
         ({"gae_lambda": 1.5}, "'gae_lambda' should"),
         ({"entropy": math.nan}, "'entropy' should"),
         ({"log_deviation": math.nan}, "'log_deviation' should"),
+        ({"lesson_share": 0.0}, "'lesson_share' should be above 0"),
         ({"terminate_bias": math.inf}, "'terminate_bias' should"),
     ],
 )

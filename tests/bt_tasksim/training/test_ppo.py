@@ -207,6 +207,29 @@ def test_it_learns_what_pays(tmp_path):
     assert last > first + 0.3 and last > 0.6
 
 
+@pytest.mark.parametrize(
+    ("until", "share", "expected"),
+    [(1.0, 0.25, "aabbcccc"), (1.0, 1.0, "aaaaaaaa"), (0.01, 1.0, "abcccccc")],
+)
+def test_a_lesson_ends_with_success_or_when_its_share_is_spent(tmp_path, until, share, expected):
+    config = dataclasses.replace(
+        TINY,
+        steps=8 * 64,
+        success_window=1,
+        terminate_bias=0.4,
+        lesson_share=share,
+        evaluate_every=0,
+        evaluation_draws=0,
+    )
+    tolerance = 1e-3 if until == 1.0 else 1e3
+    lessons = tuple(Lesson(name, until=until, tolerance=tolerance) for name in "abc")
+    scene = dataclasses.replace(SCENE, lessons=lessons)
+    blind = sequence("blind", Train(Raise(height=0.36)), Check(height=0.36, blind=True))
+    train(blind, scene, out=tmp_path / "p", config=config, workers=1)
+    history = json.loads((tmp_path / "p.training" / HISTORY).read_text())
+    assert "".join(row["lesson"] for row in history) == expected
+
+
 def test_nodes_are_trained_in_order_each_with_the_others_as_they_are(tmp_path):
     """The first leaf has no policy but the learned one, without which the second would not be reached."""
     config = dataclasses.replace(TINY, terminate_bias=1.5, log_deviation=-2.0, steps=128, evaluate_every=0)
