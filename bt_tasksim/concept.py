@@ -219,10 +219,11 @@ class ConceptNode(ContextLeaf, abc.ABC):
             return Status.SUCCESS
         if seen.elapsed > model.timeout:
             return self._fail(f"{TIMED_OUT} {model.timeout:g} s: {model.explain(seen, memory)}")
-        context.write(model.command(action.motion, seen, memory), self)
+        command, after = model.carry_out(action.motion, seen, memory)
+        context.write(command, self)
         if model.looks(seen, memory):
             context.look = True
-        self.memory = model.advance(action.motion, seen, memory)
+        self.memory = after
         self.feedback_message = ""
         return Status.RUNNING
 
@@ -343,6 +344,10 @@ class ConceptModel(ConceptNode):
     @abc.abstractmethod
     def command(self, action: Array, seen: Seen, memory: Any) -> Command:
         """The command for an action ``(..., actions)`` of offsets on the reference motion."""
+
+    def carry_out(self, action: Array, seen: Seen, memory: Any) -> tuple[Command, Any]:
+        """What `command` and `advance` say, of one action; to override where both need the same numbers."""
+        return self.command(action, seen, memory), self.advance(action, seen, memory)
 
     def programmed_motion(self, seen: Seen, memory: Any) -> Array:
         """The programmed policy's action ``(..., actions)``; by default none: the reference motion itself."""

@@ -204,12 +204,18 @@ class Grasp(ConceptModel):
 
     def command(self, action: Array, seen: Seen, memory: GraspMemory) -> Command:
         """Follow the path with the hand open, then close; both moved by the action's offsets."""
-        motion = self._motion(action, seen, memory)
-        return Command(tool=motion.target, hand=motion.closed[..., None])
+        return _commanded(self._motion(action, seen, memory))
 
     def advance(self, action: Array, seen: Seen, memory: GraspMemory) -> GraspMemory:
         """Begin to close when the tool has arrived; count the ticks at which the hand holds still."""
+        return self._after(self._motion(action, seen, memory), seen, memory)
+
+    def carry_out(self, action: Array, seen: Seen, memory: GraspMemory) -> tuple[Command, GraspMemory]:
+        """Both, of the same motion."""
         motion = self._motion(action, seen, memory)
+        return _commanded(motion), self._after(motion, seen, memory)
+
+    def _after(self, motion: Motion, seen: Seen, memory: GraspMemory) -> GraspMemory:
         delay, target = motion.delay, motion.target
         gap = poses.norm(seen.tool[..., :3] - target[..., :3])
         arrived = (seen.elapsed - delay >= memory.path.duration) & (gap < self.tolerance)
@@ -293,6 +299,10 @@ class Grasp(ConceptModel):
             f"tool {1000 * float(tool_distance(seen, self.target)):.0f} mm from {self.target}, "
             f"{float(force_at_wrist(seen)):.0f} N at the wrist"
         )
+
+
+def _commanded(motion: Motion) -> Command:
+    return Command(tool=motion.target, hand=motion.closed[..., None])
 
 
 def _tilt(before: Array, now: Array) -> Array:

@@ -61,6 +61,20 @@ def test_an_action_in_batches_is_the_same_one_by_one(near):
             assert not different(name, one, answer, len(near), 1e-9)
 
 
+def test_carrying_an_action_out_is_its_command_and_its_memory(near):
+    rng = np.random.default_rng(1)
+    for k in range(len(near.single)):
+        seen, memory = instant(near, k)
+        action = rng.uniform(-1.0, 1.0, len(ACTIONS))
+        command, after = near.leaf.carry_out(action, seen, memory)
+        expected = near.leaf.command(action, seen, memory)
+        assert np.array_equal(command.tool, expected.tool) and np.array_equal(command.hand, expected.hand)
+        assert all(
+            np.array_equal(a, b)
+            for a, b in zip(after[1:], near.leaf.advance(action, seen, memory)[1:], strict=True)
+        )
+
+
 def test_features_are_as_long_as_the_layout_and_of_the_order_of_one(near):
     size = sum(Grasp.layout(near.robot).values())
     for k in range(near.real):
