@@ -19,6 +19,7 @@ from py_trees.common import Status
 
 from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import BtTasksimError, InputError
+from bt_tasksim.interrupts import held_back
 
 CONFIDENCE = 0.95
 
@@ -159,7 +160,7 @@ def evaluate(
             if progress is not None:
                 progress(found[seed])
     else:
-        with _one_thread_each():
+        with _one_thread_each(), held_back():
             pool = multiprocessing.get_context("spawn").Pool(
                 min(workers, len(seeds)), initializer=_start, initargs=(job, stream)
             )
@@ -212,9 +213,6 @@ _worker: dict[str, Any] = {}
 
 
 def _start(job: Job, stream: str) -> None:
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the workers
     _worker["runner"], _worker["stream"] = _runner(job), stream
 
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim.errors import BtTasksimError, InputError, MachineError
+from bt_tasksim.interrupts import held_back
 from bt_tasksim.network import Network
 from bt_tasksim.poses import Array
 
@@ -148,7 +149,8 @@ class Workers:
         for _ in range(count):
             mine, theirs = context.Pipe()
             process = context.Process(target=_work, args=(make, theirs, [*self._pipes, mine]), daemon=True)
-            process.start()
+            with held_back():
+                process.start()
             theirs.close()
             self._pipes.append(mine)
             self._processes.append(process)
@@ -193,9 +195,6 @@ class Workers:
 
 
 def _work(make: EnvMaker, pipe: Connection, others: list[Connection]) -> None:
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the workers
     os.environ["OMP_NUM_THREADS"] = "1"
     for other in others:
         other.close()
