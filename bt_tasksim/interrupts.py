@@ -9,13 +9,17 @@ from multiprocessing import resource_tracker
 
 
 @contextmanager
-def held_back() -> Iterator[None]:
+def held_back(spawning: bool = False) -> Iterator[None]:
     """SIGINT waits until the end of the block; processes started in it never receive one.
 
     A terminal sends SIGINT to all processes in front. A worker that it ends between two lines may leave a
     lock taken, for which its parent then waits for ever; the parent ends the workers instead.
+
+    Args:
+        spawning: Processes are spawned in the block, not forked.
     """
-    resource_tracker.ensure_running()  # spawning starts it otherwise, and it lets SIGINT through again
+    if spawning:
+        resource_tracker.ensure_running()  # would start in the block otherwise, and lets SIGINT through again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import signal
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,15 @@ from bt_tasksim.robot import load_robot
 from bt_tasksim.runner import Runner
 from bt_tasksim.scene import Goal, ObjectSpec, Scene, SpotSpec
 from bt_tasksim.world import Command, Hidden, Observation
+
+
+@pytest.fixture(scope="session", autouse=True)
+def ctrl_c_arrives() -> Iterator[None]:
+    """A shell's background jobs ignore SIGINT, and so would all that the tests start."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
 
 SCENE = Scene(
     objects={

@@ -160,7 +160,7 @@ def evaluate(
             if progress is not None:
                 progress(found[seed])
     else:
-        with _one_thread_each(), held_back():
+        with _one_thread_each(), held_back(spawning=True):
             pool = multiprocessing.get_context("spawn").Pool(
                 min(workers, len(seeds)), initializer=_start, initargs=(job, stream)
             )

@@ -20,7 +20,7 @@ def wait_and_say(pipe):
 def test_a_process_started_meanwhile_is_never_interrupted(method):
     mine, theirs = multiprocessing.get_context(method).Pipe()
     process = multiprocessing.get_context(method).Process(target=wait_and_say, args=(theirs,))
-    with held_back():
+    with held_back(spawning=method == "spawn"):
         process.start()
     os.kill(process.pid, signal.SIGINT)  # while it starts
     assert mine.poll(20.0) and mine.recv() == "here"
