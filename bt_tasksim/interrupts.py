@@ -10,7 +10,7 @@ from multiprocessing import resource_tracker
 
 @contextmanager
 def held_back(spawning: bool = False) -> Iterator[None]:
-    """SIGINT waits until the end of the block; processes started in it never receive one.
+    """SIGINT to this thread waits until the end of the block; processes started in it never receive one.
 
     A terminal sends SIGINT to all processes in front. A worker that it ends between two lines may leave a
     lock taken, for which its parent then waits for ever; the parent ends the workers instead.

@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import threading
 import time
 
 import pytest
@@ -30,7 +31,7 @@ def test_a_process_started_meanwhile_is_never_interrupted(method):
     assert process.exitcode == 0
 
 
-def test_this_process_is_interrupted_afterwards():
+def test_this_thread_is_interrupted_afterwards():
     reached = False
     with pytest.raises(KeyboardInterrupt), held_back():
         os.kill(os.getpid(), signal.SIGINT)
