@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import threading
 import time
 
 import pytest
@@ -33,6 +34,6 @@ def test_a_process_started_meanwhile_is_never_interrupted(method):
 def test_this_thread_is_interrupted_afterwards():
     reached = False
     with pytest.raises(KeyboardInterrupt), held_back():
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.pthread_kill(threading.get_ident(), signal.SIGINT)  # this thread, not another one
         reached = True
     assert reached and signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, set())
