@@ -19,6 +19,7 @@ from bt_tasksim.arguments import count as _count
 from bt_tasksim.arguments import policy as _policy
 from bt_tasksim.arguments import seed as _seed
 from bt_tasksim.errors import BtTasksimError, InputError
+from bt_tasksim.interrupts import Terminated
 from bt_tasksim.progress import progress
 
 DEMO_LOG = ("demonstrations", "shelf_to_shelf", "00.h5")
@@ -39,8 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return int(options.command(options) or 0)
     except KeyboardInterrupt as stop:
-        print(f"interrupted{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
-        return 130
+        ended = isinstance(stop, Terminated)
+        word = "terminated" if ended else "interrupted"
+        print(f"{word}{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
+        return 143 if ended else 130
     except InputError as error:
         print(f"bt-tasksim: {error}", file=sys.stderr)
         return 2
@@ -89,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     _engine_arguments(run)
     run.add_argument("--out", type=Path, metavar="DIR", help="folder for result, log, pictures and report")
     run.add_argument("--video", action="store_true", help="draw the run: run.mp4, and in the report")
+    run.add_argument("--real-time", action="store_true", help="a simulation, too, keeps the control rate")
 
     policies = add("policies", _policies, "List the learned policies, or choose which one leaves take.")
     policies.add_argument("--folder", type=Path, metavar="DIR", help="list those of another folder, too")
@@ -156,6 +160,9 @@ def _engine_arguments(parser: argparse.ArgumentParser) -> None:
         "--noise", default="fine", metavar="N", help="estimate's error: fine (default), none, original, hard"
     )
     parser.add_argument(
+        "--safety", action="store_true", help="a simulation, too, runs behind the robot's safety limits"
+    )
+    parser.add_argument(
         "--policy",
         action="append",
         default=[],
@@ -170,7 +177,12 @@ def _options(options: argparse.Namespace, rendering: bool = False) -> Any:
     from bt_tasksim.engines.registry import EngineOptions
 
     return EngineOptions(
-        engines=options.engines, perception=options.perception, noise=options.noise, rendering=rendering
+        engines=options.engines,
+        perception=options.perception,
+        noise=options.noise,
+        rendering=rendering,
+        safety=options.safety,
+        real_time=getattr(options, "real_time", False),
     )
 
 
@@ -267,6 +279,8 @@ def _run(options: argparse.Namespace) -> int:
     folder = options.out or Path("runs") / "-".join(parts)
     result, files = _run_tree(source.build(), source.scene, options.seed, engines, folder, source.name)
     print(f"{_summary(result)}; results: {_shown(files)}")
+    if result.timing is not None:
+        print(result.timing)
     return 0 if result.success else 1
 
 

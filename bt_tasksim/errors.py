@@ -22,6 +22,19 @@ class MachineError(BtTasksimError, RuntimeError):
     """The machine failed: a full disk, a lost connection, an engine that stopped."""
 
 
+class SafetyStop(MachineError):  # noqa: N818  # a robot that stops in time has made no error
+    """The robot was stopped, and stays so until a new run.
+
+    Args:
+        message: The sentence: what was exceeded, where and by how much.
+        limit: Name of the limit or the fault, such as ``joint_velocity``.
+    """
+
+    def __init__(self, message: str, limit: str) -> None:
+        super().__init__(message)
+        self.limit = limit
+
+
 class UnreachableError(InputError):
     """A tool pose that the arm cannot bring about.
 

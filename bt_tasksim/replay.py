@@ -117,7 +117,7 @@ def _options(about: Mapping[str, Any], path: Path) -> EngineOptions:
         raise InputError(
             f"'{path}' was run with the option '{min(unknown)}', which this version does not have"
         )
-    return EngineOptions(**{**about["options"], "rendering": False})
+    return EngineOptions(**{**about["options"], "rendering": False, "real_time": False})
 
 
 def _tree(text: str, path: Path) -> Behaviour:

@@ -19,9 +19,14 @@ import numpy as np
 import yaml
 
 from bt_tasksim import poses
+from bt_tasksim.data_file import check_keys as _check_keys
+from bt_tasksim.data_file import names as _names
+from bt_tasksim.data_file import number as _number
+from bt_tasksim.data_file import vector as _vector
 from bt_tasksim.errors import InputError, nearest
 from bt_tasksim.poses import Array, array_namespace
 from bt_tasksim.resources import asset
+from bt_tasksim.safety.limits import SafetyLimits, read_limits
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,8 @@ class RobotDescription:
         solver_iterations: Position iterations of a physics engine that solves contacts by iteration: as many
             as keep the fingers from sinking into what they press on.
         cameras: By name: pose, size and field of view; see the rendering engine.
+        safety: What a real robot must never exceed; None where the file does not say, and then no real robot
+            of this kind is driven.
         source: Path of the data file.
     """
 
@@ -137,6 +144,7 @@ class RobotDescription:
     envelope: tuple[tuple[Array, tuple[float, float, float]], ...]
     solver_iterations: int
     cameras: Mapping[str, Any]
+    safety: SafetyLimits | None
     source: Path
 
     @property
@@ -240,28 +248,11 @@ _KEYS: Mapping[str, Any] = {
 _OPTIONAL: Mapping[str, Any] = {
     "task_mask": None,
     "cameras": None,
+    "safety": None,
     "solver_iterations": None,
     "arm": {"posture": None},
     "hand": {"synergies": None, "drive_scale": None},
 }
-
-
-def _check_keys(
-    data: Any, where: str, needed: Mapping[str, Any], optional: Mapping[str, Any] | None = None
-) -> None:
-    """Says which key is missing, or unknown and what it may have been meant to be."""
-    if not isinstance(data, dict):
-        raise InputError(f"'{where.rstrip('.')}' should be a mapping, found {data!r}")
-    optional = optional or {}
-    known = {*needed, *optional}
-    for key in data:
-        if key not in known:
-            raise InputError(f"unknown key '{where}{key}'{nearest(str(key), known)}")
-    for key, inner in needed.items():
-        if key not in data:
-            raise InputError(f"'{where}{key}' is missing")
-        if inner is not None:
-            _check_keys(data[key], f"{where}{key}.", inner, optional.get(key))
 
 
 def _description(data: Mapping[str, Any], path: Path) -> RobotDescription:
@@ -305,6 +296,7 @@ def _description(data: Mapping[str, Any], path: Path) -> RobotDescription:
         envelope=tuple(_box(b) for b in data["envelope"]),
         solver_iterations=int(_number(data.get("solver_iterations", 15), "solver_iterations")),
         cameras=data.get("cameras") or {},
+        safety=read_limits(data["safety"], data["arm"]) if "safety" in data else None,
         source=path,
     )
 
@@ -368,18 +360,6 @@ def _box(values: Any) -> tuple[Array, tuple[float, float, float]]:
     return _pose([*position, *rotation], "envelope.rotation"), (x, y, z)
 
 
-def _names(values: Any, what: str) -> tuple[str, ...]:
-    if not isinstance(values, list) or not values or not all(isinstance(v, str) for v in values):
-        raise InputError(f"{what} should be a list of names, found {values!r}")
-    return tuple(values)
-
-
-def _number(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise InputError(f"{what} should be a number, found {value!r}")
-    return float(value)
-
-
 def _pose(values: Any, what: str) -> Array:
     """A pose ``(7,)`` with its quaternion normalised, for files that give a few digits."""
     array = np.array(_vector(values, 7, what))
@@ -387,17 +367,6 @@ def _pose(values: Any, what: str) -> Array:
     if abs(length - 1.0) > 1e-3:
         raise InputError(f"{what} should end with a unit quaternion (w x y z), found {values!r}")
     array[3:] /= length
-    array.setflags(write=False)
-    return array
-
-
-def _vector(values: Any, n: int, what: str) -> Array:
-    try:
-        array = np.array(values, float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != (n,) or not np.all(np.isfinite(array)):
-        raise InputError(f"{what} should be {n} finite numbers, found {values!r}")
     array.setflags(write=False)
     return array
 

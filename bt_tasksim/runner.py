@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 
 from py_trees.behaviour import Behaviour
@@ -17,8 +18,10 @@ from bt_tasksim.concept import ConceptNode
 from bt_tasksim.context import Context
 from bt_tasksim.engines.pipeline import EnginePipeline
 from bt_tasksim.engines.registry import EngineOptions, build_pipeline
-from bt_tasksim.errors import BtTasksimError, LeafError, UnreachableError
+from bt_tasksim.errors import BtTasksimError, LeafError, SafetyStop, UnreachableError
+from bt_tasksim.interrupts import ending, terminable
 from bt_tasksim.judge import Verdict, at_rest, judge
+from bt_tasksim.pacing import Timing
 from bt_tasksim.robot import load_robot
 from bt_tasksim.scene import ActorConfiguration, Scene
 from bt_tasksim.world import Command, Observation, WorldModel
@@ -55,6 +58,7 @@ class Result:
         wall_time: Seconds it took.
         policies: Policy in use by leaf.
         configuration: The world as drawn.
+        timing: How well the control rate was kept; None where there was none to keep.
     """
 
     status: Status
@@ -68,6 +72,7 @@ class Result:
     wall_time: float
     policies: dict[str, str]
     configuration: ActorConfiguration
+    timing: Timing | None = None
 
 
 @dataclass
@@ -129,9 +134,11 @@ class Runner:
         Raises:
             LeafError: A leaf raised an exception; every node has ended and the robot holds.
         """
+        assert self.pipeline is not None
         started = time.perf_counter()
-        configuration, world = self.begin(seed, stream)
-        return self.finish(configuration, world, started, record)
+        with terminable() if self.pipeline.real else nullcontext():
+            configuration, world = self.begin(seed, stream)
+            return self.finish(configuration, world, started, record)
 
     def finish(
         self,
@@ -140,27 +147,26 @@ class Runner:
         started: float | None = None,
         record: Callable[[Step], None] | None = None,
     ) -> Result:
-        """Tick until the tree ends, let things come to rest, and judge."""
+        """Tick until the tree ends, let things come to rest, and judge.
+
+        However it ends, every node has ended then, and a real robot holds.
+        """
         assert self.pipeline is not None
         started = time.perf_counter() if started is None else started
-        context, pipeline, tree = self.context, self.pipeline, self.tree
-        steps, reason, why = 0, "", ""
-        limit = round(self.longest * configuration.control_frequency)
-        while True:
-            command = self.tick()
-            if record is not None:
-                record(Step(context.observation, command, tree.status, pipeline))
-            if tree.status != Status.RUNNING:
-                break
-            if steps >= limit:
-                tree.stop(Status.INVALID)
-                reason, why = "time over", f"not done within {self.longest:g} s"
-                break
-            self.step(command)
-            steps += 1
-        status = tree.status
-        sim_time = context.now
-        verdict = self._settle_and_judge(configuration, world, record)
+        pipeline, tree = self.pipeline, self.tree
+        try:
+            steps, reason, why = self._loop(configuration, record)
+            status = tree.status
+            sim_time, timing = self.context.now, pipeline.timing()
+            verdict = self._settle_and_judge(configuration, world, record)
+            pipeline.stop("the run is over")
+        except BaseException as error:
+            with ending():
+                end_all(tree, None)
+                pipeline.stop(f"{type(error).__name__}: {error}".removesuffix(": "))
+            if pipeline.real and isinstance(error, KeyboardInterrupt):
+                raise type(error)("every node has ended, and the arm holds") from error
+            raise
         if status == Status.SUCCESS:
             why = "the tree succeeded; there is no ground truth to judge it by"
             if verdict is not None:
@@ -187,7 +193,37 @@ class Runner:
                 leaf.name: leaf.policy_in_use.name for leaf in tree.iterate() if isinstance(leaf, ConceptNode)
             },
             configuration=configuration,
+            timing=timing,
         )
+
+    def _loop(
+        self, configuration: ActorConfiguration, record: Callable[[Step], None] | None
+    ) -> tuple[int, str, str]:
+        """Tick and step until the tree ends or is ended.
+
+        Returns:
+            Steps, and where the tree was ended the countable reason and the sentence.
+        """
+        context, pipeline, tree = self.context, self.pipeline, self.tree
+        assert pipeline is not None
+        steps, limit = 0, round(self.longest * configuration.control_frequency)
+        while True:
+            command = self.tick()
+            if record is not None:
+                record(Step(context.observation, command, tree.status, pipeline))
+            if tree.status != Status.RUNNING:
+                return steps, "", ""
+            if steps >= limit:
+                tree.stop(Status.INVALID)
+                return steps, "time over", f"not done within {self.longest:g} s"
+            try:
+                self.step(command)
+            except SafetyStop as stop:
+                leaf = context.tool_writer or tree.tip() or tree
+                end_all(tree, None)
+                why = f"{leaf.name}: {stop}; the arm holds"
+                return steps, f"safety stop, {stop.limit.replace('_', ' ')}", why
+            steps += 1
 
     def step(self, command: Command) -> None:
         """Carry a command out for one control period, and observe.

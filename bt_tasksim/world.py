@@ -8,6 +8,7 @@ stand in `WorldModel`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -259,10 +260,12 @@ class JointTarget:
     Attributes:
         position: ``(..., n_joints)`` in the robot's joint order (arm, then hand).
         velocity: ``(..., n_joints)``.
+        validity: Seconds after which a real robot that has heard nothing newer holds by itself.
     """
 
     position: Array
     velocity: Array
+    validity: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)

@@ -105,6 +105,14 @@ class ToyWorld:
     def hidden(self) -> Hidden | None:
         return None
 
+    real = False
+
+    def stop(self, why: str) -> None:
+        pass
+
+    def timing(self) -> None:
+        return None
+
 
 class Toy:
     """A tree in a toy world, ticked by the real runner."""

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
+from bt_tasksim.pacing import Clock, FreeClock, Timing
 from bt_tasksim.poses import Array
 from bt_tasksim.scene import ActorConfiguration
 from bt_tasksim.world import Command, Hidden, JointTarget, Observation, WorldModel, WorldState
@@ -111,6 +112,7 @@ class EnginePipeline:
         physics: See `PhysicsEngine`.
         postprocess: See `PostProcessEngine`.
         rendering: See `RenderingEngine`; None where nothing is ever drawn.
+        clock: The clock that the physics role waits for; by default none, as fast as possible.
     """
 
     def __init__(
@@ -119,11 +121,13 @@ class EnginePipeline:
         physics: PhysicsEngine,
         postprocess: PostProcessEngine,
         rendering: RenderingEngine | None = None,
+        clock: Clock | None = None,
     ) -> None:
         self.kinematics = kinematics
         self.physics = physics
         self.postprocess = postprocess
         self.rendering = rendering
+        self.clock = clock or FreeClock()
         self.state: WorldState | None = None
         self.last: Command = Command()
 
@@ -177,6 +181,21 @@ class EnginePipeline:
         if self.rendering is None or self.state is None:
             raise RuntimeError("nothing can be drawn: the pipeline has no rendering engine or was not reset")
         return self.rendering.render(self.state, camera, depth=depth)
+
+    @property
+    def real(self) -> bool:
+        """What it moves is a real robot."""
+        return bool(getattr(self.physics, "real", False))
+
+    def stop(self, why: str) -> None:
+        """The run is over, or has to be: a robot holds until the next `reset`; a simulation need not."""
+        hold: Any = getattr(self.physics, "hold", None)
+        if hold is not None:
+            hold(why)
+
+    def timing(self) -> Timing | None:
+        """How well the rate was kept; None where there is none to keep."""
+        return self.clock.timing()
 
     def close(self) -> None:
         """Let go of what the engines hold."""

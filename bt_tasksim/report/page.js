@@ -40,6 +40,7 @@ function header() {
     if (v.angle_error !== null) numbers["angle error"] = `${(180 / Math.PI * v.angle_error).toFixed(2)} degrees`;
     numbers["deepest penetration"] = `${(1000 * v.penetration).toFixed(2)} mm`;
   }
+  if (a.timing) numbers["control rate"] = a.timing.summary;
   numbers["object curves show"] = DATA.objectsAre;
   for (const [key, value] of Object.entries({ ...numbers, ...a.versions })) {
     make("dt", {}, byId("numbers"), key);

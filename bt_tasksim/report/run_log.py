@@ -286,6 +286,9 @@ def about(result: Result, runner: Runner, scenario: str) -> dict[str, Any]:
         "control_frequency": result.configuration.control_frequency,
         "sim_time": result.sim_time,
         "wall_time": result.wall_time,
+        "timing": None
+        if result.timing is None
+        else {**dataclasses.asdict(result.timing), "summary": str(result.timing)},
         "verdict": numbers,
         "versions": versions(runner.robot),
     }

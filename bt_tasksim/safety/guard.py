@@ -1,0 +1,278 @@
+"""The guard: checks every command before it is sent and every state before it is used, and stops for good.
+
+It stands between kinematics and the physics role. What goes out is what came in, or slowed down where the
+limit's policy says clip; after a stop it is a hold and nothing else, until a new run begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bt_tasksim.errors import InputError, SafetyStop
+from bt_tasksim.poses import Array
+from bt_tasksim.robot import RobotDescription
+from bt_tasksim.safety import checks
+from bt_tasksim.safety.checks import Breach
+from bt_tasksim.safety.engine import JointReading
+from bt_tasksim.safety.limits import SafetyLimits
+from bt_tasksim.safety.motion import Motion, braked, followed, moved
+from bt_tasksim.world import JointTarget
+
+_RAMP = 200
+"""Most periods of a ramp; from every speed within the limits it takes far fewer."""
+_HALVINGS = 8
+"""Steps in which the largest gentle enough change of speed is looked for."""
+_MOVED = 0.02
+"""Radians that a command has moved while the reported joints have not changed by a bit: they are frozen."""
+
+
+class Guard:
+    """Checks one robot's commands and states.
+
+    Args:
+        robot: The robot, with its ``safety`` limits.
+        forward: Tool pose ``(7,)`` of joints ``(n_joints,)``.
+
+    Raises:
+        InputError: The robot's file has no section ``safety``.
+    """
+
+    def __init__(self, robot: RobotDescription, forward: Callable[[Array], Array]) -> None:
+        if robot.safety is None:
+            raise InputError(
+                f"robot file '{robot.source}' has no section 'safety'; a robot needs its limits before it is "
+                f"moved: see docs/safety.md"
+            )
+        self.robot, self.limits, self.forward = robot, robot.safety, forward
+        self.names = robot.joints
+        self._n = len(robot.arm_joints)
+        self.lower, self.upper, self.velocity, self.acceleration = _bounds(robot, robot.safety)
+        self.stopped: SafetyStop | None = None
+        self.begin(np.zeros(len(self.names)), 0.05)
+
+    def begin(self, position: Array, period: float) -> None:
+        """Begin a run: an earlier stop is over.
+
+        Args:
+            position: Joints ``(n_joints,)`` where the robot stands.
+            period: Seconds between two commands.
+
+        Raises:
+            InputError: Commands would expire between two of them.
+        """
+        if 2.0 * period > self.limits.validity:
+            raise InputError(
+                f"commands every {1000 * period:.0f} ms cannot expire after "
+                f"{1000 * self.limits.validity:.0f} ms: raise the control frequency to "
+                f"{2.0 / self.limits.validity:.1f} Hz at least, or raise safety.timing.validity in "
+                f"'{self.robot.source}'"
+            )
+        self.period = period
+        self.stopped = None
+        still = np.zeros_like(position)
+        self.motion = Motion(np.array(position, float), still)
+        self._reference = self.motion
+        self._tool = self.forward(self.motion.position)
+        self._twist = np.zeros(6)
+        self._reading: JointReading | None = None
+        self._changed: tuple[float, Array] | None = None
+
+    # ---- commands ---------------------------------------------------------------------------------------
+
+    def command(self, target: JointTarget) -> JointTarget:
+        """The target to send.
+
+        Raises:
+            SafetyStop: A limit would be exceeded, or the guard has stopped already.
+        """
+        if self.stopped is not None:
+            raise self.stopped
+        position = np.asarray(target.position, float)
+        self._stop_at(checks.shape_and_numbers(position, np.asarray(target.velocity, float), self.names))
+        wanted = moved(self._reference, position, self.period)
+        self._stop_at(self._refused(wanted))
+        motion = self._clipped(wanted)
+        tool, twist = self._tool_motion(motion)
+        if self.limits.clips("tool_acceleration") and checks.tool_acceleration(
+            self._twist, twist, self.period, self.limits
+        ):
+            motion, tool, twist = self._gentler(motion)
+        self._stop_at(self._exceeded(motion, tool, twist))
+        if np.array_equal(motion.position, position):
+            sent = replace(target, validity=self.limits.validity)
+        else:
+            sent = JointTarget(motion.position, motion.velocity, self.limits.validity)
+        self._reference, self.motion, self._tool, self._twist = wanted, motion, tool, twist
+        return sent
+
+    def _refused(self, wanted: Motion) -> Breach | None:
+        """Limits that stop, and that the command itself exceeds, whatever clipping would make of it."""
+        limits, n = self.limits, self._n
+        found = None
+        if not limits.clips("joint_position"):
+            found = checks.joint_position(wanted.position, self.lower, self.upper, self.names)
+        if found is None and not limits.clips("joint_velocity"):
+            found = checks.joint_step(
+                self._reference.position[:n], wanted.position[:n], limits.step, self.names
+            ) or checks.joint_velocity(wanted.velocity, self.velocity, self.names)
+        return found
+
+    def _clipped(self, wanted: Motion) -> Motion:
+        """The wanted motion, within those joint limits that clip."""
+        clips, endless = self.limits.clips, np.full(len(self.names), np.inf)
+        if not (clips("joint_position") or clips("joint_velocity") or clips("joint_acceleration")):
+            return moved(self.motion, wanted.position, self.period)
+        inside = np.minimum(np.maximum(wanted.position, self.lower), self.upper)
+        velocity = np.where(inside == wanted.position, wanted.velocity, 0.0)
+        return followed(
+            self.motion,
+            Motion(inside, velocity),
+            self.velocity,
+            self.acceleration if clips("joint_acceleration") else endless,
+            self.lower,
+            self.upper,
+            self.period,
+        )
+
+    def _gentler(self, motion: Motion) -> tuple[Motion, Array, Array]:
+        """The motion whose change of joint speeds is the largest share that keeps the tool's acceleration."""
+        share, step = 0.0, 0.5
+        change = motion.velocity - self.motion.velocity
+        found = None
+        for _ in range(_HALVINGS):
+            velocity = self.motion.velocity + (share + step) * change
+            tried = Motion(self.motion.position + self.period * velocity, velocity)
+            tool, twist = self._tool_motion(tried)
+            if checks.tool_acceleration(self._twist, twist, self.period, self.limits) is None:
+                share, found = share + step, (tried, tool, twist)
+            step /= 2.0
+        return found or (motion, *self._tool_motion(motion))
+
+    def _tool_motion(self, motion: Motion) -> tuple[Array, Array]:
+        tool = self.forward(motion.position)
+        return tool, checks.twist(self._tool, tool, self.period)
+
+    def _exceeded(self, motion: Motion, tool: Array, twist: Array) -> Breach | None:
+        """What would be sent exceeds a limit."""
+        limits, names, n = self.limits, self.names, self._n
+        rest = self._ramp(motion)[-1].position
+        could_not_stop = "could not stop before"
+        return (
+            checks.joint_position(motion.position, self.lower, self.upper, names)
+            or checks.joint_position(rest, self.lower, self.upper, names, could_not_stop)
+            or checks.joint_velocity(motion.velocity, self.velocity, names)
+            or checks.joint_acceleration(self.motion, motion, self.acceleration, self.period, names)
+            or checks.joint_step(self.motion.position[:n], motion.position[:n], limits.step, names)
+            or checks.tool_velocity(twist, limits)
+            or checks.tool_acceleration(self._twist, twist, self.period, limits)
+            or checks.workspace(tool[:3], limits.workspace)
+            or checks.workspace(
+                self.forward(rest)[:3], limits.workspace, "the tool could not stop before it is"
+            )
+        )
+
+    # ---- states -----------------------------------------------------------------------------------------
+
+    def reading(self, reading: JointReading, now: float) -> None:
+        """Look at joint states.
+
+        Args:
+            reading: The newest ones.
+            now: Seconds of `time.monotonic`.
+
+        Raises:
+            SafetyStop: They are not to be trusted, or the robot does not do what it is told.
+        """
+        if self.stopped is not None:
+            raise self.stopped
+        limits, names, n = self.limits, self.names, self._n
+        self._stop_at(checks.joint_names(reading.names, names))
+        self._stop_at(checks.reported_numbers((reading.position, reading.velocity), names))
+        self._stop_at(checks.fresh(now - reading.stamp, limits.stale))
+        before, arm = self._reading, reading.position[:n]
+        if before is not None and reading.stamp > before.stamp:
+            elapsed = reading.stamp - before.stamp
+            self._stop_at(checks.plausible(before.position[:n], arm, elapsed, self.velocity[:n], names))
+        self._stop_at(self._frozen(reading, now))
+        self._stop_at(checks.tracking(self.motion.position[:n], arm, limits.tracking, names))
+        self._reading = reading
+
+    def _frozen(self, reading: JointReading, now: float) -> Breach | None:
+        """Joint states arrive and do not change, while commands do."""
+        commanded, n = self.motion.position, self._n
+        before = self._reading
+        if self._changed is None or before is None or not np.array_equal(before.position, reading.position):
+            self._changed = (now, commanded)
+            return None
+        since, then = self._changed
+        way = float(np.max(np.abs(commanded - then)[:n], initial=0.0))
+        if now - since <= self.limits.stale or way <= _MOVED:
+            return None
+        return Breach(
+            "stale",
+            f"stale: joint states have not changed for {1000 * (now - since):.0f} ms, while commands moved "
+            f"by {way:.3g} rad",
+        )
+
+    def wrench(self, wrench: Array) -> None:
+        """Look at the external wrench ``(6,)`` on the tool.
+
+        Raises:
+            SafetyStop: It is too large.
+        """
+        if self.stopped is not None:
+            raise self.stopped
+        self._stop_at(checks.wrench(wrench, self.limits.force, self.limits.torque))
+
+    # ---- stopping ---------------------------------------------------------------------------------------
+
+    def stop(self, limit: str, sentence: str) -> SafetyStop:
+        """Stop for good, and return what to raise; the first reason is the one that counts."""
+        if self.stopped is None:
+            self.stopped = SafetyStop(sentence, limit)
+        return self.stopped
+
+    def _stop_at(self, breach: Breach | None) -> None:
+        if breach is not None:
+            raise self.stop(breach.limit, breach.sentence)
+
+    def ramp(self) -> tuple[JointTarget, ...]:
+        """Targets, one a period, that bring the commanded motion to rest within its limits."""
+        return tuple(
+            JointTarget(m.position, m.velocity, self.limits.validity) for m in self._ramp(self.motion)
+        )
+
+    def _ramp(self, motion: Motion) -> Sequence[Motion]:
+        out = []
+        for _ in range(_RAMP):
+            motion = braked(motion, self.acceleration, self.period)
+            out.append(motion)
+            if not np.any(motion.velocity):
+                break
+        return out
+
+    def brake(self) -> JointTarget:
+        """The next target of the ramp, for an engine that takes one at a time."""
+        self.motion = braked(self.motion, self.acceleration, self.period)
+        return JointTarget(self.motion.position, self.motion.velocity, self.limits.validity)
+
+
+def _bounds(robot: RobotDescription, limits: SafetyLimits) -> tuple[Array, Array, Array, Array]:
+    """Limits ``(n_joints,)``: the arm's, and those that follow from the hand's range and speed."""
+    low = np.minimum(robot.hand_open, robot.hand_closed)
+    high = np.maximum(robot.hand_open, robot.hand_closed)
+    span = np.abs(robot.hand_closed - robot.hand_open)
+    if len(robot.synergies):
+        low = low + np.minimum(robot.synergy_directions, 0.0).sum(axis=0)
+        high = high + np.maximum(robot.synergy_directions, 0.0).sum(axis=0)
+        span = np.maximum(span, np.abs(robot.synergy_directions).max(axis=0))
+    speed = np.maximum(span, 1e-6) * robot.hand_speed
+    return (
+        np.concatenate([limits.lower, low - checks.TOLERANCE]),
+        np.concatenate([limits.upper, high + checks.TOLERANCE]),
+        np.concatenate([limits.velocity, speed]),
+        np.concatenate([limits.acceleration, np.full(len(low), np.inf)]),
+    )

@@ -1,0 +1,172 @@
+"""A real robot in the physics role: guard, clock, watchdog and emergency stop around its engine.
+
+Everything that can go wrong in a run ends here, in one way: the first reason counts, the arm holds, and
+`SafetyStop` tells the runner.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+from bt_tasksim.errors import MachineError, SafetyStop
+from bt_tasksim.pacing import Clock
+from bt_tasksim.safety.engine import RealEngine
+from bt_tasksim.safety.guard import Guard
+from bt_tasksim.safety.watchdog import Watchdog
+from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.world import Hidden, JointTarget, WorldState
+
+
+class GuardedRobot:
+    """The physics engine that a pipeline gets for a real robot.
+
+    Attributes:
+        real: What it moves is no simulation.
+
+    Args:
+        engine: The robot's engine.
+        guard: The guard.
+        clock: A clock of real time.
+    """
+
+    def __init__(self, engine: RealEngine, guard: Guard, clock: Clock) -> None:
+        self.engine, self.guard, self.clock = engine, guard, clock
+        self.real = True
+        self.watchdog: Watchdog | None = None
+        self._lock = threading.RLock()  # an interrupt during a hold leads to another one
+        self._held = True
+        self._sent = 0.0
+        engine.emergency.listen(self._emergency)
+
+    def reset(self, configuration: ActorConfiguration) -> WorldState:
+        """See `PhysicsEngine.reset`: a new run, which ends an earlier stop.
+
+        Raises:
+            MachineError: The emergency stop is pressed, or the robot or the watchdog is not there.
+            SafetyStop: Its joint states are not to be trusted.
+        """
+        self.hold("a new run begins")
+        if self.engine.emergency.held_down():
+            raise MachineError("the emergency stop is pressed; release it, and start again")
+        self.engine.emergency.release()
+        self._start_watchdog()
+        self.guard.stopped = None
+        self._held = False
+        try:
+            return self._begin(configuration)
+        except BaseException as error:
+            self.hold(f"the run did not begin: {error}")
+            raise
+
+    def _begin(self, configuration: ActorConfiguration) -> WorldState:
+        state = self.engine.reset(configuration)
+        reading = self.engine.latest()
+        self.guard.begin(reading.position, 1.0 / configuration.control_frequency)
+        self.guard.reading(reading, time.monotonic())
+        self.guard.wrench(state.wrench)
+        self._stamp = reading.stamp
+        self._sent = 0.0
+        self.clock.start(1.0 / configuration.control_frequency)
+        return state
+
+    def step(self, target: JointTarget) -> WorldState:
+        """Send one command, wait until the next tick begins, and read.
+
+        Raises:
+            SafetyStop: Something was wrong; the arm holds, and will until `reset`.
+        """
+        try:
+            self._before(time.monotonic())
+            sent = self.guard.command(target)
+            self.engine.send(sent)
+            self._sent = time.monotonic()
+            self.clock.acted(self._sent - self._stamp)
+            self.clock.wait()
+            self._beat()
+            return self._read()
+        except MachineError as error:
+            stop = self._reason(error)
+            self.hold(str(stop))
+            if stop is error:
+                raise
+            raise stop from error
+
+    def hidden(self) -> Hidden | None:
+        """Nobody knows the truth."""
+        return None
+
+    def hold(self, why: str) -> None:
+        """The arm holds, and nothing moves it until `reset`; a second call does nothing.
+
+        Where the engine cannot tell the robot, the watchdog does it in its own way; and commands expire.
+        """
+        with self._lock:
+            if self._held:
+                return
+            self.guard.stop("ended", why)
+            try:
+                self.engine.hold(self.guard.ramp(), why)
+            except MachineError:
+                if self.watchdog is not None:
+                    self.watchdog.hold()
+            else:
+                if self.watchdog is not None:
+                    self.watchdog.rest()
+            self._held = True
+
+    def close(self) -> None:
+        """Hold, and let go of the watchdog and the engine."""
+        self.hold("the run is over")
+        if self.watchdog is not None:
+            self.watchdog.close()
+            self.watchdog = None
+        close: Any = getattr(self.engine, "close", None)
+        if close is not None:
+            close()
+
+    def _start_watchdog(self) -> None:
+        if self.watchdog is not None:
+            if not self.watchdog.trouble():
+                return
+            self.watchdog.close()
+            self.watchdog = None
+        channel = self.engine.hold_channel()
+        if channel is not None:
+            self.watchdog = Watchdog(channel, self.guard.limits.watchdog)
+
+    def _before(self, now: float) -> None:
+        """What must hold before a command goes out."""
+        guard = self.guard
+        if guard.stopped is not None:
+            raise guard.stopped
+        self._beat()
+        if self._sent and now - self._sent > guard.limits.validity:
+            said = f"late: no command for {1000 * (now - self._sent):.0f} ms, and the last one has expired"
+            raise guard.stop("late", said)
+        guard.reading(self.engine.latest(), now)
+
+    def _reason(self, error: MachineError) -> SafetyStop:
+        if isinstance(error, SafetyStop):
+            return error
+        return self.guard.stop("engine", f"the robot's engine failed: {error}")
+
+    def _read(self) -> WorldState:
+        reading = self.engine.latest()
+        self.guard.reading(reading, time.monotonic())
+        self._stamp = reading.stamp
+        state = self.engine.state()
+        self.guard.wrench(state.wrench)
+        return state
+
+    def _beat(self) -> None:
+        if self.watchdog is not None:
+            if trouble := self.watchdog.trouble():
+                raise self.guard.stop("watchdog", trouble)
+            self.watchdog.beat()
+
+    def _emergency(self, why: str) -> None:
+        """On the thread of whatever pressed it: the arm holds at once."""
+        stop = self.guard.stop("emergency_stop", f"emergency stop: {why}")
+        self.hold(str(stop))

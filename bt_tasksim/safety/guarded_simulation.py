@@ -1,0 +1,66 @@
+"""A simulation behind the guard, to see what the guard would do to a tree before a robot is moved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from bt_tasksim.errors import SafetyStop
+from bt_tasksim.safety.engine import JointReading
+from bt_tasksim.safety.guard import Guard
+from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.world import Hidden, JointTarget, WorldState
+
+if TYPE_CHECKING:
+    from bt_tasksim.engines.pipeline import PhysicsEngine
+
+
+class GuardedSimulation:
+    """A physics engine whose every command and state is checked; after a stop it brakes and holds.
+
+    Args:
+        inner: The simulation.
+        guard: The guard.
+    """
+
+    def __init__(self, inner: PhysicsEngine, guard: Guard) -> None:
+        self.inner, self.guard = inner, guard
+
+    def reset(self, configuration: ActorConfiguration) -> WorldState:
+        """See `PhysicsEngine.reset`."""
+        state = self.inner.reset(configuration)
+        self.guard.begin(state.joint_position, 1.0 / configuration.control_frequency)
+        return state
+
+    def step(self, target: JointTarget) -> WorldState:
+        """See `PhysicsEngine.step`; after a stop, whatever the target, the arm slows down and holds.
+
+        Raises:
+            SafetyStop: A limit would be, or is, exceeded; once.
+        """
+        guard = self.guard
+        if guard.stopped is not None:
+            return self.inner.step(guard.brake())
+        try:
+            sent = guard.command(target)
+        except SafetyStop:
+            self.inner.step(guard.brake())
+            raise
+        state = self.inner.step(sent)
+        now = float(state.time)
+        guard.reading(JointReading(guard.names, state.joint_position, state.joint_velocity, now), now)
+        guard.wrench(state.wrench)
+        return state
+
+    def hidden(self) -> Hidden | None:
+        """See `PhysicsEngine.hidden`."""
+        return self.inner.hidden()
+
+    def hold(self, why: str) -> None:
+        """Accept no more targets."""
+        self.guard.stop("ended", why)
+
+    def close(self) -> None:
+        """Close the simulation."""
+        close: Any = getattr(self.inner, "close", None)
+        if close is not None:
+            close()

@@ -1,0 +1,122 @@
+"""Commanded joint motion in discrete time: braking, and following a reference within limits.
+
+Time is divided into control periods of T seconds. A motion is a position and the velocity that led there in
+the last period, so the next position is q + T v with the next velocity v, which may differ from the last by
+a T where a is the acceleration limit. All functions take arrays of joints ``(n,)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from bt_tasksim.poses import Array
+
+_SLACK = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Where the joints were last told to be, and how fast they went there.
+
+    Attributes:
+        position: ``(n,)`` rad or m.
+        velocity: ``(n,)`` rad/s or m/s, over the last period.
+    """
+
+    position: Array
+    velocity: Array
+
+
+def moved(before: Motion, position: Array, period: float) -> Motion:
+    """The motion to a position ``(n,)`` within one period."""
+    return Motion(position, (position - before.position) / period)
+
+
+def braking_distance(velocity: Array, acceleration: Array, period: float) -> Array:
+    """How far joints get ``(n,)`` after the last period, slowing down by a T in each until they stand.
+
+    Speeds v - a T, v - 2 a T, ... are summed up while they are positive.
+    """
+    speed, change = np.abs(velocity), acceleration * period
+    n = np.where(np.isfinite(change), np.floor(speed / change), 0.0)
+    return period * (n * speed - np.where(n > 0.0, change, 0.0) * n * (n + 1.0) / 2.0)
+
+
+def stopping_speed(room: Array, acceleration: Array, period: float) -> Array:
+    """Greatest speed ``(n,)`` of the next period from which joints come to stand within ``room (n,)``.
+
+    The inverse of v T + `braking_distance` (v): at v = m a T that is a T^2 m (m + 1) / 2, between them it
+    rises straight.
+    """
+    endless = np.isinf(room)
+    room = np.where(endless, 0.0, np.maximum(room, 0.0))
+    unit = acceleration * period * period
+    m = np.floor((np.sqrt(1.0 + 8.0 * room / unit) - 1.0) / 2.0)
+    rest = room - np.where(m > 0.0, unit, 0.0) * m * (m + 1.0) / 2.0
+    speed = np.where(m > 0.0, acceleration * period, 0.0) * m + rest / ((m + 1.0) * period)
+    return np.where(endless, np.inf, speed)
+
+
+def braked(before: Motion, acceleration: Array, period: float) -> Motion:
+    """The next motion of joints that slow down as fast as they may."""
+    slower = np.maximum(np.abs(before.velocity) - acceleration * period, 0.0)
+    velocity = np.sign(before.velocity) * slower
+    return Motion(before.position + period * velocity, velocity)
+
+
+def followed(
+    before: Motion,
+    reference: Motion,
+    velocity: Array,
+    acceleration: Array,
+    lower: Array,
+    upper: Array,
+    period: float,
+) -> Motion:
+    """The next motion of joints that follow a reference as closely as limits allow.
+
+    Where the reference keeps the limits and the joints are on it, the result is the reference. Joints that
+    have fallen behind catch up at a speed, relative to the reference, from which they can stop on it. A joint
+    never moves so fast that it could not come to stand before a position limit.
+
+    Args:
+        before: The last motion.
+        reference: Where the joints should be at the period's end, and the reference's own velocity.
+        velocity: Speed limits ``(n,)``; infinite: none.
+        acceleration: Limits ``(n,)``; infinite: none.
+        lower: Position limits ``(n,)``; infinite: none.
+        upper: Position limits ``(n,)``; infinite: none.
+        period: Seconds.
+    """
+    behind = reference.position - period * reference.velocity - before.position
+    wanted = reference.velocity + np.sign(behind) * stopping_speed(np.abs(behind), acceleration, period)
+    most = np.minimum(velocity, stopping_speed(upper - before.position, acceleration, period))
+    least = -np.minimum(velocity, stopping_speed(before.position - lower, acceleration, period))
+    wanted = np.minimum(np.maximum(wanted, least), most)
+    change = acceleration * period
+    wanted = np.minimum(np.maximum(wanted, before.velocity - change), before.velocity + change)
+    position = before.position + period * wanted
+    near = np.abs(position - reference.position) <= _SLACK
+    return Motion(np.where(near, reference.position, position), wanted)
+
+
+def approach(
+    start: Array, goal: Array, velocity: Array, acceleration: Array, period: float
+) -> Iterator[Motion]:
+    """The way from standing at ``start (n,)`` to standing at ``goal (n,)``, one motion a period.
+
+    Args:
+        start: Where the joints stand.
+        goal: Where they shall stand.
+        velocity: Speed limits ``(n,)``.
+        acceleration: Limits ``(n,)``.
+        period: Seconds.
+    """
+    motion, still = Motion(start, np.zeros_like(start)), Motion(goal, np.zeros_like(goal))
+    endless = np.full_like(start, np.inf)
+    while np.any(motion.position != goal) or np.any(motion.velocity):
+        motion = followed(motion, still, velocity, acceleration, -endless, endless, period)
+        yield motion
