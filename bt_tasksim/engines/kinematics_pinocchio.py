@@ -11,6 +11,8 @@ redundant robots under joint constraints: saturation in the null space", ICRA 20
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -58,13 +60,18 @@ class PinocchioKinematics:
     Args:
         robot: The robot.
         control_period: Seconds between two calls of `solve`, until `reset` says otherwise.
+        patience: Seconds after which a search for another posture gives up, for real time; by default it goes
+            on to its end, and so does not depend on the machine's speed.
 
     Raises:
         InputError: The description does not fit its URDF.
     """
 
-    def __init__(self, robot: RobotDescription, control_period: float = 0.05) -> None:
+    def __init__(
+        self, robot: RobotDescription, control_period: float = 0.05, patience: float = math.inf
+    ) -> None:
         self.robot = robot
+        self._patience = patience
         self._n = len(robot.arm_joints)
         self._full, self._order = full_model(robot)
         self._full_data = self._full.createData()
@@ -213,8 +220,9 @@ class PinocchioKinematics:
         found: list[Array] = []
         tries = [np.minimum(np.maximum(start, self._lower), self._upper) for start in starts]
         nearest_miss = np.inf if best is None else self._cost(best, pose)
+        began = time.monotonic()
         for i, start in enumerate([*tries, *self._starts]):
-            if i >= len(tries) and found:
+            if i >= len(tries) and (found or time.monotonic() - began > self._patience):
                 break
             q, error = self._iterate(start, pose, _HARDER)
             cost = self._cost(q, pose)

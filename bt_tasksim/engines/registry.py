@@ -17,6 +17,8 @@ from bt_tasksim.safety.guarded_simulation import GuardedSimulation
 
 ENGINES = ("sapien",)
 PERCEPTIONS = ("state", "camera")
+PATIENCE = 0.03
+"""Seconds for which the inverse kinematics of a real robot looks for another posture: well within a period."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,6 @@ def robot_pipeline(
     Raises:
         InputError: The robot's file does not say its safety limits.
     """
-    kinematics, clock = PinocchioKinematics(robot), RealTimeClock()
+    kinematics, clock = PinocchioKinematics(robot, patience=PATIENCE), RealTimeClock()
     physics = GuardedRobot(engine, Guard(robot, kinematics.forward), clock)
     return EnginePipeline(kinematics, physics, postprocess, rendering, clock)

@@ -14,6 +14,8 @@ import numpy as np
 
 from bt_tasksim.poses import Array
 
+RESERVE = 0.2
+"""Share of the acceleration limits with which joints that lag may catch up."""
 _SLACK = 1e-12
 
 
@@ -79,8 +81,10 @@ def followed(
     """The next motion of joints that follow a reference as closely as limits allow.
 
     Where the reference keeps the limits and the joints are on it, the result is the reference. Joints that
-    have fallen behind catch up at a speed, relative to the reference, from which they can stop on it. A joint
-    never moves so fast that it could not come to stand before a position limit.
+    have fallen behind catch up, all by the same share of what they lack, at a speed relative to the reference
+    from which they can stop on it with `RESERVE` of their acceleration; the rest is for the reference's own.
+    What is too fast a change of speed is made smaller by the same share for all joints, so that the tool
+    keeps its direction. A joint never moves so fast that it could not come to stand before a position limit.
 
     Args:
         before: The last motion.
@@ -92,15 +96,26 @@ def followed(
         period: Seconds.
     """
     behind = reference.position - period * reference.velocity - before.position
-    wanted = reference.velocity + np.sign(behind) * stopping_speed(np.abs(behind), acceleration, period)
+    rate = _least_ratio(stopping_speed(np.abs(behind), RESERVE * acceleration, period), np.abs(behind))
     most = np.minimum(velocity, stopping_speed(upper - before.position, acceleration, period))
     least = -np.minimum(velocity, stopping_speed(before.position - lower, acceleration, period))
+    wanted = reference.velocity + min(rate, 1.0 / period) * behind
     wanted = np.minimum(np.maximum(wanted, least), most)
-    change = acceleration * period
-    wanted = np.minimum(np.maximum(wanted, before.velocity - change), before.velocity + change)
+    change = wanted - before.velocity
+    share = min(_least_ratio(acceleration * period, np.abs(change)), 1.0)
+    if share < 1.0:
+        limited = np.isfinite(acceleration)
+        wanted = np.where(limited, before.velocity + share * change, wanted)
+        wanted = np.minimum(np.maximum(wanted, least), most)
     position = before.position + period * wanted
     near = np.abs(position - reference.position) <= _SLACK
     return Motion(np.where(near, reference.position, position), wanted)
+
+
+def _least_ratio(a: Array, b: Array) -> float:
+    """Smallest a / b of arrays ``(n,)``; infinite where b is zero."""
+    some = b > 0.0
+    return float(np.min(a[some] / b[some], initial=np.inf))
 
 
 def approach(
