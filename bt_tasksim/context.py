@@ -13,7 +13,7 @@ from math import isfinite
 import numpy as np
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.errors import CommandConflictError
+from bt_tasksim.errors import CommandConflictError, LeafError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.world import Command, Hidden, ObjectModel, Observation, PlaceModel, WorldModel
@@ -213,12 +213,12 @@ class Context:
         """What the leaves have written in this tick.
 
         Raises:
-            ValueError: A part is not finite; names the leaf that wrote it.
+            LeafError: A part is not finite; names the leaf that wrote it.
         """
         tool, hand = self._tool, self._hand
         for part, written in (("tool", tool), ("hand", hand)):
             if written is not None and not isfinite(written[0] @ written[0]):
-                raise ValueError(
+                raise LeafError(
                     f"leaf '{written[1].name}' commands a {part} target that is not finite: {written[0]}"
                 )
         return Command(None if tool is None else tool[0], None if hand is None else hand[0])

@@ -59,7 +59,7 @@ class CommandConflictError(InputError):
 
 
 class LeafError(BtTasksimError, RuntimeError):
-    """A leaf raised an exception; the message names the leaf, and ``__cause__`` is what it raised."""
+    """A leaf raised an exception, which is ``__cause__`` then, or commands nonsense; the message names it."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -18,7 +18,7 @@ from bt_tasksim.safety.guarded_simulation import GuardedSimulation
 ENGINES = ("sapien",)
 PERCEPTIONS = ("state", "camera")
 PATIENCE = 0.03
-"""Seconds for which the inverse kinematics of a real robot looks for another posture: well within a period."""
+"""Seconds for which the inverse kinematics of a real robot looks for another posture."""
 
 
 @dataclass(frozen=True)

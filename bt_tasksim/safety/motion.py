@@ -114,7 +114,7 @@ def followed(
 
 def _least_ratio(a: Array, b: Array) -> float:
     """Smallest a / b of arrays ``(n,)``; infinite where b is zero."""
-    some = b > 0.0
+    some = b > _SLACK
     return float(np.min(a[some] / b[some], initial=np.inf))
 
 

@@ -221,7 +221,7 @@ def main() -> None:
     """A run in a process of its own: a port, and a word when the arm moves."""
     from bt_tasksim.errors import BtTasksimError
 
-    runner, leaf = runner_of(int(sys.argv[1]))
+    runner, _ = runner_of(int(sys.argv[1]))
 
     def moving(step: Any) -> None:
         if abs(float(step.observation.time) - 0.5) < 0.026:

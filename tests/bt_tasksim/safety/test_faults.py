@@ -1,0 +1,97 @@
+"""Real processes, real signals: whatever goes wrong, the arm holds in time and the reason is said."""
+
+import pytest
+from arm import ArmProcess, runner_of
+from faults import FAULTS, QUIET, measure
+
+from bt_tasksim.errors import MachineError, SafetyStop
+from bt_tasksim.safety.limits import REACTION
+
+SAID = {
+    "joint states stop": r"safety stop, stale: sweep: stale: joint states are",
+    "joint states frozen": "joint states have not changed for",
+    "states delayed 300 ms": "safety stop, stale: sweep: stale: joint states are",
+    "NaN in a state": "positions reported, panda_joint3 at nan; the arm holds",
+    "wrong joint order": "in another order, 'panda_joint2' where 'panda_joint1' should be",
+    "positions of two joints mixed up": "is reported to have jumped by",
+    "emergency stop": "emergency stop: the red button",
+    "connection lost": "engine failed: the arm has closed the connection",
+    "leaf raises": "leaf 'sweep' raised ZeroDivisionError: oh",
+    "leaf blocks 2 s": "sweep: the watchdog has stopped the robot: no sign of life",
+    "policy gives NaN": "leaf 'sweep' commands a tool target that is not finite",
+    "no solution of the inverse kinematics": "sweep: out of reach: panda cannot bring its tool to",
+    "watchdog killed": "sweep: the watchdog's process has ended; the arm holds",
+    "SIGINT": "stopped KeyboardInterrupt every node has ended, and the arm holds []",
+    "SIGTERM": "stopped Terminated every node has ended, and the arm holds []",
+    "SIGKILL of the runner": "bt-tasksim watchdog: the runner is gone",
+    "SIGSTOP of the runner": "bt-tasksim watchdog: no sign of life from the runner for",
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_the_arm_holds_in_time_and_the_reason_is_said(fault):
+    for seed in range(3):
+        seen = measure(fault, seed)
+        if seen.busy <= QUIET:
+            break  # else the arm's own process was kept waiting, and its times say nothing
+    assert seen.held <= REACTION
+    assert seen.far <= 0.2 and seen.drift <= 0.002, "it moves little farther, and stands then"
+    assert SAID[fault] in seen.said, seen.said
+    assert seen.running == [], "every node has ended"
+    assert seen.again, "a fresh run works"
+
+
+def test_a_robot_that_dies_ends_the_run():
+    arm = ArmProcess()
+    runner, leaf = runner_of(arm.port)
+    leaf.trouble = lambda tool: (arm.process.kill() if leaf.context.now > 0.4 else None, tool)[1]
+    try:
+        result = runner.run(0)
+        assert result.reason == "safety stop, engine" and "engine failed: the " in result.why
+        assert leaf.ended[-1].name == "INVALID"
+        with pytest.raises(MachineError, match="the watchdog cannot reach the robot: ConnectionRefused"):
+            runner.run(0)
+    finally:
+        runner.pipeline.close()
+        arm.close()
+
+
+@pytest.fixture
+def arm():
+    out = ArmProcess()
+    yield out
+    out.close()
+
+
+def test_after_a_stop_nothing_starts_again_without_a_new_run(arm):
+    runner, leaf = runner_of(arm.port)
+    physics = runner.pipeline.physics
+    leaf.trouble = lambda tool: (physics.engine.emergency.press("a test"), tool)[1]
+    result = runner.run(0)
+    assert result.reason == "safety stop, emergency stop"
+    before = arm.tell()
+    with pytest.raises(SafetyStop, match="emergency stop: a test"):
+        runner.step(runner.context.command)
+    physics.engine.send(physics.guard.brake())  # even a command past the guard is refused by the robot
+    after = arm.tell()
+    assert after["commands"] == before["commands"] and after["refused"] == before["refused"] + 1
+    assert after["latched"].startswith("emergency stop")
+    leaf.trouble, leaf.lasts = lambda tool: tool, 0.2
+    physics.engine.emergency.held_down = lambda: True
+    with pytest.raises(MachineError, match="the emergency stop is pressed; release it"):
+        runner.run(0)
+    physics.engine.emergency.held_down = lambda: False
+    assert runner.run(0).success
+    runner.pipeline.close()
+
+
+def test_a_run_that_ends_well_holds_and_says_how_well_it_kept_time(arm):
+    runner, leaf = runner_of(arm.port)
+    leaf.lasts = 0.5
+    result = runner.run(0)
+    assert result.success and result.verdict is None
+    told = arm.tell()
+    assert told["latched"] == "the run is over" and told["refused"] == 0
+    assert result.timing.ticks == result.control_steps == told["commands"]
+    assert result.timing.latency_median is not None and result.timing.latency_median < 0.1
+    runner.pipeline.close()

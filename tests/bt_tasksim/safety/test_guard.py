@@ -1,0 +1,265 @@
+"""The guard: nothing beyond a limit goes out, and after a stop nothing but a hold does."""
+
+import dataclasses
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.errors import InputError, SafetyStop
+from bt_tasksim.robot import load_robot
+from bt_tasksim.safety.checks import twist
+from bt_tasksim.safety.engine import JointReading
+from bt_tasksim.safety.guard import Guard
+from bt_tasksim.world import JointTarget
+
+ROBOT = load_robot("panda")
+KINEMATICS = PinocchioKinematics(ROBOT)
+START = np.concatenate([ROBOT.rest, ROBOT.hand_open])
+PERIOD = 0.05
+N = len(ROBOT.arm_joints)
+
+
+def guard_of(policies=None, **limits):
+    changed = {**limits} if policies is None else {**limits, "policies": policies}
+    guard = Guard(
+        dataclasses.replace(ROBOT, safety=dataclasses.replace(ROBOT.safety, **changed)), KINEMATICS.forward
+    )
+    guard.begin(START, PERIOD)
+    return guard
+
+
+def target(position, velocity=None):
+    position = np.asarray(position, float)
+    return JointTarget(position, np.zeros_like(position) if velocity is None else velocity)
+
+
+def offset(*values):
+    out = START.copy()
+    out[: len(values)] += values
+    return out
+
+
+def at(joint, value):
+    out = START.copy()
+    out[joint] = value
+    return out
+
+
+def box(y):
+    return np.array([[-1.0, -1.0, 0.0], [1.0, y, 1.0]])
+
+
+def stopped(guard, position, sentence):
+    with pytest.raises(SafetyStop) as error:
+        guard.command(target(position))
+    assert sentence in str(error.value), str(error.value)
+    return error.value
+
+
+# ---- commands ---------------------------------------------------------------------------------------------
+
+
+def test_what_keeps_the_limits_goes_out_as_it_came_and_expires():
+    guard, before = guard_of(), START
+    for k in range(40):
+        asked = target(offset(0.1 * (1 - np.cos(0.1 * k)), 0.0, 0.0, 0.05 * np.sin(0.1 * k) ** 2))
+        sent = guard.command(asked)
+        assert sent.position is asked.position and sent.velocity is asked.velocity
+        assert sent.validity == 0.15
+        before = sent.position
+    assert not np.array_equal(before, START)
+
+
+@pytest.mark.parametrize(
+    ("limits", "position", "name", "sentence"),
+    [
+        ({}, offset(0.15), "joint_velocity", "panda_joint1 would move at 3 rad/s, 0.825 rad/s over"),
+        ({}, offset(0.0, 0.3), "step", "panda_joint2 would step by 0.3 rad, 0.0825 rad over its limit"),
+        ({}, offset(3.0), "joint_position", "panda_joint1 would be at 3 rad, 0.1 rad beyond its limit"),
+        ({}, at(8, 0.05), "joint_position", "panda_finger_joint2 would be at 0.05"),
+        ({}, at(3, np.nan), "not_finite", "positions commanded, panda_joint4 at nan"),
+        ({}, START[:8], "joint_names", "(8,) positions commanded for 9 joints"),
+        ({"policies": {}}, offset(0.08), "joint_acceleration", "panda_joint1 would change speed by 32"),
+        ({"tool_speed": 0.2}, offset(0.036), "tool_velocity", "the tool would move at 0.22"),
+        ({"policies": {"joint_acceleration": "clip"}, "tool_acceleration": 2.0}, offset(0.03),
+         "tool_acceleration", "the tool would change speed by 3.6"),
+        ({"workspace": box(0.005)}, offset(0.03), "workspace", "mm outside the box in y"),
+    ],
+)  # fmt: skip
+def test_a_command_beyond_a_limit_stops(limits, position, name, sentence):
+    guard = guard_of(**limits)
+    assert stopped(guard, position, sentence).limit == name
+    with pytest.raises(SafetyStop) as again:
+        guard.command(target(START))
+    assert sentence in str(again.value)
+    assert guard.stopped.limit == name, "the first reason is the one that counts"
+    guard.begin(START, PERIOD)
+    guard.command(target(START))
+
+
+def test_the_tool_must_be_able_to_stop_inside_the_box():
+    guard = guard_of(workspace=box(0.05))
+    guard.command(target(offset(0.02)))
+    guard.command(target(offset(0.075)))
+    assert KINEMATICS.forward(offset(0.15))[1] < 0.05
+    assert stopped(guard, offset(0.15), "the tool could not stop before it is").limit == "workspace"
+
+
+def test_a_joint_must_be_able_to_stop_before_its_limit():
+    guard = guard_of({}, acceleration=np.full(7, 15.0), upper=ROBOT.safety.upper - np.array([2.8] + [0] * 6))
+    guard.command(target(offset(0.03)))
+    assert stopped(guard, offset(0.09), "panda_joint1 could not stop before 0.1").limit == "joint_position"
+
+
+def test_clipping_slows_down_and_never_stops():
+    clip = dict.fromkeys(
+        ("joint_velocity", "joint_acceleration", "joint_position", "tool_acceleration"), "clip"
+    )
+    guard = guard_of(clip)
+    sent = [guard.command(target(offset(0.3))).position[0] for _ in range(40)]
+    assert sent[0] < START[0] + 0.05 and sent[-1] == START[0] + 0.3
+
+
+commands = st.lists(st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9), min_size=1, max_size=25)
+
+
+def hostile(positions, scale):
+    """Commands that start tame and get worse."""
+    for k, position in enumerate(positions):
+        yield START + scale * (1 + k) * np.array(position) * np.array([1] * 7 + [0.01] * 2)
+
+
+@settings(max_examples=60, deadline=None)
+@given(commands, st.sampled_from([1e-3, 1e-2, 0.1, 1.0]), st.booleans(), st.integers(-1, 24))
+def test_whatever_comes_in_what_goes_out_keeps_the_limits(positions, scale, clip, bad):
+    policies = {"joint_acceleration": "clip", "tool_acceleration": "clip"}
+    if clip:
+        policies |= {"joint_position": "clip", "joint_velocity": "clip"}
+    guard = guard_of(policies)
+    limits = guard.limits
+    sent, halted = [START, START], False
+    for k, position in enumerate(hostile(positions, scale)):
+        if k == bad:
+            position = position * np.nan
+        try:
+            sent.append(guard.command(target(position)).position)
+        except SafetyStop:
+            halted = True
+            ramp = [t.position for t in guard.ramp()]
+            with pytest.raises(SafetyStop):
+                guard.command(target(START))
+            sent += ramp
+            break
+    at = np.array(sent)
+    speed = np.diff(at, axis=0) / PERIOD
+    change = np.diff(speed[:, :N], axis=0) / PERIOD
+    slack = 1 + 1e-5
+    assert np.all(at[:, :N] <= limits.upper + 1e-6) and np.all(at[:, :N] >= limits.lower - 1e-6)
+    assert np.all(np.abs(speed[:, :N]) <= limits.velocity * slack)
+    assert np.all(np.abs(change) <= limits.acceleration * slack)
+    assert np.all(np.abs(np.diff(at[:, :N], axis=0)) <= limits.step * slack)
+    commanded = at[: len(at) - (len(ramp) if halted else 0)]
+    tool = KINEMATICS.forward(commanded)
+    twists = np.array([twist(a, b, PERIOD) for a, b in pairwise(tool)])
+    assert np.all(np.linalg.norm(twists[:, :3], axis=1) <= limits.tool_speed * slack)
+    assert np.all(np.linalg.norm(twists[:, 3:], axis=1) <= limits.tool_turn * slack)
+    changes = np.diff(twists, axis=0) / PERIOD
+    assert np.all(np.linalg.norm(changes[:, :3], axis=1) <= limits.tool_acceleration * slack)
+    assert np.all((tool[:, :3] >= limits.workspace[0] - 1e-6) & (tool[:, :3] <= limits.workspace[1] + 1e-6))
+    if halted:
+        np.testing.assert_array_equal(guard.ramp()[-1].velocity, 0.0)
+
+
+def test_the_ramp_brakes_and_then_stands():
+    guard = guard_of()
+    for k in range(1, 8):
+        guard.command(target(offset(0.5 * 0.03 * k * k * 0.05)))
+    ramp = guard.ramp()
+    speeds = [float(np.abs(t.velocity).max()) for t in ramp]
+    assert speeds == sorted(speeds, reverse=True) and speeds[-1] == 0.0
+    assert all(t.validity == guard.limits.validity for t in ramp)
+    guard.stop("ended", "over")
+    for t in ramp:
+        np.testing.assert_array_equal(guard.brake().position, t.position)
+    np.testing.assert_array_equal(guard.brake().position, ramp[-1].position)
+
+
+def test_a_robot_without_limits_is_not_driven():
+    with pytest.raises(InputError, match="has no section 'safety'"):
+        Guard(dataclasses.replace(ROBOT, safety=None), KINEMATICS.forward)
+
+
+def test_commands_must_come_more_often_than_they_expire():
+    with pytest.raises(InputError, match=r"every 100 ms cannot expire after 150 ms: .* to 13.3 Hz at least"):
+        guard_of().begin(START, 0.1)
+
+
+# ---- states -----------------------------------------------------------------------------------------------
+
+
+def reading(position=START, stamp=10.0, names=ROBOT.joints, velocity=None):
+    position = np.array(position, float)
+    return JointReading(
+        tuple(names), position, np.zeros_like(position) if velocity is None else velocity, stamp
+    )
+
+
+@pytest.mark.parametrize(
+    ("state", "now", "name", "sentence"),
+    [
+        (reading(), 10.2, "stale", "joint states are 200 ms old, the limit is 100 ms"),
+        (reading(names=ROBOT.joints[::-1]), 10, "joint_names", "another order, 'panda_finger_joint2' where"),
+        (reading(names=("x", *ROBOT.joints[1:])), 10, "joint_names", "joint states lack 'panda_joint1'"),
+        (reading(names=(*ROBOT.joints, "x")), 10, "joint_names", "name 'x', which is no joint of the robot"),
+        (reading(names=(*ROBOT.joints, "panda_joint1")), 10, "joint_names", "name a joint twice"),
+        (reading(START[:4]), 10, "joint_names", "(4,) positions reported for 9 joints"),
+        (reading(at(0, np.nan)), 10, "not_finite", "panda_joint1 at nan"),
+        (reading(velocity=np.full(9, np.nan)), 10, "not_finite", "velocities reported, panda_joint1 at nan"),
+        (reading(offset(0.0, 0.4)), 10, "tracking", "panda_joint2 is off its command by 0.4 rad"),
+    ],
+)  # fmt: skip
+def test_states_that_are_not_to_be_trusted_stop(state, now, name, sentence):
+    guard = guard_of()
+    with pytest.raises(SafetyStop) as error:
+        guard.reading(state, now)
+    assert sentence in str(error.value) and error.value.limit == name
+    with pytest.raises(SafetyStop):
+        guard.command(target(START))
+
+
+def test_a_jump_of_a_measured_joint_stops():
+    guard = guard_of(tracking=10.0)
+    guard.reading(reading(), 10.0)
+    guard.reading(reading(offset(0.03), 10.01), 10.01)
+    guard.reading(reading(offset(0.03), 10.01), 10.02)
+    with pytest.raises(SafetyStop, match=r"panda_joint1 is reported to have jumped by 0.4 rad"):
+        guard.reading(reading(offset(0.43), 10.02), 10.03)
+
+
+def test_states_that_no_longer_change_stop_once_commands_do():
+    guard = guard_of()
+    for k in range(10):  # the arm stands, and so do the commands
+        guard.reading(reading(stamp=10 + 0.05 * k), 10 + 0.05 * k)
+        guard.command(target(START))
+    with pytest.raises(SafetyStop, match=r"have not changed for \d+ ms, while commands moved by 0.0\d+ rad"):
+        for k in range(10, 20):
+            guard.reading(reading(stamp=10 + 0.05 * k), 10 + 0.05 * k)
+            guard.command(target(offset(0.01 * (k - 9))))
+
+
+def test_an_external_wrench_stops():
+    guard = guard_of()
+    guard.wrench(np.array([60.0, 0, 0, 0, 9.0, 0]))
+    for wrench, sentence in (
+        ([0, 50.0, 50.0, 0, 0, 0], "force on the tool 70.7 N, 5.71 N over its limit of 65 N"),
+        ([0, 0, 0, 0, 0, -12.0], "torque on the tool 12 Nm, 2 Nm over its limit of 10 Nm"),
+        ([0, np.nan, 0, 0, 0, 0], "not finite: the wrist's wrench"),
+    ):
+        with pytest.raises(SafetyStop) as error:
+            guard.wrench(np.array(wrench, float))
+        assert sentence in str(error.value)
+        guard.begin(START, PERIOD)
