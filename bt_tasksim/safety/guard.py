@@ -25,8 +25,8 @@ _RAMP = 200
 """Most periods of a ramp; from every speed within the limits it takes far fewer."""
 _HALVINGS = 8
 """Steps in which the largest gentle enough change of speed is looked for."""
-_MOVED = 0.02
-"""Radians that a command has moved while the reported joints have not changed by a bit: they are frozen."""
+_MOVED = 0.01
+"""Radians that commands have moved while the reported joints have not changed by a bit: they are frozen."""
 
 
 class Guard:
@@ -209,7 +209,9 @@ class Guard:
             return None
         since, then = self._changed
         way = float(np.max(np.abs(commanded - then)[:n], initial=0.0))
-        if now - since <= self.limits.stale or way <= _MOVED:
+        if way == 0.0:  # the arm stands, and is to stand
+            self._changed = (now, then)
+        if now - since < self.limits.stale or way <= _MOVED:
             return None
         return Breach(
             "stale",

@@ -529,6 +529,16 @@ def test_an_interrupt_during_a_run_ends_everything(call, monkeypatch):
     assert call("evaluate", "pick_and_throw", "--episodes", 1, "--json", "e.json")[0] == 0
 
 
+def test_a_run_behind_the_limits_in_real_time_says_how_well_it_kept_time(call):
+    code, out, _ = call("run", "grasp_then_pick", "--safety", "--real-time", "--out", "here")
+    assert code == 0 and "20 Hz: " in out and "periods skipped" in out
+    about = json.loads(Path("here/result.json").read_text())
+    assert about["options"]["safety"] and about["options"]["real_time"]
+    assert about["timing"]["summary"] in out and about["timing"]["ticks"] > 20
+    assert "control rate" in Path("here/report.html").read_text()
+    assert call("replay", "here")[0] == 0
+
+
 def test_an_interrupt_from_outside_ends_the_process_and_its_workers(tmp_path):
     import signal
 

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from bt_tasksim.interrupts import held_back
+from bt_tasksim.interrupts import Terminated, ending, held_back, terminable
 
 
 def wait_and_say(pipe):
@@ -37,3 +37,49 @@ def test_this_thread_is_interrupted_afterwards():
         signal.pthread_kill(threading.get_ident(), signal.SIGINT)  # this thread, not another one
         reached = True
     assert reached and signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, set())
+
+
+def test_sigterm_is_an_interrupt_where_it_is_asked_for():
+    reached = False
+    with pytest.raises(Terminated), terminable():
+        signal.raise_signal(signal.SIGTERM)
+        reached = True
+    assert not reached and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def test_sigterm_that_is_handled_already_stays_so():
+    heard = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: heard.append(number))
+    try:
+        with terminable():
+            signal.raise_signal(signal.SIGTERM)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert heard == [signal.SIGTERM]
+
+
+def test_an_ending_is_not_broken_off():
+    done = False
+    with terminable():
+        with ending():
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGTERM)
+            done = True
+        assert done
+        with pytest.raises(Terminated):
+            signal.raise_signal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_other_threads_leave_signals_alone():
+    seen = []
+
+    def work():
+        with terminable(), ending():
+            seen.append(signal.getsignal(signal.SIGTERM))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [signal.SIG_DFL]

@@ -70,7 +70,8 @@ def beating(watchdog, seconds):
     return time.monotonic()
 
 
-def test_it_holds_when_beats_stop_and_says_so(capfd, watchdog, line):
+def test_it_holds_when_beats_stop_and_says_so(capfd, line):
+    watchdog = Watchdog(line.channel, DEADLINE)
     last = beating(watchdog, 0.5)
     assert watchdog.trouble() == ""
     said, when = line.heard()
@@ -78,6 +79,7 @@ def test_it_holds_when_beats_stop_and_says_so(capfd, watchdog, line):
     assert DEADLINE - 0.03 <= when - last <= DEADLINE + 0.1
     time.sleep(0.05)
     assert "the watchdog has stopped the robot: no sign of life" in watchdog.trouble()
+    watchdog.close()
     assert "bt-tasksim watchdog: no sign of life" in capfd.readouterr().err
 
 
