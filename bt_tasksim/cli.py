@@ -18,8 +18,7 @@ from typing import Any
 from bt_tasksim.arguments import count as _count
 from bt_tasksim.arguments import policy as _policy
 from bt_tasksim.arguments import seed as _seed
-from bt_tasksim.errors import BtTasksimError, InputError
-from bt_tasksim.interrupts import Terminated
+from bt_tasksim.errors import BtTasksimError, InputError, Terminated
 from bt_tasksim.progress import progress
 
 DEMO_LOG = ("demonstrations", "shelf_to_shelf", "00.h5")

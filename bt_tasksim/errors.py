@@ -62,6 +62,10 @@ class LeafError(BtTasksimError, RuntimeError):
     """A leaf raised an exception, which is ``__cause__`` then, or commands nonsense; the message names it."""
 
 
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, where it is to end things in order as Ctrl-C does."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Says which known names are nearest to an unknown one.
 

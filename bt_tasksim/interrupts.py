@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from typing import Any
 
+from bt_tasksim.errors import Terminated
+
 
 @contextmanager
 def held_back(spawning: bool = False) -> Iterator[None]:
@@ -27,10 +29,6 @@ def held_back(spawning: bool = False) -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-class Terminated(KeyboardInterrupt):
-    """SIGTERM, where it is to end things in order as Ctrl-C does."""
 
 
 @contextmanager

@@ -162,8 +162,10 @@ class Runner:
             pipeline.stop("the run is over")
         except BaseException as error:
             with ending():
-                end_all(tree, None)
-                pipeline.stop(f"{type(error).__name__}: {error}".removesuffix(": "))
+                try:
+                    pipeline.stop(f"{type(error).__name__}: {error}".removesuffix(": "))
+                finally:
+                    end_all(tree, None)
             if pipeline.real and isinstance(error, KeyboardInterrupt):
                 raise type(error)("every node has ended, and the arm holds") from error
             raise

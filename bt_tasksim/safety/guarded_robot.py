@@ -18,6 +18,9 @@ from bt_tasksim.safety.watchdog import Watchdog
 from bt_tasksim.scene import ActorConfiguration
 from bt_tasksim.world import Hidden, JointTarget, WorldState
 
+_WHERE_IT_IS = ("wrench", "tracking", "watchdog")
+"""Reasons to stop where the arm is: it pushes against something, or somebody has stopped it already."""
+
 
 class GuardedRobot:
     """The physics engine that a pipeline gets for a real robot.
@@ -79,9 +82,7 @@ class GuardedRobot:
         """
         try:
             self._before(time.monotonic())
-            sent = self.guard.command(target)
-            self.engine.send(sent)
-            self._sent = time.monotonic()
+            self._send(self.guard.command(target))
             self.clock.acted(self._sent - self._stamp)
             self.clock.wait()
             self._beat()
@@ -107,8 +108,8 @@ class GuardedRobot:
                 return
             self.guard.stop("ended", why)
             try:
-                self.engine.hold(self.guard.ramp(), why)
-            except MachineError:
+                self.engine.hold(self._ramp(), why)
+            except Exception:  # whatever it is, there is another way
                 if self.watchdog is not None:
                     self.watchdog.hold()
             else:
@@ -135,6 +136,22 @@ class GuardedRobot:
         channel = self.engine.hold_channel()
         if channel is not None:
             self.watchdog = Watchdog(channel, self.guard.limits.watchdog)
+
+    def _send(self, target: JointTarget) -> None:
+        """Send, unless another thread has stopped the robot meanwhile: nothing follows a hold."""
+        with self._lock:
+            if self.guard.stopped is not None:
+                raise self.guard.stopped
+            self.engine.send(target)
+            self._sent = time.monotonic()
+
+    def _ramp(self) -> tuple[JointTarget, ...]:
+        """Slows the commanded motion down; none where the arm does not, or should not, follow it any more."""
+        stopped = self.guard.stopped
+        expired = time.monotonic() - self._sent > self.guard.limits.validity
+        if expired or (stopped is not None and stopped.limit in _WHERE_IT_IS):
+            return ()
+        return self.guard.ramp()
 
     def _before(self, now: float) -> None:
         """What must hold before a command goes out."""

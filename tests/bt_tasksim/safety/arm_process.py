@@ -38,7 +38,7 @@ class Arm:
         self.ramp: deque[tuple[float, list[float]]] = deque()
         self.moving_to = False
         self.fault: dict | None = None
-        self.commands = self.refused = 0
+        self.commands = self.refused = self.ramped = 0
         self.busy = 0.0
 
     def take(self, message: dict, now: float) -> None:
@@ -54,7 +54,7 @@ class Arm:
             self.commands += 1
             self.target, self.expires, self.moving_to = message["to"], now + message["valid"], True
         elif "ramp" in message and not self.latched:
-            self.latched = message["why"]
+            self.latched, self.ramped = message["why"], len(message["ramp"])
             points = enumerate(message["ramp"])
             self.ramp = deque((now + (i + 1) * message["period"], q) for i, q in points)
             self.stopped(now, message["why"])
@@ -132,7 +132,9 @@ class Server:
 
     def read(self, sock: socket.socket) -> None:
         if sock is self.listening:
-            self.pieces[sock.accept()[0]] = b""
+            peer = sock.accept()[0]
+            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self.pieces[peer] = b""
             return
         try:
             data = sock.recv(1 << 16)
@@ -161,6 +163,7 @@ class Server:
             told = {
                 "fault": arm.fault, "q": arm.q, "v": arm.v, "latched": arm.latched, "now": now,
                 "commands": arm.commands, "refused": arm.refused, "busy": arm.busy,
+                "ramped": arm.ramped,
             }  # fmt: skip
             arm.busy = 0.0
             sock.sendall(json.dumps(told).encode() + b"\n")

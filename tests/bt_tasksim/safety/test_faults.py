@@ -1,5 +1,8 @@
 """Real processes, real signals: whatever goes wrong, the arm holds in time and the reason is said."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from arm import ArmProcess, runner_of
 from faults import FAULTS, QUIET, measure
@@ -82,6 +85,23 @@ def test_after_a_stop_nothing_starts_again_without_a_new_run(arm):
         runner.run(0)
     physics.engine.emergency.held_down = lambda: False
     assert runner.run(0).success
+    runner.pipeline.close()
+
+
+@pytest.mark.parametrize(("wrench", "ramped"), [(90.0, False), (np.nan, True)])
+def test_an_arm_that_pushes_against_something_stops_where_it_is(arm, wrench, ramped):
+    runner, _ = runner_of(arm.port)
+    engine = runner.pipeline.physics.engine
+    state = engine.state
+
+    def pushed():
+        now = state()
+        return replace(now, wrench=np.full(6, wrench * (now.time > 0.3))) if now.time > 0.3 else now
+
+    engine.state = pushed
+    result = runner.run(0)
+    assert result.reason == f"safety stop, {'not finite' if ramped else 'wrench'}"
+    assert (arm.tell()["ramped"] > 0) == ramped
     runner.pipeline.close()
 
 
