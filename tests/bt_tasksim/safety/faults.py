@@ -1,6 +1,7 @@
 """Every fault of a run on the arm of these tests, injected at a random moment, and what became of it.
 
-``python tests/bt_tasksim/safety/faults.py 20`` injects each 20 times and prints a table.
+``python tests/bt_tasksim/safety/faults.py 20`` injects each 20 times and prints a table; names of faults may
+follow.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -144,8 +145,14 @@ def _in_process(arm: ArmProcess, fault: str, wait: float) -> Seen:
     runner, leaf = runner_of(arm.port)
     runner.longest = 5.0
     arm.tell()
+
+    def begin(tool: Any) -> Any:
+        leaf.trouble = lambda tool: tool
+        IN_PROCESS[fault](arm, runner, leaf, wait)
+        return leaf.trouble(tool)
+
     try:
-        IN_PROCESS[fault](arm, runner, leaf, wait + 0.5)
+        leaf.trouble = begin
         try:
             result = runner.run(0)
             said = f"{result.status.name}: {result.reason}: {result.why}"
@@ -208,11 +215,12 @@ def _after(
     )
 
 
-def main(times: int) -> None:
+def main(times: int, faults: Sequence[str] = FAULTS) -> None:
     """Print the table."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     print("| fault | held after, median and longest | stands after | farthest joint | again | said |")
     print("|---|---|---|---|---|---|")
-    for fault in FAULTS:
+    for fault in faults:
         seen = [measure(fault, seed) for seed in range(times)]
         held = [1000 * s.held for s in seen]
         still = 1000 * max(s.still for s in seen)
@@ -225,4 +233,4 @@ def main(times: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(int(sys.argv[1]), sys.argv[2:] or FAULTS)

@@ -96,7 +96,7 @@ def test_an_arm_that_pushes_against_something_stops_where_it_is(arm, wrench, ram
 
     def pushed():
         now = state()
-        return replace(now, wrench=np.full(6, wrench * (now.time > 0.3))) if now.time > 0.3 else now
+        return replace(now, wrench=np.full(6, wrench)) if now.time > 0.3 else now
 
     engine.state = pushed
     result = runner.run(0)
