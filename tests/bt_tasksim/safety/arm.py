@@ -53,6 +53,13 @@ class ArmProcess:
         self.line.sendall(b'{"tell": 1}\n')
         return json.loads(self.answers.readline())
 
+    def stopped(self, patience: float = 3.0) -> dict[str, Any]:
+        """What has happened once the arm refuses commands; what it was told may still be on its way."""
+        end = time.monotonic() + patience
+        while not (told := self.tell())["latched"] and time.monotonic() < end:
+            time.sleep(0.01)
+        return told
+
     def at_rest(self, patience: float = 3.0) -> dict[str, Any]:
         """What has happened once the arm has held and stands."""
         end = time.monotonic() + patience
@@ -87,7 +94,10 @@ class ArmEngine:
         self._lost, self._reading, self._run = "", None, uuid.uuid4().hex
         self._period = 1.0 / configuration.control_frequency
         self._began = time.monotonic()
-        self._socket = socket.create_connection(("127.0.0.1", self.port))
+        try:
+            self._socket = socket.create_connection(("127.0.0.1", self.port))
+        except OSError as error:
+            raise MachineError(f"cannot reach the robot: {error}") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._write({"run": self._run, "start": [*ROBOT.rest.tolist(), *ROBOT.hand_open.tolist()]})
         self._write({"states": 1})

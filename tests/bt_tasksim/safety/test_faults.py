@@ -1,5 +1,6 @@
 """Real processes, real signals: whatever goes wrong, the arm holds in time and the reason is said."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -52,7 +53,7 @@ def test_a_robot_that_dies_ends_the_run():
         result = runner.run(0)
         assert result.reason == "safety stop, engine" and "engine failed: the " in result.why
         assert leaf.ended[-1].name == "INVALID"
-        with pytest.raises(MachineError, match="the watchdog cannot reach the robot: ConnectionRefused"):
+        with pytest.raises(MachineError, match=r"cannot reach the robot: .*refused"):
             runner.run(0)
     finally:
         runner.pipeline.close()
@@ -72,11 +73,13 @@ def test_after_a_stop_nothing_starts_again_without_a_new_run(arm):
     leaf.trouble = lambda tool: (physics.engine.emergency.press("a test"), tool)[1]
     result = runner.run(0)
     assert result.reason == "safety stop, emergency stop"
-    before = arm.tell()
+    before = arm.stopped()
     with pytest.raises(SafetyStop, match="emergency stop: a test"):
         runner.step(runner.context.command)
     physics.engine.send(physics.guard.brake())  # even a command past the guard is refused by the robot
-    after = arm.tell()
+    end = time.monotonic() + 3.0
+    while (after := arm.tell())["refused"] == before["refused"] and time.monotonic() < end:
+        time.sleep(0.01)
     assert after["commands"] == before["commands"] and after["refused"] == before["refused"] + 1
     assert after["latched"].startswith("emergency stop")
     leaf.trouble, leaf.lasts = lambda tool: tool, 0.2
@@ -101,7 +104,7 @@ def test_an_arm_that_pushes_against_something_stops_where_it_is(arm, wrench, ram
     engine.state = pushed
     result = runner.run(0)
     assert result.reason == f"safety stop, {'not finite' if ramped else 'wrench'}"
-    assert (arm.tell()["ramped"] > 0) == ramped
+    assert (arm.stopped()["ramped"] > 0) == ramped
     runner.pipeline.close()
 
 
@@ -110,7 +113,7 @@ def test_a_run_that_ends_well_holds_and_says_how_well_it_kept_time(arm):
     leaf.lasts = 0.5
     result = runner.run(0)
     assert result.success and result.verdict is None
-    told = arm.tell()
+    told = arm.stopped()
     assert told["latched"] == "the run is over" and told["refused"] == 0
     assert result.timing.ticks == result.control_steps == told["commands"]
     assert result.timing.latency_median is not None and result.timing.latency_median < 0.1
