@@ -67,6 +67,8 @@ class GuardedRobot:
         state = self.engine.reset(configuration)
         reading = self.engine.latest()
         self.guard.begin(reading.position, 1.0 / configuration.control_frequency)
+        if why := self.engine.emergency.why:  # meanwhile, and `begin` has forgotten the stop
+            raise self.guard.stop("emergency_stop", f"emergency stop: {why}")
         self.guard.reading(reading, time.monotonic())
         self.guard.wrench(state.wrench)
         self._stamp = reading.stamp

@@ -91,6 +91,25 @@ def test_after_a_stop_nothing_starts_again_without_a_new_run(arm):
     runner.pipeline.close()
 
 
+def test_an_emergency_stop_while_a_run_begins_counts(arm):
+    runner, leaf = runner_of(arm.port)
+    engine = runner.pipeline.physics.engine
+    reset = engine.reset
+
+    def pressed(configuration):
+        state = reset(configuration)
+        engine.emergency.press("too early")
+        return state
+
+    engine.reset = pressed
+    with pytest.raises(SafetyStop, match="emergency stop: too early"):
+        runner.run(0)
+    assert arm.stopped()["commands"] == 0 and leaf.ended == []
+    engine.reset, leaf.lasts = reset, 0.2
+    assert runner.run(0).success
+    runner.pipeline.close()
+
+
 @pytest.mark.parametrize(("wrench", "ramped"), [(90.0, False), (np.nan, True)])
 def test_an_arm_that_pushes_against_something_stops_where_it_is(arm, wrench, ramped):
     runner, _ = runner_of(arm.port)
