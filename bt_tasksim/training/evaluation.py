@@ -151,6 +151,8 @@ def evaluate(
         raise InputError("an evaluation needs at least one episode")
     if workers < 1:
         raise InputError(f"an evaluation needs at least one worker, found {workers}")
+    if workers > 1 and job.options.remote:
+        raise InputError("an engine in another process serves one client at a time: evaluate with 1 worker")
     started = time.perf_counter()
     runner = _runner(job)  # errors show here, before any process starts
     found: dict[int, Outcome] = {}
