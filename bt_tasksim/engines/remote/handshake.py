@@ -17,7 +17,7 @@ from bt_tasksim.robot import RobotDescription
 _DIGESTED = {
     "robot": "the robot's data file",
     "urdf": "the robot's URDF file",
-    "layouts": "how messages are laid out",
+    "layouts": "how bt-tasksim lays messages out",
 }
 
 
@@ -62,11 +62,13 @@ def mismatch(served: Identity, wanted: Identity) -> str:
             f"the server's robot is {shown(served.robot)} and the client's {shown(wanted.robot)}: start the "
             "server with the client's, by --robot"
         )
-    names = [*_DIGESTED, *sorted(set(served.digests) ^ set(_DIGESTED))]
-    for name in names:
+    others = (set(served.digests) | set(wanted.digests)) - set(_DIGESTED)
+    for name in (*_DIGESTED, *sorted(others)):
         if served.digests.get(name) != wanted.digests.get(name):
             what = _DIGESTED.get(name, shown(name))
-            return f"{what} is not the same on the server and the client: copy it from one to the other"
+            return (
+                f"{what} is not the same on the server and the client: bring one of them to the other's state"
+            )
     return ""
 
 

@@ -35,6 +35,6 @@ class RefusalLog:
             self._unsaid += 1
             return
         self._left -= 1.0
-        more = f" (and {self._unsaid} refusals more that were not shown)" if self._unsaid else ""
+        more = f" (before it {self._unsaid} more, not shown)" if self._unsaid else ""
         self._unsaid = 0
         self._say(f"refused: {sentence}{more}")
