@@ -13,6 +13,7 @@ from zmq.utils.monitor import recv_monitor_message
 
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.remote.keys import Key
+from bt_tasksim.engines.remote.memory import MemoryWatch
 from bt_tasksim.engines.remote.session import Session
 from bt_tasksim.engines.remote.sockets import end, prepare, receive, send
 from bt_tasksim.errors import InputError, MachineError
@@ -37,6 +38,7 @@ class EngineServer:
         address: Where to listen; port 0 takes a free one.
         key: The server's key; must be given where others than this machine can connect.
         refused: Called with one sentence for each connection that is refused.
+        memory: Bytes that unfinished messages may take up before all connections are cut.
 
     Raises:
         InputError: Other machines could connect and there is no key.
@@ -49,18 +51,26 @@ class EngineServer:
         address: Address,
         key: Key | None = None,
         refused: Callable[[str], None] = lambda sentence: None,
+        memory: int = 1 << 30,
     ) -> None:
         check_address(address, key)
-        self.session, self.key, self._refused = session, key, refused
-        self._context = zmq.Context()
-        self._socket = self._context.socket(zmq.ROUTER)
+        self.session, self.key, self.memory, self._refused = session, key, memory, refused
+        self.address = address
+        self._look = 0.0
+        self._open()
+
+    def _open(self) -> None:
+        """Listen, without any client yet."""
+        context = zmq.Context()
+        self._socket = context.socket(zmq.ROUTER)
         self._monitor = self._socket.get_monitor_socket(sum(_FAILED))
-        self._gate = self._context.socket(zmq.REP)
-        self._end = weakref.finalize(self, end, self._context, self._socket, self._monitor, self._gate)
+        self._gate = context.socket(zmq.REP)
+        self._end = weakref.finalize(self, end, context, self._socket, self._monitor, self._gate)
+        address = self.address
         try:
-            if key is not None:  # before the engine's socket: where nobody answers, CURVE lets every key in
+            if self.key is not None:  # first of all: where nobody answers there, CURVE lets every key in
                 self._gate.bind(_ZAP)
-            prepare(self._socket, key, pictures=session.role == "postprocess", server=True)
+            prepare(self._socket, self.key, pictures=self.session.role == "postprocess", server=True)
             self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
             self._socket.bind(address.url)
             bound = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
@@ -70,6 +80,10 @@ class EngineServer:
             raise MachineError(
                 f"cannot listen at {address}: {error.strerror}; choose another --port or --address"
             ) from None
+        self._poller = zmq.Poller()
+        for socket in (self._socket, self._monitor, self._gate):
+            self._poller.register(socket, zmq.POLLIN)
+        self._watch = MemoryWatch()
 
     @property
     def sentence(self) -> str:
@@ -84,17 +98,15 @@ class EngineServer:
 
     def serve(self, stopped: Callable[[], bool] = lambda: False) -> None:
         """Answer messages until `stopped` says so, or an interrupt ends it."""
-        poller = zmq.Poller()
-        for socket in (self._socket, self._monitor, self._gate):
-            poller.register(socket, zmq.POLLIN)
         while not stopped():
-            ready = dict(poller.poll(_WAKE))
+            ready = dict(self._poller.poll(_WAKE))
             if self._gate in ready:
                 self._answer_gate()
             if self._monitor in ready:
                 self._read_monitor()
             if self._socket in ready:
                 self._answer()
+            self._watch_memory()
 
     def close(self) -> None:
         """Let go of the port and of every client."""
@@ -103,7 +115,9 @@ class EngineServer:
     def _answer(self) -> None:
         client, *frames = receive(self._socket)
         name = bytes(client)
-        self._send(name, self.session.answer(name, frames, self._there))
+        with self._watch.own():
+            reply = self.session.answer(name, frames, self._there)
+        self._send(name, reply)
 
     def _send(self, client: bytes, frames: list[Any]) -> bool:
         """Send to a client that is still there and listens; says whether it could be."""
@@ -119,6 +133,17 @@ class EngineServer:
             if not self._send(client, self.session.notice()):
                 return False
         return True
+
+    def _watch_memory(self) -> None:
+        """Cut every connection where unfinished messages fill the memory."""
+        now = time.monotonic()
+        if now < self._look:
+            return
+        self._look = now + _WAKE / 1000.0
+        if self._watch.strange() > self.memory:
+            self._refused(f"messages without end, {self.memory >> 20} MiB of them: all connections were cut")
+            self.close()
+            self._open()
 
     def _read_monitor(self) -> None:
         recv_monitor_message(self._monitor)

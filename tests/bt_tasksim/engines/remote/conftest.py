@@ -118,7 +118,7 @@ def image():
     return Image(camera, rng.integers(0, 256, (240, 320, 3), dtype=np.uint8), depth)
 
 
-def hello(robot, role: str, number: int = 1, **changes: Any) -> list[bytes]:
+def hello(robot, role: str, number: int = 1, /, **changes: Any) -> list[bytes]:
     """The frames of a ``hello``."""
     own = identity(role, robot)
     fields = {"role": own.role, "version": own.version, "robot": own.robot, "digests": dict(own.digests)}
