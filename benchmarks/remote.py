@@ -1,10 +1,10 @@
-"""What another process costs: ``python -m benchmarks.remote``. Ratios within one run, medians over rounds.
+"""What another process costs: ``python -m benchmarks.remote``. Ratios in one run, medians over rounds.
 
-The same episodes of ``pick_and_place`` with everything in this process, with physics served over loopback
-TCP, and with kinematics and physics served by two processes; then, where pictures can be drawn, episodes in
-which a picture with its depth is drawn every ten control periods, with everything here, and with physics
-here and rendering in another process. In these the physics is MuJoCo's where that engine is there, else
-SAPIEN's.
+The same episodes of ``pick_and_place`` with everything in this process, with physics served over
+loopback TCP, and with kinematics and physics served by two processes. Then, where pictures can be drawn,
+episodes in which a picture with its depth is drawn every ten control periods: everything here; and
+physics here, with rendering in another process. The physics of these is MuJoCo's where that engine is
+there, else SAPIEN's.
 
 Writes ``benchmarks/results/remote.json``; ``python -m benchmarks.tables`` brings it to docs/remote_engines.md.
 """

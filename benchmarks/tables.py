@@ -182,8 +182,9 @@ def remote(results: dict[str, Any]) -> str:
         rate, ratio = (found.get(f"{key}_{what}") for what in ("steps_per_s", "ratio"))
         shown = f"{rate:.0f}" if rate is not None else NOT_YET
         lines.append(f"| {label} | {shown} | {f'{ratio:.2f}' if ratio is not None else ''} |")
-    times = [f"{found[k]:.0f} us" if k in found else NOT_YET for k in ("step_us", "served_step_us")]
-    lines.append(f"\nOne step of physics with the robot at rest: {times[0]} here, {times[1]} served.")
+    lines += ["", "| one step of physics, the robot at rest | |", "|---|---|"]
+    for label, key in (("in process", "step_us"), ("served over loopback TCP", "served_step_us")):
+        lines.append(f"| {label} | {f'{found[key]:.0f} us' if key in found else NOT_YET} |")
     return "\n".join(lines)
 
 

@@ -83,6 +83,7 @@ class Connection:
         self.address, self.role, self.robot, self.key = address, role, robot, key
         self.limits = limits or Limits()
         self.engine = ""
+        self._pictures = role == "rendering"
         self._sizes = sizes_of(robot)
         self._end: Any = None
         self._why = ""
@@ -104,7 +105,7 @@ class Connection:
         self._number, self._shaken, self._why = 0, False, ""
         context = zmq.Context()
         self._socket = context.socket(zmq.DEALER)
-        prepare(self._socket, self.key, pictures=self.role == "rendering", server=False)
+        prepare(self._socket, self.key, pictures=self._pictures, server=False)
         self._socket.setsockopt(zmq.RECONNECT_IVL, _AGAIN)
         self._monitor = self._socket.get_monitor_socket(zmq.EVENT_HANDSHAKE_SUCCEEDED | sum(_BROKEN))
         self._end = weakref.finalize(self, end, context, self._socket, self._monitor)
@@ -190,7 +191,7 @@ class Connection:
             ready = dict(self._poller.poll(math.ceil(1000.0 * left)))
             if self._socket in ready:
                 try:
-                    reply = decode(receive(self._socket), replies, self._sizes)
+                    reply = decode(receive(self._socket, self._pictures), replies, self._sizes)
                 except InputError as error:
                     raise self._fail(f"{self.server} answers nonsense: {error}") from None
                 if reply.number == self._number:

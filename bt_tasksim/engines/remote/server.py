@@ -56,6 +56,7 @@ class EngineServer:
         check_address(address, key)
         self.session, self.key, self.memory, self._refused = session, key, memory, refused
         self.address = address
+        self._pictures = session.role == "postprocess"
         self._look = 0.0
         self._open()
 
@@ -70,7 +71,7 @@ class EngineServer:
         try:
             if self.key is not None:  # first of all: where nobody answers there, CURVE lets every key in
                 self._gate.bind(_ZAP)
-            prepare(self._socket, self.key, pictures=self.session.role == "postprocess", server=True)
+            prepare(self._socket, self.key, pictures=self._pictures, server=True)
             self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
             self._socket.bind(address.url)
             bound = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
@@ -113,7 +114,7 @@ class EngineServer:
         self._end()
 
     def _answer(self) -> None:
-        client, *frames = receive(self._socket)
+        client, *frames = receive(self._socket, self._pictures)
         name = bytes(client)
         with self._watch.own():
             reply = self.session.answer(name, frames, self._there)

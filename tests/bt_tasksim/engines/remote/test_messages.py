@@ -170,9 +170,9 @@ LAYOUT = [["position", "<f8", [9]], ["velocity", "<f8", [9]]]
         (step(layout=[LAYOUT[0], ["velocity", "<f4", [9]]]), "'velocity' should be <f8, found '<f4'"),
         (step(layout=[LAYOUT[0], ["velocity", "|O", [9]]]), "'velocity' should be <f8, found '|O'"),
         (step(layout=[LAYOUT[0], ["velocity", "<f8", 9]]), "'velocity' has no shape"),
-        (step(layout=[LAYOUT[0], ["velocity", "<f8", [9.0]]]), "'velocity' has no shape"),
-        (step(layout=[LAYOUT[0], ["velocity", "<f8", [True]]]), "'velocity' has no shape"),
-        (step(layout=[LAYOUT[0], ["velocity", "<f8", [3, 3]]]), "1 dimensions, found 2"),
+        (step(layout=[LAYOUT[0], ["velocity", "<f8", [8.5]]]), "1 dimensions, found a list of 1"),
+        (step(layout=[LAYOUT[0], ["velocity", "<f8", ["9"]]]), "1 dimensions, found a list of 1"),
+        (step(layout=[LAYOUT[0], ["velocity", "<f8", [3, 3]]]), "1 dimensions, found a list of 2"),
         (step(layout=[LAYOUT[0], ["velocity", "<f8", [8]]]), r"the shape \(9,\), found \(8,\)"),
         (step(layout=[LAYOUT[0], ["velocity", "<f8", [-9]]]), r"the shape \(9,\), found \(-9,\)"),
         (step(frames=[b"\0" * 72, b"\0" * 71]), "should have 72 bytes, found 71"),
@@ -191,7 +191,7 @@ def test_huge_arrays_are_refused_before_anything_is_made_of_them(image):
     header = msgpack.unpackb(frames[0])
     for shape in ([1 << 62, 1 << 62, 3], [8193, 1, 3], [0, 8193, 3], [-1, 1, 3]):
         header[4][0][2] = shape
-        with pytest.raises(BadMessageError, match=r"too large|bytes"):
+        with pytest.raises(BadMessageError, match=r"cannot be|bytes"):
             decode([msgpack.packb(header), *frames[1:]], ["image"], {})
 
 
