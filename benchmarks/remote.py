@@ -6,7 +6,8 @@ episodes in which a picture with its depth is drawn every ten control periods: e
 physics here, with rendering in another process. The physics of these is MuJoCo's where that engine is
 there, else SAPIEN's.
 
-Writes ``benchmarks/results/remote.json``; ``python -m benchmarks.tables`` brings it to docs/remote_engines.md.
+Writes ``benchmarks/results/remote.json``, which ``python -m benchmarks.tables`` takes to
+docs/remote_engines.md.
 """
 
 from __future__ import annotations

@@ -33,6 +33,8 @@ _BROKEN = {
 }
 _AGAIN = 100
 """Milliseconds between two tries to connect, while a server starts."""
+_TRIES = 2
+"""Connections that may break off before a handshake: one may, where a server is just ending or starting."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ class Connection:
     def open(self) -> None:
         """Connect and say hello, as a new client."""
         self.close()
-        self._number, self._shaken, self._why = 0, False, ""
+        self._number, self._tries, self._shaken, self._why = 0, 0, False, ""
         context = zmq.Context()
         self._socket = context.socket(zmq.DEALER)
         prepare(self._socket, self.key, pictures=self._pictures, server=False)
@@ -216,14 +218,11 @@ class Connection:
                     f"{self.server} has gone away: it was stopped, or the connection was cut; "
                     "start it again, and begin a new run"
                 )
-            elif self.key is not None:
-                raise self._fail(
-                    f"{self.server} broke off: it has another key, or none, or is no such server"
-                )
             else:
-                raise self._fail(
-                    f"{self.server} broke off: it wants a key (--key FILE), or is no such server"
-                )
+                self._tries += 1
+                if self._tries >= _TRIES:
+                    wants = "has another key, or none" if self.key else "wants a key (--key FILE)"
+                    raise self._fail(f"{self.server} broke off: it {wants}, or is no such server")
 
     def _too_late(self, kind: str, limit: float) -> str:
         if self._shaken:
