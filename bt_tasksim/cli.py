@@ -186,6 +186,9 @@ def _engine_arguments(parser: argparse.ArgumentParser) -> None:
         "--timeout", type=float, default=2.0, metavar="S", help="seconds a remote step may take, default 2"
     )
     parser.add_argument(
+        "--connect-timeout", type=float, default=5.0, metavar="S", help="and a connection, default 5"
+    )
+    parser.add_argument(
         "--noise", default="fine", metavar="N", help="estimate's error: fine (default), none, original, hard"
     )
     parser.add_argument(
@@ -211,6 +214,7 @@ def _options(options: argparse.Namespace, rendering: bool = False) -> Any:
         renderer=options.rendering,
         key=options.key,
         timeout=options.timeout,
+        connect_timeout=options.connect_timeout,
     )
 
 

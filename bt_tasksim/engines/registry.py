@@ -39,6 +39,7 @@ class EngineOptions:
         renderer: Name of the rendering engine, where one is wanted.
         key: The client's key file, for engines on other machines.
         timeout: Seconds that a step of an engine in another process may take.
+        connect_timeout: Seconds within which it must be there.
     """
 
     engines: str = "sapien"
@@ -49,6 +50,7 @@ class EngineOptions:
     renderer: str = "sapien"
     key: str = ""
     timeout: float = 2.0
+    connect_timeout: float = 5.0
 
     def __post_init__(self) -> None:
         for what, name, known in (
@@ -62,8 +64,9 @@ class EngineOptions:
             elif name not in known:
                 raise InputError(f"unknown {what} '{name}'{nearest(name, known)}")
         noise_model(self.noise)
-        if not 0.0 < self.timeout < 3600.0:
-            raise InputError(f"a time-out is a positive number of seconds below 3600, found {self.timeout:g}")
+        for limit in (self.timeout, self.connect_timeout):
+            if not 0.0 < limit < 3600.0:
+                raise InputError(f"a time-out is a positive number of seconds below 3600, found {limit:g}")
 
     @property
     def remote(self) -> bool:
@@ -159,5 +162,5 @@ def connect(role: str, name: str, robot: RobotDescription, options: EngineOption
             f"engines in other processes need the extra 'remote' ({error}): pip install 'bt-tasksim[remote]'"
         ) from error
     key = load_key(options.key, CLIENT) if options.key else None
-    limits = Limits(step=options.timeout)
+    limits = Limits(connect=options.connect_timeout, step=options.timeout)
     return REMOTE[role](Connection(parse_remote(name), role, robot, key, limits))

@@ -25,16 +25,18 @@ from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.scene import ActorConfiguration
 
-_BROKEN = {
-    zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL,
-    zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL,
-    zmq.EVENT_HANDSHAKE_FAILED_AUTH,
-    zmq.EVENT_DISCONNECTED,
-}
 _AGAIN = 100
 """Milliseconds between two tries to connect, while a server starts."""
-_TRIES = 2
-"""Connections that may break off before a handshake: one may, where a server is just ending or starting."""
+_TRIES = 3
+"""Connections that break off without a reason, as those to a server that is just ending or starting."""
+_EVENTS = (
+    zmq.EVENT_HANDSHAKE_SUCCEEDED
+    | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
+    | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
+    | zmq.EVENT_HANDSHAKE_FAILED_AUTH
+    | zmq.EVENT_DISCONNECTED
+)
+"""What a client wants to know of its connection; after the second and third failure ZeroMQ tries no more."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ class Connection:
         self._socket = context.socket(zmq.DEALER)
         prepare(self._socket, self.key, pictures=self._pictures, server=False)
         self._socket.setsockopt(zmq.RECONNECT_IVL, _AGAIN)
-        self._monitor = self._socket.get_monitor_socket(zmq.EVENT_HANDSHAKE_SUCCEEDED | sum(_BROKEN))
+        self._monitor = self._socket.get_monitor_socket(_EVENTS)
         self._end = weakref.finalize(self, end, context, self._socket, self._monitor)
         self._poller = zmq.Poller()
         self._poller.register(self._socket, zmq.POLLIN)
@@ -218,20 +220,25 @@ class Connection:
                     f"{self.server} has gone away: it was stopped, or the connection was cut; "
                     "start it again, and begin a new run"
                 )
-            else:
+            elif event != zmq.EVENT_DISCONNECTED:  # that one follows each of the others
                 self._tries += 1
-                if self._tries >= _TRIES:
-                    wants = "has another key, or none" if self.key else "wants a key (--key FILE)"
-                    raise self._fail(f"{self.server} broke off: it {wants}, or is no such server")
+                if self._tries >= _TRIES or event != zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+                    raise self._fail(self._broke_off())
 
     def _too_late(self, kind: str, limit: float) -> str:
         if self._shaken:
             return f"{self.server} did not answer '{kind}' within {limit:g} s: it hangs, or is too slow"
+        if self._tries:
+            return self._broke_off()
         return (
             f"no {self.role} server answers at {self.address} within {limit:g} s: start one there with "
             f"'bt-tasksim serve-engine {self.role} NAME --port {self.address.port}', or look at the key and "
             "the firewall"
         )
+
+    def _broke_off(self) -> str:
+        wants = "has another key, or none" if self.key else "wants a key (--key FILE)"
+        return f"{self.server} broke off: it {wants}, or is no such server"
 
     def _fail(self, why: str) -> MachineError:
         self._why = why

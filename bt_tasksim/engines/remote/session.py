@@ -81,7 +81,7 @@ class Session:
             request = decode(frames, self._kinds, self._sizes)
             number = request.number
             reply = self._reply(client, request, there)
-            return encode(dataclasses.replace(reply, number=number), self._sizes)
+            return self._encoded(dataclasses.replace(reply, number=number))
         except BadMessageError as error:
             return self._error(error, error.number, refused=True)
         except UnreachableError as error:
@@ -92,6 +92,13 @@ class Session:
             self._in_episode = False  # nobody knows what state the engine is in
             sentence = f"the {self.role} engine '{self.name}' raised {type(error).__name__}: {error}"
             return self._error(MachineError(sentence), number, refused=True)
+
+    def _encoded(self, reply: Message) -> list[Any]:
+        try:
+            return encode(reply, self._sizes)
+        except InputError as error:  # such as NaN, after which nothing of the episode is worth anything
+            self._in_episode = False
+            raise MachineError(f"the {self.role} engine '{self.name}' has gone astray: {error}") from error
 
     def notice(self) -> list[Any]:
         """The frames of a message that answers nothing."""

@@ -47,6 +47,7 @@ def test_results_say_which_perception_it_was(options, label):
         ({"engines": "remote:here"}, "'remote:here' should read remote:HOST:PORT"),
         ({"renderer": "remote:here:0"}, "'remote:here:0' should end with a port from 1 to 65535"),
         ({"timeout": 0.0}, "a time-out is a positive number of seconds"),
+        ({"connect_timeout": 1e9}, "a time-out is a positive number of seconds"),
         ({"timeout": float("nan")}, "a time-out is a positive number of seconds"),
     ],
 )

@@ -493,9 +493,10 @@ def test_an_interrupt_ends_a_client_that_waits(folder):
 
 
 def test_an_evaluation_over_a_server_that_is_not_there_is_one_sentence():
-    process = command("evaluate", "pick_and_place", "--episodes", "1", "--engines", "remote:127.0.0.1:1")
+    words = ("--episodes", "1", "--engines", "remote:127.0.0.1:1", "--connect-timeout", "0.5")
+    process = command("evaluate", "pick_and_place", *words)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 1 and err.count("\n") == 1
-    assert err.startswith("bt-tasksim: no physics server answers at 127.0.0.1:1 within 5 s: start one there")
+    assert err.startswith("bt-tasksim: no physics server answers at 127.0.0.1:1 within 0.5 s: start one")
     said = refused("evaluate", "pick_and_place", "--workers", 2, "--engines", "remote:127.0.0.1:1")
     assert "serves one client at a time" in said

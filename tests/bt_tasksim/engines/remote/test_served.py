@@ -18,6 +18,7 @@ from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
 from bt_tasksim.engines.registry import EngineOptions, build_engine, build_pipeline, connect
 from bt_tasksim.engines.remote.engines import ENGINES
 from bt_tasksim.errors import InputError, MachineError, UnreachableError
+from bt_tasksim.resources import asset
 from bt_tasksim.robot import load_robot
 from bt_tasksim.runner import Runner
 from bt_tasksim.world import Command, JointTarget
@@ -148,23 +149,34 @@ def test_served_perception_sees_in_pictures_what_it_sees_here(folder, robot, wor
         remote.close()
 
 
-def test_pictures_drawn_there_are_those_drawn_here(folder, robot, world, state):
+def test_pictures_drawn_there_are_those_drawn_here(folder, world, state):
+    """With a robot of one's own, from a file."""
+    file = folder / "mine.yaml"
+    file.write_text(asset("robots", "panda.yaml").read_text() + SMALL_CAMERA)
+    robot = load_robot(str(file))
+    world = dataclasses.replace(world, robot=str(file))
     try:
         own = build_engine("rendering", "sapien", robot)
     except MachineError as error:
         pytest.skip(f"no pictures on this machine: {error}")
-    with served(folder, "rendering", "sapien") as server:
+    with served(folder, "rendering", "sapien", "--robot", file) as server:
         remote = connected("rendering", server, robot)
         for engine in (own, remote):
             engine.reset(world)
-        a, b = (engine.render(state, "perception", depth=True) for engine in (own, remote))
-        assert same(a.colour, b.colour) and same(a.depth, b.depth)
+        a, b = (engine.render(state, "small", depth=True) for engine in (own, remote))
+        assert same(a.colour, b.colour) and same(a.depth, b.depth) and np.ptp(a.colour) > 100
         assert a.camera.name == b.camera.name and same(a.camera.matrix, b.camera.matrix)
-        assert remote.render(state, "scene").depth is None
+        assert remote.render(state, "small").depth is None
         with pytest.raises(InputError, match=r"unknown camera 'scenes'; did you mean 'scene'\?"):
             remote.render(state, "scenes")
         remote.close()
     own.close()
+
+
+SMALL_CAMERA = """
+cameras:
+  small: {position: [0.05, 0.95, 1.25], look_at: [0.53, -0.05, 0.27], size: [160, 120]}
+"""
 
 
 def test_served_engines_play_their_roles(physics, kinematics, robot):

@@ -142,7 +142,10 @@ def test_an_engine_that_gives_nan_is_an_error(stage):
     reply = stage.say("step", arrays={"position": np.ones(9), "velocity": np.zeros(9)})
     assert reply.kind == "state"
     stage.arm.state = dataclasses.replace(stage.arm.state, wrench=np.full(6, np.nan))
-    assert "array 'wrench' has a number in it that is not finite" in sentence(stage.step())
+    reply = stage.step()
+    assert reply.fields["error"] == "MachineError"
+    assert "'arm' has gone astray: array 'wrench' has a number in it that is not finite" in sentence(reply)
+    assert "it has to be reset first" in sentence(stage.step())
 
 
 def test_a_world_that_cannot_be_built_leaves_no_episode(stage):
