@@ -89,11 +89,10 @@ def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePip
     with ExitStack() as built:
 
         def engine(role: str, name: str) -> Any:
-            made = (
-                connect(role, name, robot, options)
-                if is_remote(name)
-                else build_engine(role, name, robot, options.noise)
-            )
+            if is_remote(name):
+                made = connect(role, name, robot, options)
+            else:
+                made = build_engine(role, name, robot, options.noise)
             if hasattr(made, "close"):
                 built.callback(made.close)
             return made

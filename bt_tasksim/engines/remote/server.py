@@ -57,7 +57,7 @@ class EngineServer:
         self.session, self.key, self.memory, self._refused = session, key, memory, refused
         self.address = address
         self._pictures = session.role == "postprocess"
-        self._look = 0.0
+        self._look = self._probed = 0.0
         self._open()
 
     def _open(self) -> None:
@@ -129,7 +129,9 @@ class EngineServer:
         return True
 
     def _there(self, client: bytes) -> bool:
-        for wait in _PROBES:
+        now = time.monotonic()
+        patient, self._probed = now - self._probed > 1.0, now  # its owner's steps wait meanwhile
+        for wait in _PROBES if patient else _PROBES[:1]:
             time.sleep(wait)
             if not self._send(client, self.session.notice()):
                 return False

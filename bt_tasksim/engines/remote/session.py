@@ -183,8 +183,8 @@ class Session:
         if refused:
             self._refused(sentence)
         kind = next((k for k in ERRORS if isinstance(error, k)), MachineError)
-        miss = [min(float(getattr(error, name, 0.0)), LARGEST) for name in ("distance", "angle")]
-        fields = {"error": kind.__name__, "sentence": sentence, "distance": miss[0], "angle": miss[1]}
+        miss = {name: _bounded(getattr(error, name, 0.0)) for name in ("distance", "angle")}
+        fields = {"error": kind.__name__, "sentence": sentence, **miss}
         return encode(Message(number, "error", fields), {})
 
 
@@ -194,6 +194,10 @@ def error_of(reply: Message) -> BtTasksimError:
     if name == UnreachableError.__name__:
         return UnreachableError(sentence, reply.fields["distance"], reply.fields["angle"])
     return InputError(sentence) if name == InputError.__name__ else MachineError(sentence)
+
+
+def _bounded(value: float) -> float:
+    return float(value) if abs(value) <= LARGEST else LARGEST  # no comparison with NaN holds
 
 
 def plain_sentence(text: str) -> str:

@@ -118,6 +118,7 @@ def test_hello_again_begins_anew(stage):
         (NoWayError("no way"), MachineError, "no way"),
         (UnreachableError("misses", 0.12, 0.5), UnreachableError, "misses"),
         (UnreachableError("misses", np.inf, 0.5), UnreachableError, "misses"),
+        (UnreachableError("misses", np.nan, 0.5), UnreachableError, "misses"),
         (ZeroDivisionError("oh"), MachineError, "the physics engine 'arm' raised ZeroDivisionError: oh"),
         (KeyError("x\n\x1b[2J" + "y" * 9999), MachineError, "raised KeyError: "),
         (RuntimeError(), MachineError, "raised RuntimeError: "),
@@ -129,7 +130,10 @@ def test_errors_come_back_as_the_same_kind(stage, error, kind, said):
     back = error_of(stage.step())
     assert type(back) is kind and said.strip() in str(back) and str(back).isprintable()
     if isinstance(error, UnreachableError):
-        assert (back.distance, back.angle) == (min(error.distance, 1e9), 0.5) and not stage.refused
+        assert (back.distance, back.angle) == (
+            0.12 if error.distance == 0.12 else 1e9,
+            0.5,
+        ) and not stage.refused
     stage.arm.error = None
     known = type(error).__module__ == "bt_tasksim.errors"
     after = stage.step()
