@@ -13,6 +13,7 @@ import pytest
 import zmq
 
 from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.remote.client import Connection, Limits
 from bt_tasksim.engines.remote.engines import RemoteKinematics, RemotePhysics
@@ -21,6 +22,7 @@ from bt_tasksim.engines.remote.messages import REPLIES, Message, decode, encode
 from bt_tasksim.engines.remote.server import EngineServer
 from bt_tasksim.engines.remote.session import Session
 from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.training.evaluation import Job, evaluate
 from bt_tasksim.world import Command, JointTarget
 
 from .conftest import ROOT, hello, served
@@ -208,6 +210,22 @@ def test_a_server_of_another_version_that_did_not_look(fake, robot):
     replies.append(lambda n: encode(Message(n, "welcome", other), {}))
     with pytest.raises(InputError, match=r"the server has bt-tasksim '9.9' and the client"):
         Connection(Address("127.0.0.1", port), "physics", robot, limits=QUICK)
+
+
+def test_episodes_without_their_server_are_not_counted_as_failures(folder):
+    with served(folder, "physics", "sapien") as server:
+        options = EngineOptions(engines=server.name, connect_timeout=0.5)
+        done = []
+
+        def kill_after_the_second(outcome):
+            done.append(outcome.success)
+            if len(done) == 2:
+                server.process.kill()
+                server.process.wait()
+
+        with pytest.raises(MachineError, match=r"the physics server at .* has gone away"):
+            evaluate(Job("pick_and_place", options=options), range(4, 9), progress=kill_after_the_second)
+    assert done == [True, True]
 
 
 # ---- clients that fail ------------------------------------------------------------------------------------
