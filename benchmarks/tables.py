@@ -1,8 +1,8 @@
 """Measured numbers into the documentation: ``python -m benchmarks.tables``.
 
 Reads ``benchmarks/results/*.json`` and writes the tables between the marker comments of README.md,
-docs/evaluation.md, docs/training.md and docs/experiments.md, so that no number is typed by hand. Results are
-what the measurements write:
+docs/evaluation.md, docs/training.md, docs/experiments.md and docs/remote_engines.md, so that no number is
+typed by hand. Results are what the measurements write:
 
 - ``<scenario>-<robot>[-camera][-fromlogs].json`` by ``python -m benchmarks.success``, in the format of
   ``bt-tasksim evaluate --json``;
@@ -11,6 +11,7 @@ what the measurements write:
 - ``learning.json`` by ``python -m benchmarks.learning``;
 - ``experiment-<letter>.json`` by ``python -m benchmarks.experiments <letter>``;
 - ``speed.json`` by ``bt-tasksim bench --json``;
+- ``remote.json`` by ``python -m benchmarks.remote``;
 - ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
 
 ``--check`` changes nothing and fails when a table is not up to date.
@@ -32,11 +33,17 @@ from benchmarks.success import ROWS as MEASURED
 from bt_tasksim.files import write_text
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ("README.md", "docs/evaluation.md", "docs/training.md", "docs/experiments.md")
+PAGES = (
+    "README.md",
+    "docs/evaluation.md",
+    "docs/training.md",
+    "docs/experiments.md",
+    "docs/remote_engines.md",
+)
 ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
 KINDS = ("camera", "fromlogs")
-OTHER = ("speed", "decomposition", "learning")
+OTHER = ("speed", "decomposition", "learning", "remote")
 APART = ("oracle-", "grasp-", "experiment-", "training-")
 """How results begin that have tables of their own: see `benchmarks.learned_tables`, `experiments.pages`."""
 NOT_YET = "not measured yet"
@@ -159,6 +166,28 @@ def speed(results: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def remote(results: dict[str, Any]) -> str:
+    """What engines in other processes cost."""
+    found = results.get("remote") or {}
+    here = {"mujoco": "MuJoCo", "sapien": "SAPIEN"}.get(found.get("mixed_physics", ""), "physics")
+    rows = [
+        ("everything in one process", "in_process"),
+        ("physics served over loopback TCP", "physics_served"),
+        ("physics and kinematics served, two processes", "two_served"),
+        (f"{here} and pictures (SAPIEN) in one process", "pictures_in_process"),
+        (f"{here} here, pictures (SAPIEN) served", "pictures_served"),
+    ]
+    lines = ["| engines | control steps per second | over the same in one process |", "|---|---|---|"]
+    for label, key in rows:
+        rate, ratio = (found.get(f"{key}_{what}") for what in ("steps_per_s", "ratio"))
+        shown = f"{rate:.0f}" if rate is not None else NOT_YET
+        lines.append(f"| {label} | {shown} | {f'{ratio:.2f}' if ratio is not None else ''} |")
+    lines += ["", "| one step of physics, the robot at rest | |", "|---|---|"]
+    for label, key in (("in process", "step_us"), ("served over loopback TCP", "served_step_us")):
+        lines.append(f"| {label} | {f'{found[key]:.0f} us' if key in found else NOT_YET} |")
+    return "\n".join(lines)
+
+
 def decomposition(results: dict[str, Any]) -> str:
     """How many logs were decomposed rightly."""
     found = results.get("decomposition")
@@ -180,6 +209,7 @@ TABLES = {
     "commands": commands,
     "speed": speed,
     "decomposition": decomposition,
+    "remote": remote,
     **learned_tables.TABLES,
     **experiment_tables.TABLES,
 }

@@ -31,6 +31,14 @@ def seed(text: str) -> int:
     return value
 
 
+def port(text: str) -> int:
+    """A TCP port; 0 for a free one."""
+    value = whole(text)
+    if not 0 <= value <= 65535:
+        raise argparse.ArgumentTypeError(f"should be a port from 0 to 65535, found '{text}'")
+    return value
+
+
 def whole(text: str) -> int:
     """A whole number."""
     try:

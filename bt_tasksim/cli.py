@@ -17,7 +17,9 @@ from typing import Any
 
 from bt_tasksim.arguments import count as _count
 from bt_tasksim.arguments import policy as _policy
+from bt_tasksim.arguments import port as _port
 from bt_tasksim.arguments import seed as _seed
+from bt_tasksim.engines.remote.address import DEFAULT_PORT, LOOPBACK
 from bt_tasksim.errors import BtTasksimError, InputError, Terminated
 from bt_tasksim.progress import progress
 
@@ -131,6 +133,23 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--workers", type=_count, default=1, metavar="W", help="processes, default 1")
     evaluate.add_argument("--json", type=Path, metavar="F", help="write everything as JSON")
 
+    serve = add("serve-engine", _serve_engine, "Serve an engine of the pipeline to another process.")
+    serve.add_argument("role", metavar="ROLE", help="kinematics, physics, rendering or postprocess")
+    serve.add_argument("name", metavar="NAME", help="pinocchio; sapien; sapien; state or camera")
+    serve.add_argument("--robot", default="panda", metavar="R", help="default panda")
+    serve.add_argument("--noise", default="fine", metavar="N", help="of post-process state, default fine")
+    serve.add_argument("--port", type=_port, default=DEFAULT_PORT, metavar="P", help="0: a free one")
+    serve.add_argument("--address", default=LOOPBACK, metavar="A", help="any but this machine's own: --key")
+    serve.add_argument(
+        "--key", type=Path, metavar="FILE", help="the server's key: encrypt, admit its clients"
+    )
+    serve.add_argument("--objects", type=Path, metavar="DIR", help="mesh files, besides the bundled ones")
+
+    new_key = add("new-key", _new_key, "Make the key files of an engine's server and its clients.")
+    new_key.add_argument(
+        "file", type=Path, metavar="FILE", help="the server's; the clients' is put beside it"
+    )
+
     bench = add("bench", _bench, "Measure speed, as ratios to peers in one run.")
     bench.add_argument("--json", type=Path, metavar="F", help="write the numbers as JSON")
     bench.add_argument("--quick", action="store_true", help="fewer repetitions")
@@ -153,8 +172,25 @@ def _tree_arguments(parser: argparse.ArgumentParser, seed: bool = True) -> None:
 
 
 def _engine_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--engines", default="sapien", metavar="E", help="default sapien")
-    parser.add_argument("--perception", default="state", metavar="P", help="state (default) or camera")
+    parser.add_argument(
+        "--engines", default="sapien", metavar="E", help="physics: sapien (default), or remote:HOST:PORT"
+    )
+    parser.add_argument(
+        "--perception", default="state", metavar="P", help="state (default), camera, or remote:HOST:PORT"
+    )
+    parser.add_argument(
+        "--kinematics", default="pinocchio", metavar="K", help="pinocchio (default), or remote:HOST:PORT"
+    )
+    parser.add_argument(
+        "--rendering", default="sapien", metavar="R", help="sapien (default), or remote:HOST:PORT"
+    )
+    parser.add_argument("--key", default="", metavar="FILE", help="the client's key, for remote engines")
+    parser.add_argument(
+        "--timeout", type=float, default=2.0, metavar="S", help="seconds a remote step may take, default 2"
+    )
+    parser.add_argument(
+        "--connect-timeout", type=float, default=5.0, metavar="S", help="and a connection, default 5"
+    )
     parser.add_argument(
         "--noise", default="fine", metavar="N", help="estimate's error: fine (default), none, original, hard"
     )
@@ -182,6 +218,11 @@ def _options(options: argparse.Namespace, rendering: bool = False) -> Any:
         rendering=rendering,
         safety=options.safety,
         real_time=getattr(options, "real_time", False),
+        kinematics=options.kinematics,
+        renderer=options.rendering,
+        key=options.key,
+        timeout=options.timeout,
+        connect_timeout=options.connect_timeout,
     )
 
 
@@ -274,7 +315,7 @@ def _run(options: argparse.Namespace) -> int:
     engines = _options(options, rendering=options.video)
     parts = [source.name, Path(source.scene.robot).stem, str(options.seed)]
     if options.perception != "state":
-        parts.insert(2, options.perception)
+        parts.insert(2, options.perception.partition(":")[0])
     folder = options.out or Path("runs") / "-".join(parts)
     result, files = _run_tree(source.build(), source.scene, options.seed, engines, folder, source.name)
     print(f"{_summary(result)}; results: {_shown(files)}")
@@ -385,6 +426,32 @@ def _evaluate(options: argparse.Namespace) -> int:
         print(f"  {count:4d} x {reason}, such as seed {worst.seed}: {worst.why}")
     if options.json:
         print(f"wrote {options.json}")
+    return 0
+
+
+def _serve_engine(options: argparse.Namespace) -> int:
+    from bt_tasksim.engines.remote.command import serve
+
+    serve(
+        options.role,
+        options.name,
+        options.robot,
+        options.address,
+        options.port,
+        noise=options.noise,
+        key=options.key,
+        objects=options.objects,
+        say=lambda line: print(line, flush=True),
+        complain=lambda line: print(f"bt-tasksim: {line}", file=sys.stderr, flush=True),
+    )
+    return 0
+
+
+def _new_key(options: argparse.Namespace) -> int:
+    from bt_tasksim.engines.remote.keys import make_keys
+
+    server, client = make_keys(options.file)
+    print(f"wrote {server} for the server, and {client} for its clients; copy that to them, keep both secret")
     return 0
 
 

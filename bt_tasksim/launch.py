@@ -37,7 +37,11 @@ def run(
     if options is None:
         options = EngineOptions(**({"rendering": video is not None} | engines))
     runner = Runner(tree, scene, options)
-    if video is None:
-        return runner.run(seed)
-    with VideoRecorder(video) as recorder:
-        return runner.run(seed, record=recorder)
+    assert runner.pipeline is not None
+    try:
+        if video is None:
+            return runner.run(seed)
+        with VideoRecorder(video) as recorder:
+            return runner.run(seed, record=recorder)
+    finally:
+        runner.pipeline.close()

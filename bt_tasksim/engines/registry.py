@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import Any
 
 from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
 from bt_tasksim.engines.noise import noise_model
-from bt_tasksim.engines.pipeline import EnginePipeline, PhysicsEngine, PostProcessEngine, RenderingEngine
-from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.engines.pipeline import EnginePipeline, PostProcessEngine, RenderingEngine
+from bt_tasksim.engines.remote.address import is_remote, parse_remote
+from bt_tasksim.errors import InputError, MachineError, nearest
 from bt_tasksim.pacing import Clock, FreeClock, PacedPhysics, RealTimeClock
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.safety.engine import RealEngine
@@ -15,10 +18,19 @@ from bt_tasksim.safety.guard import Guard
 from bt_tasksim.safety.guarded_robot import GuardedRobot
 from bt_tasksim.safety.guarded_simulation import GuardedSimulation
 
+KINEMATICS = ("pinocchio",)
 ENGINES = ("sapien",)
+RENDERERS = ("sapien",)
 PERCEPTIONS = ("state", "camera")
 PATIENCE = 0.03
 """Seconds for which the inverse kinematics of a real robot looks for another posture."""
+ROLES = {
+    "kinematics": KINEMATICS,
+    "physics": ENGINES,
+    "rendering": RENDERERS,
+    "postprocess": PERCEPTIONS,
+}
+"""Names of the engines by role; ``remote:HOST:PORT`` is one in another process, for each role."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +44,11 @@ class EngineOptions:
         rendering: A rendering engine is wanted, for a recording.
         safety: A simulation, too, runs behind the guard; a real robot always does.
         real_time: A simulation, too, runs in real time; a real robot always does.
+        kinematics: Name of the kinematics engine.
+        renderer: Name of the rendering engine, where one is wanted.
+        key: The client's key file, for engines on other machines.
+        timeout: Seconds that a step of an engine in another process may take.
+        connect_timeout: Seconds within which it must be there.
     """
 
     engines: str = "sapien"
@@ -40,50 +57,70 @@ class EngineOptions:
     rendering: bool = False
     safety: bool = False
     real_time: bool = False
+    kinematics: str = "pinocchio"
+    renderer: str = "sapien"
+    key: str = ""
+    timeout: float = 2.0
+    connect_timeout: float = 5.0
 
     def __post_init__(self) -> None:
-        if self.engines not in ENGINES:
-            raise InputError(f"unknown engines '{self.engines}'{nearest(self.engines, ENGINES)}")
-        if self.perception not in PERCEPTIONS:
-            raise InputError(f"unknown perception '{self.perception}'{nearest(self.perception, PERCEPTIONS)}")
+        for what, name, known in (
+            ("engines", self.engines, ENGINES),
+            ("perception", self.perception, PERCEPTIONS),
+            ("kinematics", self.kinematics, KINEMATICS),
+            ("rendering", self.renderer, RENDERERS),
+        ):
+            if is_remote(name):
+                parse_remote(name)
+            elif name not in known:
+                raise InputError(f"unknown {what} '{name}'{nearest(name, known)}")
         noise_model(self.noise)
+        for limit in (self.timeout, self.connect_timeout):
+            if not 0.0 < limit < 3600.0:
+                raise InputError(f"a time-out is a positive number of seconds below 3600, found {limit:g}")
+
+    @property
+    def remote(self) -> bool:
+        """Some engine is in another process, which serves one client at a time."""
+        return any(map(is_remote, (self.engines, self.perception, self.kinematics, self.renderer)))
 
     @property
     def label(self) -> str:
         """How results name the perception."""
-        return "camera" if self.perception == "camera" else f"state, noise {self.noise}"
+        return f"state, noise {self.noise}" if self.perception == "state" else self.perception
 
 
 def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePipeline:
     """The pipeline for a robot.
 
     Raises:
-        MachineError: An engine cannot start on this machine.
+        InputError: An engine in another process is not one for this robot and version, or its key is no good.
+        MachineError: An engine cannot start on this machine, or does not answer from another process.
     """
-    from bt_tasksim.engines.physics_sapien import SapienPhysics
+    with ExitStack() as built:
 
-    kinematics = PinocchioKinematics(robot)
-    physics: PhysicsEngine = SapienPhysics(robot)
-    clock: Clock = FreeClock()
-    if options.safety:
-        physics = GuardedSimulation(physics, Guard(robot, kinematics.forward))
-    if options.real_time:
-        clock = RealTimeClock()
-        physics = PacedPhysics(physics, clock)
-    rendering: RenderingEngine | None = None
-    if options.rendering or options.perception == "camera":
-        from bt_tasksim.engines.rendering_sapien import SapienRendering
+        def engine(role: str, name: str) -> Any:
+            if is_remote(name):
+                made = connect(role, name, robot, options)
+            else:
+                made = build_engine(role, name, robot, options.noise)
+            if hasattr(made, "close"):
+                built.callback(made.close)
+            return made
 
-        rendering = SapienRendering()
-    postprocess: PostProcessEngine
-    if options.perception == "camera":
-        from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
-
-        postprocess = CameraPostProcess(robot)
-    else:
-        from bt_tasksim.engines.postprocess_state import StatePostProcess
-
-        postprocess = StatePostProcess(robot, noise_model(options.noise))
+        kinematics = engine("kinematics", options.kinematics)
+        physics = engine("physics", options.engines)
+        postprocess = engine("postprocess", options.perception)
+        rendering = None
+        if options.rendering or getattr(postprocess, "perception", "") == "camera":
+            rendering = engine("rendering", options.renderer)
+        clock: Clock = FreeClock()
+        if options.safety:
+            physics = GuardedSimulation(physics, Guard(robot, PinocchioKinematics(robot).forward))
+        if options.real_time:
+            clock = RealTimeClock()
+            physics = PacedPhysics(physics, clock)
+        built.pop_all()  # all of them are there: they stay
     return EnginePipeline(kinematics, physics, postprocess, rendering, clock)
 
 
@@ -101,3 +138,61 @@ def robot_pipeline(
     kinematics, clock = PinocchioKinematics(robot, patience=PATIENCE), RealTimeClock()
     physics = GuardedRobot(engine, Guard(robot, kinematics.forward), clock)
     return EnginePipeline(kinematics, physics, postprocess, rendering, clock)
+
+
+def build_engine(role: str, name: str, robot: RobotDescription, noise: str = "fine") -> Any:
+    """One engine in this process.
+
+    Args:
+        role: One of `ROLES`.
+        name: Its name.
+        robot: The robot.
+        noise: Name of the noise model, for post-process ``state``.
+
+    Raises:
+        InputError: There is no such role or engine.
+        MachineError: The engine cannot start on this machine.
+    """
+    if role not in ROLES:
+        raise InputError(f"unknown role of an engine '{role}'{nearest(role, ROLES)}")
+    match role, name:
+        case "kinematics", "pinocchio":
+            return PinocchioKinematics(robot)
+        case "physics", "sapien":
+            from bt_tasksim.engines.physics_sapien import SapienPhysics
+
+            return SapienPhysics(robot)
+        case "rendering", "sapien":
+            from bt_tasksim.engines.rendering_sapien import SapienRendering
+
+            return SapienRendering()
+        case "postprocess", "camera":
+            from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
+
+            return CameraPostProcess(robot)
+        case "postprocess", "state":
+            from bt_tasksim.engines.postprocess_state import StatePostProcess
+
+            return StatePostProcess(robot, noise_model(noise))
+        case _:
+            raise InputError(f"unknown {role} engine '{name}'{nearest(name, ROLES[role])}")
+
+
+def connect(role: str, name: str, robot: RobotDescription, options: EngineOptions) -> Any:
+    """One engine in another process, see `bt_tasksim.engines.remote`.
+
+    Raises:
+        InputError: It is not one for this robot and version, or the key is no good.
+        MachineError: It does not answer.
+    """
+    try:
+        from bt_tasksim.engines.remote.client import Connection, Limits
+        from bt_tasksim.engines.remote.engines import ENGINES as REMOTE
+        from bt_tasksim.engines.remote.keys import CLIENT, load_key
+    except ImportError as error:
+        raise MachineError(
+            f"engines in other processes need the extra 'remote' ({error}): pip install 'bt-tasksim[remote]'"
+        ) from error
+    key = load_key(options.key, CLIENT) if options.key else None
+    limits = Limits(connect=options.connect_timeout, step=options.timeout)
+    return REMOTE[role](Connection(parse_remote(name), role, robot, key, limits))

@@ -18,7 +18,7 @@ from typing import Any
 from py_trees.common import Status
 
 from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import BtTasksimError, InputError
+from bt_tasksim.errors import BtTasksimError, InputError, MachineError
 from bt_tasksim.interrupts import held_back
 
 CONFIDENCE = 0.95
@@ -146,11 +146,14 @@ def evaluate(
 
     Raises:
         InputError: The tree, scene, robot or engines are no good, or there are no seeds.
+        MachineError: An engine in another process has gone away.
     """
     if not seeds:
         raise InputError("an evaluation needs at least one episode")
     if workers < 1:
         raise InputError(f"an evaluation needs at least one worker, found {workers}")
+    if workers > 1 and job.options.remote:
+        raise InputError("an engine in another process serves one client at a time: evaluate with 1 worker")
     started = time.perf_counter()
     runner = _runner(job)  # errors show here, before any process starts
     found: dict[int, Outcome] = {}
@@ -181,7 +184,12 @@ def evaluate(
 
 
 def episode(runner: Any, seed: int, stream: str = "evaluation") -> Outcome:
-    """One episode; an error in it is a failure with the error as its reason."""
+    """One episode; an error in it is a failure with the error as its reason.
+
+    Raises:
+        InputError: Tree or scene are no good.
+        MachineError: An engine in another process has gone away.
+    """
     started = time.perf_counter()
     nan = float("nan")
     try:
@@ -189,6 +197,8 @@ def episode(runner: Any, seed: int, stream: str = "evaluation") -> Outcome:
     except InputError:
         raise
     except BtTasksimError as error:
+        if isinstance(error, MachineError) and runner.options.remote:
+            raise  # an engine that is not there any more says nothing about the tree
         return Outcome(
             seed, False, Status.INVALID.name, type(error).__name__, str(error), 0, nan, nan, nan,
             time.perf_counter() - started,

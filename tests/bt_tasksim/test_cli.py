@@ -30,9 +30,14 @@ COMMANDS = (
     "new",
     "replay",
     "evaluate",
+    "serve-engine",
+    "new-key",
     "bench",
 )
-HEAVY = ("torch", "sapien", "mani_skill", "pinocchio", "mujoco", "ray", "cv2", "scipy", "h5py", "networkx")
+HEAVY = (
+    "torch", "sapien", "mani_skill", "pinocchio", "mujoco", "ray", "cv2", "scipy", "h5py", "networkx", "zmq",
+    "msgpack",
+)  # fmt: skip
 
 TREE = """
 from bt_tasksim import Scene

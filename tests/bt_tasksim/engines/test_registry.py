@@ -1,12 +1,14 @@
 """Engines by name."""
 
+import sys
+
 import pytest
 
 from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physics_sapien import SapienPhysics
 from bt_tasksim.engines.postprocess_state import StatePostProcess
-from bt_tasksim.engines.registry import EngineOptions, build_pipeline
-from bt_tasksim.errors import InputError
+from bt_tasksim.engines.registry import ROLES, EngineOptions, build_engine, build_pipeline
+from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.robot import load_robot
 
 
@@ -27,6 +29,7 @@ def test_the_default_is_sapien_with_fine_noise_and_no_images():
         ({}, "state, noise fine"),
         ({"noise": "none"}, "state, noise none"),
         ({"perception": "camera"}, "camera"),
+        ({"perception": "remote:localhost:5599"}, "remote:localhost:5599"),
     ],
 )
 def test_results_say_which_perception_it_was(options, label):
@@ -39,8 +42,40 @@ def test_results_say_which_perception_it_was(options, label):
         ({"engines": "sapiens"}, r"unknown engines 'sapiens'; did you mean 'sapien'\?"),
         ({"perception": "camra"}, r"unknown perception 'camra'; did you mean 'camera'\?"),
         ({"noise": "nome"}, r"unknown noise model 'nome'; did you mean 'none'\?"),
+        ({"kinematics": "pinochio"}, r"unknown kinematics 'pinochio'; did you mean 'pinocchio'\?"),
+        ({"renderer": "sapient"}, r"unknown rendering 'sapient'; did you mean 'sapien'\?"),
+        ({"engines": "remote:here"}, "'remote:here' should read remote:HOST:PORT"),
+        ({"renderer": "remote:here:0"}, "'remote:here:0' should end with a port from 1 to 65535"),
+        ({"timeout": 0.0}, "a time-out is a positive number of seconds"),
+        ({"connect_timeout": 1e9}, "a time-out is a positive number of seconds"),
+        ({"timeout": float("nan")}, "a time-out is a positive number of seconds"),
     ],
 )
 def test_unknown_names_are_refused_with_the_nearest(options, sentence):
     with pytest.raises(InputError, match=sentence):
         EngineOptions(**options)
+
+
+def test_options_say_whether_an_engine_is_elsewhere():
+    assert not EngineOptions().remote
+    for where in ("engines", "perception", "kinematics", "renderer"):
+        assert EngineOptions(**{where: "remote:localhost:5599"}).remote
+
+
+def test_every_name_of_a_role_can_be_built():
+    for role, names in ROLES.items():
+        for name in names:
+            if role != "rendering":  # needs a device to draw with
+                assert build_engine(role, name, load_robot("panda")) is not None
+    with pytest.raises(InputError, match=r"unknown role of an engine 'physic'; did you mean 'physics'\?"):
+        build_engine("physic", "sapien", load_robot("panda"))
+    with pytest.raises(InputError, match="unknown physics engine 'pinocchio'; known: "):
+        build_engine("physics", "pinocchio", load_robot("panda"))
+
+
+def test_what_is_not_installed_is_said(monkeypatch):
+    monkeypatch.setitem(sys.modules, "zmq", None)
+    for name in [n for n in sys.modules if n.startswith("bt_tasksim.engines.remote.")]:
+        monkeypatch.delitem(sys.modules, name)
+    with pytest.raises(MachineError, match=r"need the extra 'remote' .*pip install 'bt-tasksim\[remote\]'"):
+        build_pipeline(load_robot("panda"), EngineOptions(engines="remote:localhost:5599"))

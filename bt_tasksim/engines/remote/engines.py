@@ -1,0 +1,167 @@
+"""Engines of the pipeline that are in another process: each is the role's methods over a connection."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bt_tasksim.engines.pipeline import Image
+from bt_tasksim.engines.remote.bundles import arrays_of, bundle_of
+from bt_tasksim.engines.remote.client import Connection
+from bt_tasksim.engines.remote.configurations import for_sending
+from bt_tasksim.errors import InputError
+from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.world import Command, Hidden, JointTarget, Observation, WorldModel, WorldState
+
+
+class _RemoteEngine:
+    """What the roles have in common.
+
+    Args:
+        connection: To a server of this role.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self.connection = connection
+
+    def close(self) -> None:
+        """Let go of the served engine."""
+        self.connection.close()
+
+    def _begin(self, configuration: ActorConfiguration, reply: str) -> Any:
+        connection = self.connection
+        if connection.broken:  # an episode begins anew, and so may a connection
+            connection.open()
+        sent = {"configuration": for_sending(configuration, connection.robot)}
+        connection.begin(configuration)
+        return connection.request("reset", reply, connection.limits.slow, sent)
+
+    def _ask(self, kind: str, *replies: str, slow: bool = False, **content: Any) -> Any:
+        limits = self.connection.limits
+        return self.connection.request(kind, replies, limits.slow if slow else limits.step, **content)
+
+
+class RemotePhysics(_RemoteEngine):
+    """A `PhysicsEngine` in another process."""
+
+    def reset(self, configuration: ActorConfiguration) -> WorldState:
+        """See `PhysicsEngine.reset`."""
+        return bundle_of(WorldState, self._begin(configuration, "state").arrays)
+
+    def step(self, target: JointTarget) -> WorldState:
+        """See `PhysicsEngine.step`.
+
+        Raises:
+            MachineError: The server has gone, is too slow or answers nonsense.
+        """
+        return bundle_of(WorldState, self._ask("step", "state", arrays=arrays_of(target)).arrays)
+
+    def hidden(self) -> Hidden | None:
+        """See `PhysicsEngine.hidden`."""
+        reply = self._ask("hidden", "truth", "no truth")
+        return bundle_of(Hidden, reply.arrays) if reply.kind == "truth" else None
+
+
+class RemoteKinematics(_RemoteEngine):
+    """A `KinematicsEngine` in another process."""
+
+    def reset(self, configuration: ActorConfiguration) -> None:
+        """See `KinematicsEngine.reset`."""
+        self._begin(configuration, "done")
+
+    def solve(self, command: Command, state: WorldState) -> JointTarget:
+        """See `KinematicsEngine.solve`.
+
+        Raises:
+            UnreachableError: The arm cannot be there; nothing has moved.
+            MachineError: The server has gone, is too slow or answers nonsense.
+        """
+        arrays = {**arrays_of(state), **arrays_of(command)}
+        return bundle_of(JointTarget, self._ask("solve", "target", arrays=arrays).arrays)
+
+    def joints_of_hand_start(self, start: tuple[float, ...]) -> tuple[float, ...]:
+        """See `PinocchioKinematics.joints_of_hand_start`."""
+        reply = self._ask("hand_start", "joints", arrays={"start": start})
+        return tuple(reply.arrays["position"].tolist())
+
+
+class RemoteRendering(_RemoteEngine):
+    """A `RenderingEngine` in another process."""
+
+    def reset(self, configuration: ActorConfiguration) -> None:
+        """See `RenderingEngine.reset`."""
+        self._begin(configuration, "done")
+
+    def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
+        """See `RenderingEngine.render`.
+
+        Raises:
+            InputError: There is no such camera.
+            MachineError: The server has gone, is too slow or answers nonsense.
+        """
+        fields = {"camera": camera, "depth": depth}
+        reply = self._ask("render", "image", slow=True, fields=fields, arrays=arrays_of(state))
+        image: Image = reply.images[0]
+        return image
+
+
+class RemotePostProcess(_RemoteEngine):
+    """A `PostProcessEngine` in another process."""
+
+    def __init__(self, connection: Connection) -> None:
+        super().__init__(connection)
+        self._unseen: dict[str, str] = {}
+
+    @property
+    def perception(self) -> str:
+        """``state`` or ``camera``: what the served engine is."""
+        return self.connection.engine
+
+    def reset(self, configuration: ActorConfiguration, model: WorldModel) -> None:
+        """See `PostProcessEngine.reset`; the other side makes the model from the configuration.
+
+        Raises:
+            InputError: The model is another one than that.
+        """
+        robot = self.connection.robot
+        own = configuration.world_model([tip.name for tip in robot.tips], robot.opening)
+        if (own.objects, own.tips, own.control_period) != (model.objects, model.tips, model.control_period):
+            raise InputError("a served post-process engine takes the world's own model, and no other one")
+        self._unseen = {}
+        self._begin(configuration, "done")
+
+    def cameras(self, needed: bool) -> tuple[str, ...]:
+        """See `PostProcessEngine.cameras`."""
+        names: tuple[str, ...] = self._ask("cameras", "names", fields={"needed": bool(needed)}).fields[
+            "names"
+        ]
+        return names
+
+    def observe(self, state: WorldState, images: Mapping[str, Image]) -> Observation:
+        """See `PostProcessEngine.observe`.
+
+        Raises:
+            MachineError: The server has gone, is too slow or answers nonsense.
+        """
+        reply = self._ask(
+            "observe",
+            "observation",
+            slow=bool(images),
+            arrays=arrays_of(state),
+            images=tuple(images.values()),
+        )
+        self._unseen = reply.fields["unseen"]
+        return bundle_of(Observation, reply.arrays)
+
+    def unseen(self) -> dict[str, str]:
+        """Why perception has never seen an object, one sentence each, by the object's name."""
+        return self._unseen
+
+
+ENGINES = {
+    "kinematics": RemoteKinematics,
+    "physics": RemotePhysics,
+    "rendering": RemoteRendering,
+    "postprocess": RemotePostProcess,
+}
+"""The client's side of each role."""
