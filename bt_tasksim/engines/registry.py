@@ -10,7 +10,7 @@ from bt_tasksim.engines.pipeline import EnginePipeline, PhysicsEngine, PostProce
 from bt_tasksim.errors import InputError, nearest
 from bt_tasksim.robot import RobotDescription
 
-ENGINES = ("sapien",)
+ENGINES = ("sapien", "mujoco")
 PERCEPTIONS = ("state", "camera")
 
 
@@ -49,9 +49,15 @@ def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePip
     Raises:
         MachineError: An engine cannot start on this machine.
     """
-    from bt_tasksim.engines.physics_sapien import SapienPhysics
+    physics: PhysicsEngine
+    if options.engines == "mujoco":
+        from bt_tasksim.engines.physics_mujoco import MujocoPhysics
 
-    physics: PhysicsEngine = SapienPhysics(robot)
+        physics = MujocoPhysics(robot)
+    else:
+        from bt_tasksim.engines.physics_sapien import SapienPhysics
+
+        physics = SapienPhysics(robot)
     rendering: RenderingEngine | None = None
     if options.rendering or options.perception == "camera":
         from bt_tasksim.engines.rendering_sapien import SapienRendering

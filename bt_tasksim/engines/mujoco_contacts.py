@@ -1,0 +1,108 @@
+"""How bodies touch in MuJoCo: which pairs of shapes can, and the parameters of their contacts.
+
+MuJoCo takes the larger of two frictions, and PhysX their mean; so that one configuration means the same in both,
+every pair of shapes that can touch is stated, with its own parameters, and no others are looked for.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+ROLES = ("base", "link", "object", "fixture")
+"""What a shape belongs to: a link of the robot that stands still, any other link, an object, a fixture."""
+
+TIMESTEP = 0.002
+"""Seconds of a step, at most: a whole number of them makes a control period."""
+FINE_STEP = 0.0005
+"""Seconds of a step, at most, while an object falls or is pushed: it comes no deeper than half a millimetre or
+so in what it hits. A contact's time constant is twice the step: stiffer ones would not be stable."""
+REACH = 0.002
+"""Metres of distance up to which contacts are looked for; they carry force from 0 on."""
+SOLREF = (2 * FINE_STEP, 1.0)
+"""Time constant in seconds, which MuJoCo raises to twice the step, and damping ratio of contacts."""
+SOLIMP = (0.98, 0.99, 0.001, 0.5, 2.0)
+"""Impedance of contacts: nearly hard from the first micrometre on."""
+IMPRATIO = 20.0
+"""Impedance of friction over that of the normal force: what is held does not creep out of the hand."""
+FRICTION = 0.5
+"""Friction of the robot's links other than the pads."""
+_NO_TWIST = 1e-5
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a shape belongs to.
+
+    Attributes:
+        role: One of `ROLES`.
+        index: Number of the object, or of the fixture behind the objects; -1 for links.
+        name: Name of the link, the object or the fixture.
+        tip: Number of the fingertip, or -1.
+        neighbours: Names of the links that a joint joins to it.
+    """
+
+    role: str
+    index: int
+    name: str
+    tip: int = -1
+    neighbours: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Friction, and radius in metres of the contact patch that resists twisting; 0: a point."""
+
+    friction: float
+    patch: float = 0.0
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A convex shape: its name in the model, its body and surface."""
+
+    name: str
+    body: Body
+    surface: Surface
+
+
+def touching_pairs(solids: Sequence[Solid]) -> Iterator[tuple[Solid, Solid]]:
+    """All pairs of shapes that can touch.
+
+    Objects touch everything. Links touch objects and fixtures; of each other, only fingertips touch links, unless
+    a joint joins the two. What stands still does not touch what stands still.
+    """
+    for a, b in itertools.combinations(solids, 2):
+        if _can_touch(a.body, b.body):
+            yield a, b
+
+
+def _can_touch(a: Body, b: Body) -> bool:
+    roles = {a.role, b.role}
+    if "object" in roles:
+        return a.role != b.role or a.index != b.index
+    if "link" not in roles:
+        return False
+    if "fixture" in roles:
+        return True
+    if a.name == b.name or a.name in b.neighbours or b.name in a.neighbours:
+        return False
+    return a.tip >= 0 or b.tip >= 0
+
+
+def add_pair(spec: Any, a: Solid, b: Solid) -> None:
+    """State a pair in a ``mujoco.MjSpec``: friction is the mean of both, as in PhysX.
+
+    A patch of radius r that presses with the force f resists twisting with up to friction * r * f.
+    """
+    friction = (a.surface.friction + b.surface.friction) / 2
+    patch = max(a.surface.patch, b.surface.patch)
+    pair = spec.add_pair(name=f"{a.name} {b.name}", geomname1=a.name, geomname2=b.name)
+    pair.condim = 4 if patch > 0.0 else 3
+    pair.friction = [friction, friction, max(friction * patch, _NO_TWIST), _NO_TWIST, _NO_TWIST]
+    pair.solref = list(SOLREF)
+    pair.solimp = list(SOLIMP)
+    pair.margin = 0.0
+    pair.gap = REACH
