@@ -15,7 +15,7 @@ from bt_tasksim import poses
 from bt_tasksim.engines.disturbance import Knock
 from bt_tasksim.engines.mujoco_contacts import FINE_STEP, TIMESTEP
 from bt_tasksim.engines.mujoco_model import World, build_world
-from bt_tasksim.engines.mujoco_sensing import ContactReader, wrist_wrench
+from bt_tasksim.engines.mujoco_sensing import ContactReader, Felt, Near, wrist_wrench
 from bt_tasksim.errors import MachineError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
@@ -62,6 +62,7 @@ class MujocoPhysics:
         self._data: Any = mujoco.MjData(world.model)
         self._period = 1.0 / configuration.control_frequency
         self._steps = math.ceil(self._period / TIMESTEP - 1e-9)
+        self._sensed = max(round(self._steps * configuration.control_frequency / configuration.physics_frequency), 1)
         self._finer = math.ceil(self._period / self._steps / FINE_STEP - 1e-9)
         self._periods = 0
         self._names = [actor.name for actor in configuration.objects]
@@ -81,7 +82,11 @@ class MujocoPhysics:
             self._names.index(configuration.disturbance.object) if configuration.disturbance else -1
         )
         self._penetration, self._falling, self._watch = 0.0, False, 0
-        self._touched, self._support = np.zeros(0, bool), np.zeros(0, bool)
+        n = len(self._names)
+        self._felt = Felt(np.zeros((len(robot.tips), 3)), np.zeros(n), np.zeros(6))
+        self._near = Near(np.full(n, np.inf), np.zeros((n, n + len(configuration.fixtures)), bool))
+        mujoco.mj_forward(world.model, self._data)
+        self._samples = [self._feel()]
         return self._state()
 
     def _index_links(self) -> None:
@@ -109,68 +114,84 @@ class MujocoPhysics:
             self._watch = WATCHED
         self._set_target(target)
         self._world.model.opt.timestep = self._period / self._steps
-        if not self._knock.over:
-            for _ in range(self._steps):
-                self._disturbed_step()
-        elif self._falling:
-            self._fine_steps(self._steps)
-        elif self._watch > 0:
-            self._watch -= 1
-            for _ in range(self._steps):
-                self._mujoco.mj_step(self._world.model, self._data)
-                self._read_depth()
-        else:
-            self._mujoco.mj_step(self._world.model, self._data, self._steps)
+        self._samples = []
+        quiet = self._knock.over and not self._falling and self._watch == 0
+        if quiet:
+            self._mujoco.mj_step(self._world.model, self._data, self._steps - self._sensed)
+        for k in range(self._steps - self._sensed if quiet else 0, self._steps):
+            self._step(sensed=k >= self._steps - self._sensed)
+        self._watch = max(self._watch - 1, 0)
         self._periods += 1
         return self._state()
 
-    def _fine_steps(self, n: int) -> None:
-        """Move on by ``n`` ordinary steps in finer ones."""
-        model, data = self._world.model, self._data
-        ordinary = model.opt.timestep
-        model.opt.timestep = ordinary / self._finer
-        for _ in range(n * self._finer):
-            if self._knock.pushing:
-                self._push()
-            self._mujoco.mj_step(model, data)
+    def _step(self, sensed: bool) -> None:
+        """One ordinary step, in finer ones while something falls or is pushed."""
+        model, data, mj_step = self._world.model, self._data, self._mujoco.mj_step
+        if not self._knock.over:
+            k = self._knocked
+            held = bool(self._felt.hand_force[k] > 1.0 and not self._near.support[k].any())
+            self._knock.watch(float(data.time), held)
+        if self._falling or self._knock.pushing:
+            ordinary = model.opt.timestep
+            model.opt.timestep = ordinary / self._finer
+            for _ in range(self._finer):
+                if self._knock.pushing:
+                    self._push()
+                mj_step(model, data)
+                self._read_depth()
+            model.opt.timestep = ordinary
+        else:
+            mj_step(model, data)
             self._read_depth()
-        model.opt.timestep = ordinary
+        if sensed:
+            self._samples.append(self._feel())
+
+    def _feel(self) -> Felt:
+        """The forces of the last step."""
+        model, data = self._world.model, self._data
+        self._mujoco.mj_rnePostConstraint(model, data)
+        x, y, z, *q = self._tool().tolist()
+        force, torque = wrist_wrench(data, self._root_body, self._wrist_body, (x, y, z))
+        back = [0.0, 0.0, 0.0, q[0], -q[1], -q[2], -q[3]]
+        wrench = np.array([*poses.point(back, force), *poses.point(back, torque)])
+        return Felt(*self._reader.forces(data), wrench)
 
     def _read_depth(self) -> None:
         """Remember the deepest overlap."""
-        depth, a, b = self._reader.deepest(self._data)
-        if depth > self._penetration:
-            self._penetration = depth
-            self.deepest_pair = (a, b, depth, float(self._data.time))
+        found = self._reader.deeper(self._data, self._penetration)
+        if found is not None:
+            self._penetration, a, b = found
+            self.deepest_pair = (a, b, self._penetration, float(self._data.time))
 
     def _state(self) -> WorldState:
-        """The state of now, with positions, contacts and forces that belong to it."""
+        """The state of now: positions and distances of this instant, forces as felt since just before."""
         model, data, world = self._world.model, self._data, self._world
-        self._mujoco.mj_forward(model, data)
-        self._mujoco.mj_rnePostConstraint(model, data)
+        self._mujoco.mj_kinematics(model, data)
+        self._mujoco.mj_comPos(model, data)
+        self._mujoco.mj_collision(model, data)
         self._read_depth()
-        contacts = self._contacts = self._reader.read(data)
-        touched = contacts.hand_force > 0.0
-        if not (np.array_equal(touched, self._touched) and np.array_equal(contacts.support, self._support)):
+        near, felt = self._reader.near(data), Felt.mean(self._samples)
+        touched = felt.hand_force > 0.0
+        if not (
+            np.array_equal(touched, self._felt.hand_force > 0.0)
+            and np.array_equal(near.support, self._near.support)
+        ):
             self._watch = WATCHED
-        self._touched, self._support = touched, contacts.support
+        self._near, self._felt = near, felt
         q, v = data.qpos[world.joint_qpos], data.qvel[world.joint_dof]
         effort = self._stiffness * (self._target.position - q) + self._damping * (self._target.velocity - v)
-        tool = self._tool()
         velocities = self._object_velocities()
         speed = np.linalg.norm(velocities.reshape(-1, 2, 3), axis=-1)
         self._falling = bool(np.any(~touched[:, None] & (speed > FALLING)))
-        tips = poses.transform(self._poses(self._tip_bodies), self._tip_points)
-        rotation = poses.to_matrix(tool[3:])
         return WorldState(
             time=np.float64(self._periods * self._period),
             joint_position=q,
             joint_velocity=v,
             joint_effort=np.clip(effort, -self._limit, self._limit),
-            tip_force=contacts.tip_force,
-            wrench=wrist_wrench(data, self._root_body, self._wrist_body, tool[:3], rotation),
-            tool_pose=tool,
-            tips=tips,
+            tip_force=felt.tip_force,
+            wrench=felt.wrench,
+            tool_pose=self._tool(),
+            tips=poses.transform(self._poses(self._tip_bodies), self._tip_points),
             objects=self._poses(world.object_body),
             velocities=velocities,
         )
@@ -198,28 +219,17 @@ class MujocoPhysics:
             time=np.float64(self._periods * self._period),
             objects=self._poses(self._world.object_body),
             velocities=self._object_velocities(),
-            hand_force=self._contacts.hand_force.copy(),
-            hand_distance=self._contacts.hand_distance.copy(),
-            support=self._contacts.support.copy(),
+            hand_force=self._felt.hand_force.copy(),
+            hand_distance=self._near.hand_distance.copy(),
+            support=self._near.support.copy(),
             penetration=np.float64(self._penetration),
             tool_pose=self._tool(),
         )
 
-    # ---- disturbance ------------------------------------------------------------------------------------
-
-    def _disturbed_step(self) -> None:
-        """One step, with a push that begins some time after the object was first held clear."""
-        k, contacts = self._knocked, self._contacts
-        held = bool(contacts.hand_force[k] > 1.0 and not contacts.support[k].any())
-        self._knock.watch(float(self._data.time), held)
-        if self._knock.pushing or self._falling:
-            self._fine_steps(1)
-        else:
-            self._mujoco.mj_step(self._world.model, self._data)
-
     def _push(self) -> None:
+        """Set the force of the disturbance for the next step."""
         k, data = self._knocked, self._data
-        touched = bool(self._reader.read(data).hand_force[k] > 0.0)
+        touched = bool(self._reader.near(data).hand_distance[k] < np.inf)
         force = self._knock.force(float(data.time), touched, self._object_velocities()[k, :3])
         body = self._world.object_body[k]
         lever = data.xpos[body] - data.xipos[body]
