@@ -131,7 +131,8 @@ class MujocoPhysics:
             k = self._knocked
             held = bool(self._felt.hand_force[k] > 1.0 and not self._near.support[k].any())
             self._knock.watch(float(data.time), held)
-        if self._falling or self._knock.pushing:
+            self._falling |= self._knock.pushing  # until the period's end, where it is looked at again
+        if self._falling:
             ordinary = model.opt.timestep
             model.opt.timestep = ordinary / self._finer
             for _ in range(self._finer):
