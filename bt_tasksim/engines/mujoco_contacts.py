@@ -16,14 +16,17 @@ ROLES = ("base", "link", "object", "fixture")
 
 TIMESTEP = 0.002
 """Seconds of a step, at most: a whole number of them makes a control period."""
-FINE_STEP = 0.0005
-"""Seconds of a step, at most, while an object falls or is pushed: it comes no deeper than half a millimetre or
-so in what it hits. A contact's time constant is twice the step: stiffer ones would not be stable."""
+FINE_STEP = 0.00025
+"""Seconds of a step, at most, while an object falls or is pushed: what lands at 2 m/s then goes less than a
+millimetre deep."""
 REACH = 0.002
 """Metres of distance up to which contacts are looked for; they carry force from 0 on."""
-SOLREF = (2 * FINE_STEP, 1.0)
-"""Time constant in seconds, which MuJoCo raises to twice the step, and damping ratio of contacts among objects
-and fixtures, and of all friction: as hard as the step allows."""
+SOLREF = (4 * FINE_STEP, 1.0)
+"""Time constant in seconds and damping ratio of contacts among objects and fixtures. MuJoCo raises the time to
+twice the step, which is what counts in ordinary steps; twice the fine step would let things that slide hop."""
+FRICTION_SOLREF = (2 * TIMESTEP, 1.0)
+"""The same of all friction. Slower, and things slide below the angle of friction; faster, and what slides hops:
+MuJoCo's friction pushes bodies apart in proportion to the rate at which it would stop them."""
 HAND_SOLREF = (0.012, 1.0)
 """The same of what the robot presses on: pads and the structure behind them give way. 30 N of a finger press
 some 0.6 mm deep; an arm that hits something at 0.3 m/s comes to rest within a millimetre or two. Harder, and
@@ -113,7 +116,7 @@ def add_pair(spec: Any, a: Solid, b: Solid) -> None:
     robot = not {"link", "base"}.isdisjoint((a.body.role, b.body.role))
     pair.condim = (4 if patch > 0.0 else 3) if robot else 6
     pair.friction = [friction, friction, max(friction * patch, _NO_TWIST), ROLLING, ROLLING]
-    pair.solreffriction = list(SOLREF)
+    pair.solreffriction = list(FRICTION_SOLREF)
     pair.solref = list(HAND_SOLREF if robot else SOLREF)
     pair.solimp = list(SOLIMP)
     pair.margin = 0.0
