@@ -31,8 +31,11 @@ HAND_SOLREF = (0.012, 1.0)
 """The same of what the robot presses on: pads and the structure behind them give way. 30 N of a finger press
 some 0.6 mm deep; an arm that hits something at 0.3 m/s comes to rest within a millimetre or two. Harder, and
 every brush of a finger with a cup's rim is a blow of 150 N; softer, and the judge's 2 mm of overlap come near."""
-SOLIMP = (0.98, 0.99, 0.001, 0.5, 2.0)
-"""Impedance of contacts: nearly that of rigid bodies from the first micrometre on."""
+SOLIMP = (0.99, 0.998, 0.001, 0.5, 2.0)
+"""Impedance of contacts among objects and fixtures: nearly that of rigid bodies. MuJoCo measures it by the masses
+that touch, so that it must carry a light cup which a heavy arm sets down."""
+HAND_SOLIMP = (0.98, 0.99, 0.001, 0.5, 2.0)
+"""The same of what the robot presses on."""
 IMPRATIO = 100.0
 """Impedance of friction over that of the normal force: what is held creeps by some 0.01 mm in 5 s."""
 ROLLING = 5e-4
@@ -118,6 +121,6 @@ def add_pair(spec: Any, a: Solid, b: Solid) -> None:
     pair.friction = [friction, friction, max(friction * patch, _NO_TWIST), ROLLING, ROLLING]
     pair.solreffriction = list(FRICTION_SOLREF)
     pair.solref = list(HAND_SOLREF if robot else SOLREF)
-    pair.solimp = list(SOLIMP)
+    pair.solimp = list(HAND_SOLIMP if robot else SOLIMP)
     pair.margin = 0.0
     pair.gap = REACH
