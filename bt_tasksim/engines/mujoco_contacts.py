@@ -19,8 +19,10 @@ TIMESTEP = 0.002
 FINE_STEP = 0.00025
 """Seconds of a step, at most, while an object falls or is pushed: what lands at 2 m/s then goes less than a
 millimetre deep."""
-REACH = 0.002
-"""Metres of distance up to which contacts are looked for; they carry force from 0 on."""
+REACH = 0.0005
+"""Metres of distance up to which contacts are looked for, and bodies count as touching; they carry force from 0
+on. MuJoCo keeps four points of a pair of faces, those that lie far apart: looked for from farther away, the
+lowest point of a round base would not always be one of them."""
 SOLREF = (4 * FINE_STEP, 1.0)
 """Time constant in seconds and damping ratio of contacts among objects and fixtures. MuJoCo raises the time to
 twice the step, which is what counts in ordinary steps; twice the fine step would let things that slide hop."""

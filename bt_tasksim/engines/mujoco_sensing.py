@@ -11,9 +11,6 @@ import numpy as np
 from bt_tasksim.engines.mujoco_contacts import Body
 from bt_tasksim.poses import Array
 
-SUPPORT_DISTANCE = 5e-4
-"""Metres within which two bodies touch."""
-
 
 @dataclass(frozen=True, eq=False)
 class Near:
@@ -104,7 +101,7 @@ class ContactReader:
             for me, other in ((geom[:, 0], geom[:, 1]), (geom[:, 1], geom[:, 0])):
                 held = self._object[me] & self._robot[other]
                 np.minimum.at(distances, self._index[me[held]], np.maximum(distance[held], 0.0))
-                on = self._object[me] & ~self._robot[other] & (distance < SUPPORT_DISTANCE)
+                on = self._object[me] & ~self._robot[other]
                 support[self._index[me[on]], self._index[other[on]]] = True
         return Near(distances, support)
 
