@@ -150,7 +150,9 @@ def _tree_arguments(parser: argparse.ArgumentParser, seed: bool = True) -> None:
 
 
 def _engine_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--engines", default="sapien", metavar="E", help="physics: sapien (default) or mujoco")
+    parser.add_argument(
+        "--engines", default="sapien", metavar="E", help="physics: sapien (default) or mujoco"
+    )
     parser.add_argument("--perception", default="state", metavar="P", help="state (default) or camera")
     parser.add_argument(
         "--noise", default="fine", metavar="N", help="estimate's error: fine (default), none, original, hard"

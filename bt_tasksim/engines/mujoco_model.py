@@ -65,9 +65,7 @@ def build_world(mujoco: Any, robot: RobotDescription, configuration: ActorConfig
         solids += _add_object(mujoco, spec, k, actor)
     for k, fixture in enumerate(configuration.fixtures):
         body = Body("fixture", len(configuration.objects) + k, fixture.name)
-        carrier = spec.worldbody.add_body(
-            name=f"fixture/{k}", pos=fixture.pose[:3], quat=fixture.pose[3:]
-        )
+        carrier = spec.worldbody.add_body(name=f"fixture/{k}", pos=fixture.pose[:3], quat=fixture.pose[3:])
         for j, box in enumerate(fixture.boxes):
             geom = carrier.add_geom(name=f"fixture/{k}/{j}", type=mujoco.mjtGeom.mjGEOM_BOX)
             _place(geom, box.pose, [s / 2 for s in box.size])

@@ -23,8 +23,8 @@ MIMIC_SOLIMP = (0.99, 0.999, 0.001, 0.5, 2.0)
 def add_robot(mujoco: Any, spec: Any, robot: RobotDescription) -> list[Solid]:
     """Add a robot to a ``mujoco.MjSpec``; returns its shapes.
 
-    Bodies are named ``robot/`` and the link, joints and drives by the joint. Links carry no weight, for nothing
-    does in this model but objects.
+    Bodies are named ``robot/`` and the link, joints and drives by the joint. Links carry no weight, for
+    nothing does in this model but objects.
 
     Raises:
         InputError: The URDF cannot be read, or lacks what the robot's file names.

@@ -130,10 +130,11 @@ class ContactReader:
 
 
 def wrist_wrench(data: Any, root: int, wrist: int, tool: Sequence[float]) -> tuple[list[float], list[float]]:
-    """External force and torque ``(3,)`` each at the tool origin, base frame, with what the hand's motion takes.
+    """External force and torque ``(3,)`` each at the tool origin, base frame.
 
-    MuJoCo gives torque and force that the wrist's parent exerts on it, about the robot's centre of mass. The
-    world's on the hand is its opposite: nothing here has weight but objects.
+    What the hand's own acceleration takes is in them, as a sensor at the wrist has it. MuJoCo gives torque
+    and force that the wrist's parent exerts on it, about the robot's centre of mass. The world's on the
+    hand is its opposite: nothing here has weight but objects.
 
     Args:
         data: ``mujoco.MjData`` after ``mj_rnePostConstraint``.

@@ -1,7 +1,7 @@
 """Physics by MuJoCo, one fresh model and state an episode.
 
-The world is built in `mujoco_model` and `mujoco_robot`, contacts are chosen in `mujoco_contacts`, and what is felt
-is read in `mujoco_sensing`.
+The world is built in `mujoco_model` and `mujoco_robot`, contacts are chosen in `mujoco_contacts`, and what
+is felt is read in `mujoco_sensing`.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from bt_tasksim.world import Hidden, JointTarget, WorldState
 FALLING = (0.1, 1.5)
 """Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are fine ones."""
 WATCHED = 4
-"""Control periods after the hand was moved or a contact came or went, in which overlaps are looked for at every
-step; at other times at the period's end."""
+"""Control periods after the hand was moved or a contact came or went, in which overlaps are looked for at
+every step; at other times at the period's end."""
 
 
 class MujocoPhysics:
     """The physics engine on MuJoCo.
 
-    The same world as that of `SapienPhysics`, by another method: links carry no weight, drives follow the same
-    law, the same bodies can touch, and friction is the mean of two bodies' as there. The forces on fingertips
-    have their friction, which PhysX does not report.
+    The same world as that of `SapienPhysics`, by another method: links carry no weight, drives follow the
+    same law, the same bodies can touch, and friction is the mean of two bodies' as there. The forces on
+    fingertips have their friction, which PhysX does not report.
 
     Args:
         robot: The robot.
@@ -62,12 +62,18 @@ class MujocoPhysics:
         self._data: Any = mujoco.MjData(world.model)
         self._period = 1.0 / configuration.control_frequency
         self._steps = math.ceil(self._period / TIMESTEP - 1e-9)
-        self._sensed = max(round(self._steps * configuration.control_frequency / configuration.physics_frequency), 1)
+        self._sensed = max(
+            round(self._steps * configuration.control_frequency / configuration.physics_frequency), 1
+        )
         self._finer = math.ceil(self._period / self._steps / FINE_STEP - 1e-9)
         self._periods = 0
         self._names = [actor.name for actor in configuration.objects]
         self._reader = ContactReader(
-            world.bodies, world.model.geom_bodyid, len(robot.tips), len(self._names), len(configuration.fixtures)
+            world.bodies,
+            world.model.geom_bodyid,
+            len(robot.tips),
+            len(self._names),
+            len(configuration.fixtures),
         )
         self._stiffness = robot.drive_array("stiffness")
         self._damping = robot.drive_array("damping")

@@ -88,15 +88,15 @@ def load_links(urdf: Path) -> tuple[LinkJoint, ...]:
     children: dict[str, list[LinkJoint]] = {name: [] for name in inertials}
     for item in carried:
         if item.parent not in children:
-            raise InputError(f"URDF '{urdf}': joint '{item.joint}' hangs on '{item.parent}', which is no link")
+            raise InputError(
+                f"URDF '{urdf}': joint '{item.joint}' hangs on '{item.parent}', which is no link"
+            )
         children[item.parent].append(item)
     roots = sorted(set(inertials) - {item.link for item in carried})
     if len(roots) != 1:
         raise InputError(f"URDF '{urdf}' should have one root link, found {len(roots)}: {', '.join(roots)}")
     still = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    queue = [
-        LinkJoint(roots[0], inertials[roots[0]], "", still, "", "fixed", (1.0, 0.0, 0.0), None, None)
-    ]
+    queue = [LinkJoint(roots[0], inertials[roots[0]], "", still, "", "fixed", (1.0, 0.0, 0.0), None, None)]
     ordered = []
     while queue:
         item = queue.pop()

@@ -95,9 +95,7 @@ def _parts(urdf: Path, tag: str) -> tuple[LinkVisual, ...]:
     return tuple(parts)
 
 
-def _part(
-    link: str, visual: ElementTree.Element, named: dict[str, Colour | None], urdf: Path
-) -> LinkVisual:
+def _part(link: str, visual: ElementTree.Element, named: dict[str, Colour | None], urdf: Path) -> LinkVisual:
     geometry = visual.find("geometry")
     if geometry is None or len(geometry) == 0:
         raise ValueError("it has no geometry")

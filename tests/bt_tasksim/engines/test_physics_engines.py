@@ -1,4 +1,4 @@
-"""What every physics engine must do: falling, resting, holding, touching, pushing, and no state overwritten."""
+"""What every physics engine must do: fall, rest, hold, touch, push, and overwrite no state."""
 
 import numpy as np
 import pytest

@@ -72,7 +72,9 @@ def test_joints_that_follow_others_do(name="xarm7_ability"):
 def test_tool_and_tips_are_where_pinocchio_says(name, seed):
     robot, rng = load_robot(name), np.random.default_rng(seed)
     arm = rng.uniform(robot.arm_lower, robot.arm_upper)
-    joints = np.concatenate([arm, robot.hand_position(rng.uniform(0, 1, 1 + len(robot.synergies)) * [1.0] * 1)])
+    joints = np.concatenate(
+        [arm, robot.hand_position(rng.uniform(0, 1, 1 + len(robot.synergies)) * [1.0] * 1)]
+    )
     configuration = ActorConfiguration(name, (), (), (), 0, joint_position=tuple(joints))
     state, kinematics = MujocoPhysics(robot).reset(configuration), PinocchioKinematics(robot)
     expected = kinematics.forward(joints)
@@ -190,7 +192,9 @@ def test_a_press_is_felt_at_the_wrist_as_the_contacts_have_it():
         state = physics.step(kinematics.solve(Command(tool=lower, hand=np.array([1.0])), state))
         force = poses.rotate(state.tool_pose[3:], state.wrench[:3])
         hidden = physics.hidden()
-        assert hidden.hand_force[0] == pytest.approx(np.linalg.norm(force), abs=0.05 * np.linalg.norm(force) + 0.5)
+        assert hidden.hand_force[0] == pytest.approx(
+            np.linalg.norm(force), abs=0.05 * np.linalg.norm(force) + 0.5
+        )
         assert np.allclose(state.tip_force.sum(axis=0), force, atol=0.05 * np.linalg.norm(force) + 0.5)
         felt.append(force[2])
     assert felt[0] == pytest.approx(0.0, abs=0.5) and felt[-1] > 8.0, "the table carries, the fingers press"
