@@ -60,6 +60,7 @@ def build_world(mujoco: Any, robot: RobotDescription, configuration: ActorConfig
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     option.impratio = IMPRATIO
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that blew up must not start anew
     solids = add_robot(mujoco, spec, robot)
     for k, actor in enumerate(configuration.objects):
         solids += _add_object(mujoco, spec, k, actor)

@@ -114,7 +114,13 @@ class MujocoPhysics:
     # ---- running ----------------------------------------------------------------------------------------
 
     def step(self, target: JointTarget) -> WorldState:
-        """See `PhysicsEngine.step`."""
+        """See `PhysicsEngine.step`.
+
+        Raises:
+            MachineError: The target or the state is not finite; nothing has moved for a bad target.
+        """
+        if not (np.isfinite(target.position).all() and np.isfinite(target.velocity).all()):
+            raise MachineError(f"the joint target is not finite: {target.position}, {target.velocity}")
         before, n_arm = self._target, len(self.robot.arm_joints)
         if np.any(target.position[n_arm:] != before.position[n_arm:]):
             self._watch = WATCHED
@@ -173,6 +179,10 @@ class MujocoPhysics:
     def _state(self) -> WorldState:
         """The state of now: positions and distances of this instant, forces as felt since just before."""
         model, data, world = self._world.model, self._data, self._world
+        if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
+            raise MachineError(
+                f"MuJoCo's state is no longer finite after {data.time:.2f} s: see the last target"
+            )
         self._mujoco.mj_kinematics(model, data)
         self._mujoco.mj_comPos(model, data)
         self._mujoco.mj_collision(model, data)

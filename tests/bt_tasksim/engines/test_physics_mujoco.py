@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from physics_cases import PHYSICS, G, assert_identical, episode, holding, runner_of, scene
+from physics_cases import PHYSICS, G, Still, assert_identical, episode, holding, runner_of, scene
 from py_trees.common import Status
 
 from bt_tasksim import poses
@@ -234,6 +234,24 @@ def test_without_mujoco_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MachineError, match=r"pip install 'bt-tasksim\[mujoco\]'"):
         MujocoPhysics(load_robot("panda"))
+
+
+def test_a_target_that_is_no_number_is_refused_and_moves_nothing():
+    still = Still(scene().sample(0), "mujoco")
+    before = still.step(2).joint_position
+    bad = JointTarget(np.where(np.arange(9) == 2, np.nan, before), np.zeros(9))
+    with pytest.raises(MachineError, match="the joint target is not finite"):
+        still.physics.step(bad)
+    assert np.abs(still.step().joint_position - before).max() < 1e-6
+
+
+def test_a_world_that_blew_up_is_an_error_and_does_not_start_anew(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo logs such a thing to the working directory
+    still = Still(scene().sample(0), "mujoco")
+    still.step(2)
+    still.physics._data.qvel[3] = np.inf
+    with pytest.raises(MachineError, match=r"no longer finite after 0.1"):
+        still.step()
 
 
 def test_it_needs_no_other_simulator_and_no_torch():
