@@ -135,7 +135,7 @@ def _parser() -> argparse.ArgumentParser:
 
     serve = add("serve-engine", _serve_engine, "Serve an engine of the pipeline to another process.")
     serve.add_argument("role", metavar="ROLE", help="kinematics, physics, rendering or postprocess")
-    serve.add_argument("name", metavar="NAME", help="pinocchio; sapien; sapien; state or camera")
+    serve.add_argument("name", metavar="NAME", help="pinocchio; sapien or mujoco; sapien; state or camera")
     serve.add_argument("--robot", default="panda", metavar="R", help="default panda")
     serve.add_argument("--noise", default="fine", metavar="N", help="of post-process state, default fine")
     serve.add_argument("--port", type=_port, default=DEFAULT_PORT, metavar="P", help="0: a free one")
@@ -173,7 +173,10 @@ def _tree_arguments(parser: argparse.ArgumentParser, seed: bool = True) -> None:
 
 def _engine_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--engines", default="sapien", metavar="E", help="physics: sapien (default), or remote:HOST:PORT"
+        "--engines",
+        default="sapien",
+        metavar="E",
+        help="physics: sapien (default), mujoco, or remote:HOST:PORT",
     )
     parser.add_argument(
         "--perception", default="state", metavar="P", help="state (default), camera, or remote:HOST:PORT"

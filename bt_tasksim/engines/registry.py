@@ -19,7 +19,7 @@ from bt_tasksim.safety.guarded_robot import GuardedRobot
 from bt_tasksim.safety.guarded_simulation import GuardedSimulation
 
 KINEMATICS = ("pinocchio",)
-ENGINES = ("sapien",)
+ENGINES = ("sapien", "mujoco")
 RENDERERS = ("sapien",)
 PERCEPTIONS = ("state", "camera")
 PATIENCE = 0.03
@@ -162,6 +162,10 @@ def build_engine(role: str, name: str, robot: RobotDescription, noise: str = "fi
             from bt_tasksim.engines.physics_sapien import SapienPhysics
 
             return SapienPhysics(robot)
+        case "physics", "mujoco":
+            from bt_tasksim.engines.physics_mujoco import MujocoPhysics
+
+            return MujocoPhysics(robot)
         case "rendering", "sapien":
             from bt_tasksim.engines.rendering_sapien import SapienRendering
 

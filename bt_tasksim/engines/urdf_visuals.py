@@ -1,4 +1,4 @@
-"""What a URDF's links look like."""
+"""What a URDF's links look like, and what they collide with."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class LinkVisual:
-    """One visible part of a link.
+    """One part of a link, seen or collided with.
 
     Attributes:
         link: Name of the link.
@@ -26,7 +26,7 @@ class LinkVisual:
         kind: ``mesh``, ``box``, ``cylinder`` (its axis is z) or ``sphere``.
         size: Scale ``(3,)`` of a mesh, full size ``(3,)`` of a box, radius and length, or radius; metres.
         mesh: Path of the mesh file.
-        colour: RGB, 0 to 1; None where the mesh brings its own.
+        colour: RGB, 0 to 1; None where the mesh brings its own, and for what is not seen.
     """
 
     link: str
@@ -44,30 +44,58 @@ def load_visuals(urdf: Path) -> tuple[LinkVisual, ...]:
     Raises:
         InputError: The file is no URDF, or one of its meshes is missing.
     """
+    return _parts(urdf, "visual")
+
+
+@lru_cache(maxsize=32)
+def load_collisions(urdf: Path) -> tuple[LinkVisual, ...]:
+    """All parts of a URDF that things collide with, link by link.
+
+    Raises:
+        InputError: The file is no URDF, or one of its meshes is missing.
+    """
+    return _parts(urdf, "collision")
+
+
+def read_urdf(urdf: Path) -> ElementTree.Element:
+    """The root element of a URDF.
+
+    Raises:
+        InputError: The file cannot be read as XML.
+    """
     try:
         root = parse(urdf).getroot()
         assert root is not None
     except (ElementTree.ParseError, OSError, ValueError) as error:
         raise InputError(f"URDF '{urdf}' cannot be read: {error}") from error
+    return root
+
+
+def origin(element: ElementTree.Element) -> poses.Array:
+    """The pose ``(7,)`` that an element's origin says, the identity where it has none."""
+    found = element.find("origin")
+    if found is None:
+        return poses.pose((0.0, 0.0, 0.0))
+    xyz, rpy = _floats(found.get("xyz", "0 0 0")), _floats(found.get("rpy", "0 0 0"))
+    return poses.pose(xyz, _from_rpy(*rpy))
+
+
+def _parts(urdf: Path, tag: str) -> tuple[LinkVisual, ...]:
+    root = read_urdf(urdf)
     named = {m.get("name", ""): _colour(m) for m in root.findall("material")}
-    visuals = []
+    parts = []
     for link in root.findall("link"):
-        for visual in link.findall("visual"):
+        for part in link.findall(tag):
             try:
-                visuals.append(_visual(link.get("name", ""), visual, named, urdf))
+                parts.append(_part(link.get("name", ""), part, named, urdf))
             except (AttributeError, IndexError, TypeError, ValueError) as error:
                 if isinstance(error, InputError):
                     raise
-                raise InputError(f"URDF '{urdf}': link '{link.get('name')}': bad visual: {error}") from error
-    return tuple(visuals)
+                raise InputError(f"URDF '{urdf}': link '{link.get('name')}': bad {tag}: {error}") from error
+    return tuple(parts)
 
 
-def _visual(
-    link: str, visual: ElementTree.Element, named: dict[str, Colour | None], urdf: Path
-) -> LinkVisual:
-    origin = visual.find("origin")
-    xyz: tuple[float, ...] = _floats(origin.get("xyz", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
-    rpy: tuple[float, ...] = _floats(origin.get("rpy", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
+def _part(link: str, visual: ElementTree.Element, named: dict[str, Colour | None], urdf: Path) -> LinkVisual:
     geometry = visual.find("geometry")
     if geometry is None or len(geometry) == 0:
         raise ValueError("it has no geometry")
@@ -90,8 +118,7 @@ def _visual(
     colour = None
     if material is not None:
         colour = _colour(material) or named.get(material.get("name", ""))
-    pose = poses.pose(xyz, _from_rpy(*rpy))
-    return LinkVisual(link, tuple(float(v) for v in pose), kind, size, mesh, colour)
+    return LinkVisual(link, tuple(float(v) for v in origin(visual)), kind, size, mesh, colour)
 
 
 def _from_rpy(roll: float, pitch: float, yaw: float) -> poses.Array:

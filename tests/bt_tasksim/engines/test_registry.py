@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.engines.physics_mujoco import MujocoPhysics
 from bt_tasksim.engines.physics_sapien import SapienPhysics
 from bt_tasksim.engines.postprocess_state import StatePostProcess
 from bt_tasksim.engines.registry import ROLES, EngineOptions, build_engine, build_pipeline
@@ -23,6 +24,11 @@ def test_the_default_is_sapien_with_fine_noise_and_no_images():
     assert line.rendering is None
 
 
+def test_mujoco_is_chosen_by_its_name():
+    line = build_pipeline(load_robot("panda"), EngineOptions(engines="mujoco"))
+    assert type(line.physics) is MujocoPhysics and line.rendering is None
+
+
 @pytest.mark.parametrize(
     ("options", "label"),
     [
@@ -39,6 +45,7 @@ def test_results_say_which_perception_it_was(options, label):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
+        ({"engines": "mujocco"}, r"unknown engines 'mujocco'; did you mean 'mujoco'\?"),
         ({"engines": "sapiens"}, r"unknown engines 'sapiens'; did you mean 'sapien'\?"),
         ({"perception": "camra"}, r"unknown perception 'camra'; did you mean 'camera'\?"),
         ({"noise": "nome"}, r"unknown noise model 'nome'; did you mean 'none'\?"),

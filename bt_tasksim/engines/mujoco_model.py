@@ -1,0 +1,120 @@
+"""A drawn world as a MuJoCo model: robot, objects, fixtures, and which number is whose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim.engines.mujoco_contacts import IMPRATIO, Body, Solid, Surface, add_pair, touching_pairs
+from bt_tasksim.engines.mujoco_robot import add_hull, add_robot, set_inertia
+from bt_tasksim.errors import InputError
+from bt_tasksim.poses import Array
+from bt_tasksim.robot import RobotDescription
+from bt_tasksim.scene import ActorConfiguration, ObjectActor
+from bt_tasksim.shapes import BoxPiece
+
+GRAVITY = 9.81
+"""m/s^2."""
+
+
+@dataclass(frozen=True)
+class World:
+    """A compiled model, and where things are in its arrays.
+
+    Attributes:
+        model: The ``mujoco.MjModel``.
+        bodies: What each geom belongs to, in the model's order.
+        joint_qpos: Position addresses ``(n_joints,)``, in the robot's joint order.
+        joint_dof: Velocity addresses ``(n_joints,)``.
+        object_body: Body numbers ``(n_objects,)``.
+        object_qpos: Position addresses ``(n_objects, 7)``.
+        object_dof: Velocity addresses ``(n_objects, 6)``.
+        weight: Weights ``(n_objects,)``, N.
+    """
+
+    model: Any
+    bodies: tuple[Body, ...]
+    joint_qpos: Array
+    joint_dof: Array
+    object_body: Array
+    object_qpos: Array
+    object_dof: Array
+    weight: Array
+
+
+def build_world(mujoco: Any, robot: RobotDescription, configuration: ActorConfiguration) -> World:
+    """The model of a drawn world. Gravity is that on objects alone, which the engine applies.
+
+    Raises:
+        InputError: The robot or an object cannot be built.
+    """
+    spec = mujoco.MjSpec()
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.compiler.balanceinertia = True
+    spec.compiler.degree = False
+    option = spec.option
+    option.gravity = [0.0, 0.0, 0.0]
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.impratio = IMPRATIO
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a world that blew up must not start anew
+    solids = add_robot(mujoco, spec, robot)
+    for k, actor in enumerate(configuration.objects):
+        solids += _add_object(mujoco, spec, k, actor)
+    for k, fixture in enumerate(configuration.fixtures):
+        body = Body("fixture", len(configuration.objects) + k, fixture.name)
+        carrier = spec.worldbody.add_body(name=f"fixture/{k}", pos=fixture.pose[:3], quat=fixture.pose[3:])
+        for j, box in enumerate(fixture.boxes):
+            geom = carrier.add_geom(name=f"fixture/{k}/{j}", type=mujoco.mjtGeom.mjGEOM_BOX)
+            _place(geom, box.pose, [s / 2 for s in box.size])
+            solids.append(Solid(geom.name, body, Surface(box.friction)))
+    for a, b in touching_pairs(solids):
+        add_pair(spec, a, b)
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise InputError(
+            f"MuJoCo cannot build the robot '{robot.name}' and its scene: {' '.join(str(error).split())}"
+        ) from error
+    of_name = {solid.name: solid.body for solid in solids}
+    objects = range(len(configuration.objects))
+    free = np.array([model.joint(f"object/{k}").qposadr[0] for k in objects], int)
+    moving = np.array([model.joint(f"object/{k}").dofadr[0] for k in objects], int)
+    return World(
+        model=model,
+        bodies=tuple(of_name[model.geom(i).name] for i in range(model.ngeom)),
+        joint_qpos=np.array([model.joint(name).qposadr[0] for name in robot.joints]),
+        joint_dof=np.array([model.joint(name).dofadr[0] for name in robot.joints]),
+        object_body=np.array([model.body(f"object/{k}").id for k in objects], int),
+        object_qpos=free[:, None] + np.arange(7),
+        object_dof=moving[:, None] + np.arange(6),
+        weight=GRAVITY * np.array([actor.mass for actor in configuration.objects]),
+    )
+
+
+def _add_object(mujoco: Any, spec: Any, k: int, actor: ObjectActor) -> list[Solid]:
+    geometry = actor.shape()
+    carrier = spec.worldbody.add_body(name=f"object/{k}", pos=actor.pose[:3], quat=actor.pose[3:])
+    carrier.add_joint(name=f"object/{k}", type=mujoco.mjtJoint.mjJNT_FREE)
+    set_inertia(carrier, actor.mass, geometry.mass.pose, actor.mass * geometry.mass.inertia)
+    body = Body("object", k, actor.name)
+    solids = []
+    for j, piece in enumerate(geometry.collision):
+        geom = carrier.add_geom(name=f"object/{k}/{j}")
+        if isinstance(piece, BoxPiece):
+            geom.type = mujoco.mjtGeom.mjGEOM_BOX
+            _place(geom, piece.pose, piece.half_size)
+        else:
+            geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, geom.name
+            geom.contype = geom.conaffinity = 0
+            add_hull(spec, geom.name, piece.vertices)
+        solids.append(Solid(geom.name, body, Surface(actor.friction)))
+    return solids
+
+
+def _place(geom: Any, pose: Any, half_size: Any) -> None:
+    geom.pos, geom.quat, geom.size = pose[:3], pose[3:], half_size
+    geom.contype = geom.conaffinity = 0
