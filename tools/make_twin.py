@@ -50,9 +50,11 @@ def main(arguments: list[str]) -> int:
     pip = [str(folder / "bin" / "python"), "-m", "pip", "--disable-pip-version-check", "-qq", "install"]
     try:
         subprocess.run(
-            [*pip, "-c", str(HERE.parent / "constraints.txt"), "-r", str(HERE / "twin_packages.txt")], check=True
+            [*pip, "-c", str(HERE.parent / "constraints.txt"), "-r", str(HERE / "twin_packages.txt")],
+            check=True,
         )
         put_right(folder)
+        (folder / "made").touch()
     except (OSError, subprocess.SubprocessError, StopIteration) as error:
         shutil.rmtree(folder, ignore_errors=True)
         print(f"Cannot make the twin's virtual environment: {error}", file=sys.stderr)

@@ -1,0 +1,1 @@
+"""A real robot through rosbridge: ROS 2 topics in JSON over a WebSocket."""

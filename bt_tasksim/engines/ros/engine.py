@@ -1,0 +1,406 @@
+"""A real robot through rosbridge, in the physics role: commands as short trajectories, states from topics.
+
+Every command is a trajectory that ends at rest, so that it expires by itself in any controller that carries
+trajectories out. Nothing here waits but `reset`, and nothing judges: the guard does
+(`bt_tasksim.safety.guarded_robot`).
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bt_tasksim.engines.remote.address import Address
+from bt_tasksim.engines.ros import messages
+from bt_tasksim.engines.ros.link import LOG, PATIENCE, Link
+from bt_tasksim.engines.ros.messages import Point
+from bt_tasksim.engines.ros.setting import RosSetting
+from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.poses import Array
+from bt_tasksim.robot import RobotDescription
+from bt_tasksim.safety.engine import ChannelSpec, EmergencyStop, JointReading, RobotClock
+from bt_tasksim.safety.motion import approach
+from bt_tasksim.world import JointTarget, WorldState
+
+if TYPE_CHECKING:
+    from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+    from bt_tasksim.scene import ActorConfiguration
+
+STALE = 0.3
+"""Seconds after which forces are too old to act on; joint states have a limit of their own."""
+UNSEEN = 1.0
+"""Seconds after which a tracked object counts as lost."""
+STILL = (0.02, 0.03)
+"""Speed (rad/s) and distance (rad) within which the arm stands where a run begins."""
+SETTLE = 5.0
+"""Seconds within which it must."""
+MATCH = 0.3
+"""Seconds after which whoever listens to a topic has found whoever publishes there."""
+TRAJECTORY, TEXT = "trajectory_msgs/JointTrajectory", "std_msgs/String"
+
+
+@dataclass(frozen=True, slots=True)
+class Newest:
+    """The newest value of a topic, and when it was measured, seconds of `time.monotonic`."""
+
+    value: Array
+    stamp: float
+
+
+@dataclass(frozen=True, slots=True)
+class Joints:
+    """The newest joint states, and the effort ``(n,)`` in their own order."""
+
+    reading: JointReading
+    effort: Array
+
+
+class RosRobot:
+    """A `RealEngine` through rosbridge.
+
+    Args:
+        robot: The robot.
+        setting: Topics and names.
+        address: Where rosbridge is.
+        kinematics: For the poses of tool and fingertips.
+        tracked: Objects' poses come from a tracking system; else perception has images.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        setting: RosSetting,
+        address: Address,
+        kinematics: PinocchioKinematics,
+        tracked: bool = True,
+    ) -> None:
+        if tracked and setting.objects is None:
+            raise InputError(
+                f"'{setting.source}' names no topic for the poses of objects: use --perception camera"
+            )
+        if robot.safety is None:
+            raise InputError(f"robot file '{robot.source}' has no section 'safety'")
+        self.robot, self.setting, self.address, self.kinematics = robot, setting, address, kinematics
+        self.tracked = tracked
+        self.limits = robot.safety
+        self.emergency = EmergencyStop()
+        self.emergency.held_down = lambda: self._pressed
+        self.link: Link | None = None
+        self._lock = threading.RLock()
+        self._names = dict(zip(setting.arm.joints + setting.hand.joints, robot.joints, strict=True))
+        self._objects: tuple[str, ...] = ()
+        self._held, self._pressed, self._run = True, False, ""
+        self._period = 0.05
+        self._forget()
+
+    def _forget(self) -> None:
+        """Nothing has arrived yet."""
+        self._clock = RobotClock()
+        self._joints: Joints | None = None
+        self._before: JointReading | None = None
+        self._newest: dict[str, Newest] = {}
+
+    # ---- a run begins ---------------------------------------------------------------------------------------
+
+    def reset(self, configuration: ActorConfiguration) -> WorldState:
+        """See `RealEngine.reset`: connect where need be, end a hold, bring the arm to its start.
+
+        Raises:
+            MachineError: There is no bridge, topics are silent, or the arm does not get there.
+        """
+        self._period = 1.0 / configuration.control_frequency
+        link = self._connected(configuration)
+        self._run, self._held = uuid.uuid4().hex[:12], False
+        self._expect_messages()
+        if self._pressed:
+            raise MachineError(f"the emergency stop is pressed ({self.setting.emergency_stop}); release it")
+        if self.setting.begin:
+            link.publish(self.setting.begin, {"data": self._run})
+            time.sleep(0.05)
+        goal = np.array(
+            configuration.joint_position or np.concatenate([self.robot.rest, self.robot.hand_open])
+        )
+        self._approach(goal)
+        self._began = time.monotonic()
+        return self.state()
+
+    def _connected(self, configuration: ActorConfiguration) -> Link:
+        """The connection, with the topics of this world's objects."""
+        objects = tuple(actor.name for actor in configuration.objects) if self.tracked else ()
+        if self.link is not None and not self.link.lost and objects == self._objects:
+            return self.link
+        self.close()
+        self._forget()
+        self._pressed = False
+        link, setting = Link(self.address), self.setting
+        self.link, self._objects = link, objects
+        for topic in (setting.arm.command, setting.hand.command):
+            link.advertise(topic, TRAJECTORY)
+        for topic in filter(None, (setting.begin, setting.hold)):
+            link.advertise(topic, TEXT)
+        link.subscribe(setting.emergency_stop, "std_msgs/Bool", self._on_emergency)
+        link.subscribe(setting.joint_states, "sensor_msgs/JointState", self._on_joints)
+        self._listen(
+            link, setting.wrench.topic, "geometry_msgs/WrenchStamped", messages.wrench, setting.wrench.frame
+        )
+        for topic in setting.tips.topics:
+            self._listen(link, topic, "geometry_msgs/WrenchStamped", messages.wrench, setting.tips.frame)
+        for name in objects:
+            assert setting.objects is not None
+            topic = setting.object_topic(name)
+            self._listen(link, topic, "geometry_msgs/PoseStamped", messages.pose, setting.objects.frame)
+        time.sleep(MATCH)
+        return link
+
+    def _listen(
+        self, link: Link, topic: str, kind: str, read: Callable[[Any, str], tuple[Array, float]], frame: str
+    ) -> None:
+        def handle(message: Any, arrived: float) -> None:
+            value, stamp = read(message, frame)
+            self._newest[topic] = Newest(value, self._clock.convert(stamp, arrived))
+
+        link.subscribe(topic, kind, handle)
+
+    def _expect_messages(self) -> None:
+        """Wait until every topic has spoken.
+
+        Raises:
+            MachineError: Some have not; names them.
+        """
+        end = time.monotonic() + PATIENCE
+        while silent := self._silent():
+            self._alive()
+            if time.monotonic() > end:
+                raise MachineError(
+                    f"nothing usable has come for {PATIENCE:g} s on {', '.join(silent)}: do the topics of "
+                    f"'{self.setting.source}' exist, and does the robot publish there?"
+                )
+            time.sleep(0.01)
+
+    def _silent(self) -> list[str]:
+        setting = self.setting
+        wanted = [setting.wrench.topic, *setting.tips.topics, *map(setting.object_topic, self._objects)]
+        silent = [] if self._joints is not None else [setting.joint_states]
+        return silent + [topic for topic in wanted if topic not in self._newest]
+
+    def _approach(self, goal: Array) -> None:
+        """Go to where the run begins, slowly, and wait until the arm stands there.
+
+        Raises:
+            MachineError: It does not follow, or was stopped.
+        """
+        start = self._checked().position
+        speed, acceleration = self._gentle()
+        period, n = 0.05, len(self.robot.arm_joints)
+        following = time.monotonic()
+        for motion in approach(start, goal, speed, acceleration, period):
+            self._send(JointTarget(motion.position, motion.velocity, self.limits.validity), period)
+            following += period
+            time.sleep(max(following - time.monotonic(), 0.0))
+            off = np.abs(self._checked().position - motion.position)[:n]
+            if np.any(off > self.limits.tracking):
+                raise self._astray(
+                    int(np.argmax(off)), float(off.max()), "does not follow the way to its start"
+                )
+        end = time.monotonic() + SETTLE
+        while True:
+            reading = self._checked()
+            off = np.abs(reading.position - goal)[:n]
+            if np.all(off < STILL[1]) and np.all(np.abs(reading.velocity[:n]) < STILL[0]):
+                return
+            if time.monotonic() > end:
+                raise self._astray(
+                    int(np.argmax(off)), float(off.max()), "does not come to stand at its start"
+                )
+            time.sleep(0.02)
+
+    def _gentle(self) -> tuple[Array, Array]:
+        """Speeds and accelerations ``(n_joints,)`` of the way to the start."""
+        robot, share = self.robot, self.setting.approach
+        span = np.maximum(np.abs(robot.hand_closed - robot.hand_open), 1e-3) * robot.hand_speed
+        speed = np.concatenate([self.limits.velocity, span])
+        acceleration = np.concatenate([self.limits.acceleration, span / 0.1])
+        return share * speed, share * acceleration
+
+    def _checked(self) -> JointReading:
+        """The newest joint states, of the names and the age that a motion needs."""
+        if self._held:
+            raise MachineError(self.emergency.why or "the robot was told to hold")
+        reading = self.latest()
+        if reading.names != self.robot.joints or not np.all(np.isfinite(reading.position)):
+            raise MachineError(
+                f"{self.setting.joint_states}: joints in another order, or no numbers; see its file"
+            )
+        age = time.monotonic() - reading.stamp
+        if age > STALE:
+            raise MachineError(f"{self.setting.joint_states} is silent for {1000 * age:.0f} ms")
+        return reading
+
+    def _astray(self, joint: int, off: float, what: str) -> MachineError:
+        name = self.robot.joints[joint]
+        return MachineError(
+            f"the arm {what}: {name} is {off:.2f} rad away; is the controller of "
+            f"'{self.setting.arm.command}' active?"
+        )
+
+    # ---- commands -------------------------------------------------------------------------------------------
+
+    def send(self, target: JointTarget) -> None:
+        """See `RealEngine.send`."""
+        self._send(target, self._period)
+
+    def _send(self, target: JointTarget, period: float) -> None:
+        setting, limits, n = self.setting, self.limits, len(self.robot.arm_joints)
+        arm = messages.ending_at_rest(
+            target.position[:n],
+            target.velocity[:n],
+            period,
+            limits.acceleration,
+            limits.lower,
+            limits.upper,
+            min(target.validity, limits.validity),
+        )
+        hand = target.position[n:]
+        with self._lock:
+            if self._held:
+                raise MachineError("the robot holds until a new run begins")
+            link = self._alive()
+            link.publish(setting.arm.command, messages.trajectory(setting.arm.joints, arm, self._run))
+            closing = (Point(hand, None, period),)
+            link.publish(setting.hand.command, messages.trajectory(setting.hand.joints, closing, self._run))
+
+    def hold(self, ramp: Sequence[JointTarget], why: str) -> None:
+        """See `RealEngine.hold`: the ramp as a trajectory, or one point where the arm is; then the word."""
+        setting, n = self.setting, len(self.robot.arm_joints)
+        with self._lock:
+            self._held = True
+            link = self._alive()
+            points = [
+                Point(t.position[:n], t.velocity[:n], (i + 1) * self._period) for i, t in enumerate(ramp)
+            ]
+            joints = self._joints
+            if not points and joints is not None and np.all(np.isfinite(joints.reading.position[:n])):
+                if joints.reading.names == self.robot.joints:
+                    here = joints.reading.position[:n]
+                    points = [Point(here, np.zeros(n), self._period)]
+            if points:
+                link.publish(setting.arm.command, messages.trajectory(setting.arm.joints, points, self._run))
+            if setting.hold:
+                link.publish(setting.hold, {"data": why[:400]})
+
+    def hold_channel(self) -> ChannelSpec | None:
+        """See `RealEngine.hold_channel`: a connection of its own to the same bridge."""
+        setting = self.setting
+        return ChannelSpec(
+            "bt_tasksim.engines.ros.hold:RosHold",
+            {
+                "host": self.address.host,
+                "port": self.address.port,
+                "states": setting.joint_states,
+                "command": setting.arm.command,
+                "joints": list(setting.arm.joints),
+                "word": setting.hold,
+            },
+        )
+
+    # ---- states ---------------------------------------------------------------------------------------------
+
+    def latest(self) -> JointReading:
+        """See `RealEngine.latest`."""
+        self._alive()
+        if self._joints is None:
+            raise MachineError(f"no joint states have come on {self.setting.joint_states}")
+        return self._joints.reading
+
+    def state(self) -> WorldState:
+        """See `RealEngine.state`.
+
+        Raises:
+            MachineError: Forces or objects have not been heard of for too long.
+        """
+        self._alive()
+        setting, joints = self.setting, self._joints
+        if joints is None:
+            raise MachineError(f"no joint states have come on {setting.joint_states}")
+        now = time.monotonic()
+        position = np.array(joints.reading.position)
+        wrench = self._fresh(setting.wrench.topic, now, STALE)
+        objects = [self._fresh(setting.object_topic(name), now, UNSEEN) for name in self._objects]
+        return WorldState(
+            time=np.float64(now - self._began),
+            joint_position=position,
+            joint_velocity=np.array(joints.reading.velocity),
+            joint_effort=np.nan_to_num(joints.effort),
+            tip_force=self._tip_force(joints, now),
+            wrench=messages.in_tool_frame(wrench, setting.wrench.pose),
+            tool_pose=self.kinematics.forward(position),
+            tips=self.kinematics.tips(position),
+            objects=np.array(objects).reshape(len(objects), 7) if self.tracked else None,
+        )
+
+    def _tip_force(self, joints: Joints, now: float) -> Array:
+        """Forces ``(n_tips, 3)``: as felt, or of the drives' size where there are no sensors."""
+        tips = self.setting.tips
+        if tips.topics:
+            return np.array([self._fresh(topic, now, STALE)[:3] for topic in tips.topics])
+        n = len(self.robot.tips)
+        effort = np.abs(np.nan_to_num(joints.effort[len(self.robot.arm_joints) :]))
+        felt = effort if len(effort) == n else np.full(n, effort.max())
+        out = np.zeros((n, 3))
+        out[:, 2] = np.where(felt >= tips.effort, felt, 0.0)
+        return out
+
+    def _fresh(self, topic: str, now: float, oldest: float) -> Array:
+        newest = self._newest.get(topic)
+        if newest is None:
+            raise MachineError(f"nothing has come on {topic}")
+        if now - newest.stamp > oldest:
+            raise MachineError(f"stale: nothing usable on {topic} for {1000 * (now - newest.stamp):.0f} ms")
+        return newest.value
+
+    def _alive(self) -> Link:
+        if self.link is None:
+            raise MachineError("there is no connection to the robot")
+        if self.link.lost:
+            raise MachineError(self.link.lost)
+        return self.link
+
+    def _on_joints(self, message: Any, arrived: float) -> None:
+        """Joint states, in the robot's order and names where the wire's are as its file says."""
+        came, setting = messages.joint_states(message), self.setting
+        stamp = self._clock.convert(came.stamp, arrived)
+        if came.names == setting.wire:
+            order = setting.order
+            names = self.robot.joints
+        else:  # the guard says what is wrong with them
+            order = np.arange(len(came.names))
+            names = tuple(self._names.get(name, name) for name in came.names)
+        position, velocity = came.position[order], came.velocity[order]
+        before = self._before
+        if before is not None and before.names == names and np.all(np.isnan(velocity)):
+            elapsed = stamp - before.stamp
+            velocity = (position - before.position) / elapsed if elapsed > 1e-4 else before.velocity
+        elif np.all(np.isnan(velocity)):
+            velocity = np.zeros_like(position)
+        reading = JointReading(names, position, velocity, stamp)
+        self._before = reading
+        self._joints = Joints(reading, came.effort[order])
+
+    def _on_emergency(self, message: Any, arrived: float) -> None:
+        pressed = messages.flag(message)
+        before, self._pressed = self._pressed, pressed
+        if pressed and not before:
+            LOG.warning("emergency stop on %s", self.setting.emergency_stop)
+            self.emergency.press(self.setting.emergency_stop)
+
+    def close(self) -> None:
+        """Disconnect."""
+        if self.link is not None:
+            self.link.close()
+            self.link = None

@@ -1,0 +1,366 @@
+"""ROS messages as rosbridge writes them in JSON: from plain data to checked arrays, and back.
+
+Every function takes whatever has arrived. What is not a message of its type, of the expected frame and of a
+sane size is `RefusedError` with one sentence. JSON has no NaN: rosbridge writes null, which joint states keep
+as NaN, since the guard says what that means for a robot; elsewhere it is refused.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim import poses
+from bt_tasksim.poses import Array
+
+MOST_JOINTS = 256
+MOST_BYTES = 8_000_000
+"""Of one compressed image."""
+MOST_PIXELS = 4096
+"""Along one side of an image."""
+_LARGEST = 1e9
+
+
+class RefusedError(ValueError):
+    """A message that is not used, and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointStates:
+    """Joint states as they came; ``(n,)`` each, NaN where the message says nothing."""
+
+    names: tuple[str, ...]
+    position: Array
+    velocity: Array
+    effort: Array
+    stamp: float
+
+
+def joint_states(message: Any) -> JointStates:
+    """A sensor_msgs/JointState."""
+    data = _mapping(message, "joint states")
+    raw = _get(data, "name", "joint states")
+    if not isinstance(raw, list) or not raw or not all(isinstance(n, str) for n in raw):
+        raise RefusedError(f"joint states: 'name' should be a list of names, found {_shown(raw)}")
+    if len(raw) > MOST_JOINTS:
+        raise RefusedError(f"joint states: {len(raw)} joints, more than {MOST_JOINTS}")
+    names = tuple(raw)
+    if len(set(names)) < len(names):
+        raise RefusedError("joint states: a joint is named twice")
+    n = len(names)
+
+    def optional(key: str) -> Array:
+        values = data.get(key) or []
+        return _numbers(values, n, f"joint states: '{key}'") if values else np.full(n, np.nan)
+
+    position = _numbers(_get(data, "position", "joint states"), n, "joint states: 'position'")
+    return JointStates(names, position, optional("velocity"), optional("effort"), stamp(data, "joint states"))
+
+
+def wrench(message: Any, frame: str) -> tuple[Array, float]:
+    """A geometry_msgs/WrenchStamped: force and torque ``(6,)``, and its stamp."""
+    data = _mapping(message, "wrench")
+    _check_frame(data, frame, "wrench")
+    inner = _mapping(_get(data, "wrench", "wrench"), "wrench: 'wrench'")
+    values = [*_xyz(inner, "force", "wrench"), *_xyz(inner, "torque", "wrench")]
+    return np.array(values), stamp(data, "wrench")
+
+
+def pose(message: Any, frame: str) -> tuple[Array, float]:
+    """A geometry_msgs/PoseStamped: a pose ``(7,)``, quaternion w x y z, and its stamp."""
+    data = _mapping(message, "pose")
+    _check_frame(data, frame, "pose")
+    inner = _mapping(_get(data, "pose", "pose"), "pose: 'pose'")
+    place = _xyz(inner, "position", "pose")
+    turn = _mapping(_get(inner, "orientation", "pose"), "pose: 'orientation'")
+    q = np.array([_number(_get(turn, k, "pose"), f"pose: orientation {k}") for k in ("w", "x", "y", "z")])
+    length = float(np.linalg.norm(q))
+    if abs(length - 1.0) > 0.01:
+        raise RefusedError(f"pose: the quaternion has length {length:.3g} instead of 1")
+    return np.concatenate([place, q / length]), stamp(data, "pose")
+
+
+def flag(message: Any) -> bool:
+    """A std_msgs/Bool."""
+    value = _get(_mapping(message, "flag"), "data", "flag")
+    if not isinstance(value, bool):
+        raise RefusedError(f"flag: 'data' should be true or false, found {_shown(value)}")
+    return value
+
+
+def text(message: Any, longest: int = 500) -> str:
+    """A std_msgs/String of a sane length."""
+    value = _get(_mapping(message, "text"), "data", "text")
+    if not isinstance(value, str) or len(value) > longest:
+        raise RefusedError(f"text: 'data' should be a text of at most {longest} characters")
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Size in pixels and intrinsic matrix ``(3, 3)`` of a camera."""
+
+    width: int
+    height: int
+    matrix: Array
+
+
+def camera_info(message: Any) -> Calibration:
+    """A sensor_msgs/CameraInfo of a camera without distortion."""
+    data = _mapping(message, "camera info")
+    size = [_get(data, key, "camera info") for key in ("width", "height")]
+    for value in size:
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_PIXELS:
+            raise RefusedError(f"camera info: a size of {_shown(value)} pixels")
+    matrix = _finite(_get(data, "k", "camera info"), 9, "camera info: 'k'").reshape(3, 3)
+    if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0 or matrix[2].tolist() != [0.0, 0.0, 1.0]:
+        raise RefusedError("camera info: 'k' is no intrinsic matrix")
+    distortion = data.get("d") or []
+    if not isinstance(distortion, list) or any(v not in (0, 0.0) for v in distortion):
+        raise RefusedError("camera info: the images are distorted ('d'); publish rectified ones")
+    return Calibration(size[0], size[1], matrix)
+
+
+def colour_image(message: Any, size: tuple[int, int]) -> tuple[Array, float]:
+    """A sensor_msgs/CompressedImage in colour: ``(height, width, 3)`` uint8 RGB, and its stamp.
+
+    Args:
+        message: PNG or JPEG.
+        size: Width and height that it must have.
+    """
+    import cv2
+
+    pixels, when = _image(message, "colour image", size, cv2.IMREAD_COLOR)
+    if pixels.ndim != 3 or pixels.dtype != np.uint8:
+        raise RefusedError("colour image: no colours of 8 bits")
+    return np.ascontiguousarray(pixels[:, :, ::-1]), when
+
+
+def depth_image(message: Any, size: tuple[int, int]) -> tuple[Array, float]:
+    """A sensor_msgs/CompressedImage of depths: ``(height, width)`` float32 metres, 0 nothing, and its stamp.
+
+    Args:
+        message: A PNG of 16 bits, millimetres; what image_transport writes before it (12 bytes) is skipped.
+        size: Width and height that it must have.
+    """
+    import cv2
+
+    pixels, when = _image(message, "depth image", size, cv2.IMREAD_UNCHANGED)
+    if pixels.ndim != 2 or pixels.dtype != np.uint16:
+        raise RefusedError(f"depth image: should be one channel of 16 bits, found {pixels.dtype}")
+    return pixels.astype(np.float32) / np.float32(1000.0), when
+
+
+_PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff"
+
+
+def _image(message: Any, what: str, size: tuple[int, int], how: int) -> tuple[Array, float]:
+    import cv2
+
+    data = _mapping(message, what)
+    raw = _get(data, "data", what)
+    if isinstance(raw, str):
+        if len(raw) > MOST_BYTES * 4 // 3 + 4:
+            raise RefusedError(f"{what}: {len(raw)} characters are too many")
+        try:
+            content = base64.b64decode(raw, validate=True)
+        except (binascii.Error, ValueError):
+            raise RefusedError(f"{what}: 'data' is not base64") from None
+    elif isinstance(raw, list) and len(raw) <= MOST_BYTES:
+        try:
+            content = bytes(raw)
+        except (TypeError, ValueError):
+            raise RefusedError(f"{what}: 'data' holds no bytes") from None
+    else:
+        raise RefusedError(f"{what}: 'data' holds no bytes, or too many")
+    if content[12:20] == _PNG and not content.startswith(_PNG):
+        content = content[12:]
+    found = _size(content)
+    if found is None:
+        raise RefusedError(f"{what}: neither PNG nor JPEG")
+    if found != size:
+        raise RefusedError(
+            f"{what}: {found[0]} x {found[1]} pixels, and the camera has {size[0]} x {size[1]}"
+        )
+    try:
+        pixels = cv2.imdecode(np.frombuffer(content, np.uint8), how)
+    except cv2.error as error:
+        raise RefusedError(f"{what}: cannot be read ({error.err})") from None
+    if pixels is None or pixels.shape[:2] != (size[1], size[0]):
+        raise RefusedError(f"{what}: cannot be read")
+    return pixels, stamp(data, what)
+
+
+def _size(content: bytes) -> tuple[int, int] | None:
+    """Width and height as a PNG or JPEG says them in its head, before anything is unpacked."""
+    if content.startswith(_PNG) and len(content) >= 24:
+        return int.from_bytes(content[16:20], "big"), int.from_bytes(content[20:24], "big")
+    if not content.startswith(_JPEG):
+        return None
+    at = 2
+    while at + 9 <= len(content) and content[at] == 0xFF:
+        kind, length = content[at + 1], int.from_bytes(content[at + 2 : at + 4], "big")
+        if 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):
+            height, width = (int.from_bytes(content[at + k : at + k + 2], "big") for k in (5, 7))
+            return width, height
+        at += 2 + max(length, 2)
+    return None
+
+
+# ---- what goes out ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point of a trajectory, ``time`` seconds after its begin: ``position (n,)``, and ``velocity`` likewise.
+
+    Without velocities a controller goes straight from point to point.
+    """
+
+    position: Array
+    velocity: Array | None
+    time: float
+
+
+def trajectory(joints: Sequence[str], points: Sequence[Point], run: str = "") -> dict[str, Any]:
+    """A trajectory_msgs/JointTrajectory that begins when it arrives; the run's name stands in its frame."""
+    return {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": run},
+        "joint_names": list(joints),
+        "points": [
+            {
+                "positions": np.asarray(p.position, float).tolist(),
+                "velocities": [] if p.velocity is None else np.asarray(p.velocity, float).tolist(),
+                "accelerations": [],
+                "effort": [],
+                "time_from_start": _duration(p.time),
+            }
+            for p in points
+        ],
+    }
+
+
+def _duration(seconds: float) -> dict[str, int]:
+    nanoseconds = round(seconds * 1e9)
+    return {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}
+
+
+def ending_at_rest(
+    position: Array,
+    velocity: Array,
+    period: float,
+    acceleration: Array,
+    lower: Array,
+    upper: Array,
+    validity: float,
+) -> tuple[Point, ...]:
+    """A trajectory of one target and, where it is still moving there, of a point at which it has braked.
+
+    Args:
+        position: Where to be at the control period's end ``(n,)``.
+        velocity: How fast, there ``(n,)``.
+        period: Seconds until then.
+        acceleration: With which joints may brake ``(n,)``.
+        lower: Position limits ``(n,)``.
+        upper: Position limits ``(n,)``.
+        validity: Seconds after which the arm stands, if its speed allows that.
+    """
+    speed = np.abs(velocity)
+    still = np.zeros_like(position)
+    if not np.any(speed > 1e-9):
+        return (Point(position, still, period),)
+    braking = max(float(np.max(speed / acceleration)), validity - period, 0.01)
+    rest = position + velocity * braking / 2.0
+    rest = np.minimum(np.maximum(rest, np.minimum(lower, position)), np.maximum(upper, position))
+    return Point(position, velocity, period), Point(rest, still, period + braking)
+
+
+# ---- reading plain data -----------------------------------------------------------------------------------
+
+
+def stamp(data: Mapping[str, Any], what: str) -> float:
+    """Seconds of the message's header."""
+    header = _mapping(_get(data, "header", what), f"{what}: 'header'")
+    time = _mapping(_get(header, "stamp", what), f"{what}: 'stamp'")
+    sec, nanosec = _get(time, "sec", what), _get(time, "nanosec", what)
+    for value in (sec, nanosec):
+        if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**40:
+            raise RefusedError(f"{what}: a stamp of {_shown(sec)} s and {_shown(nanosec)} ns")
+    return float(sec) + 1e-9 * float(nanosec)
+
+
+def _check_frame(data: Mapping[str, Any], frame: str, what: str) -> None:
+    header = _mapping(_get(data, "header", what), f"{what}: 'header'")
+    if header.get("frame_id") != frame:
+        raise RefusedError(f"{what}: in frame {_shown(header.get('frame_id'))}, expected '{frame}'")
+
+
+def _mapping(value: Any, what: str) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise RefusedError(f"{what}: no message, but {_shown(value)}")
+    return value
+
+
+def _get(data: Mapping[str, Any], key: str, what: str) -> Any:
+    if key not in data:
+        raise RefusedError(f"{what}: '{key}' is missing")
+    return data[key]
+
+
+def _xyz(data: Mapping[str, Any], key: str, what: str) -> Array:
+    inner = _mapping(_get(data, key, what), f"{what}: '{key}'")
+    return np.array([_number(_get(inner, k, what), f"{what}: {key} {k}") for k in "xyz"])
+
+
+def _number(value: Any, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < _LARGEST:
+        raise RefusedError(f"{what} should be a number, found {_shown(value)}")
+    return float(value)
+
+
+def _numbers(values: Any, n: int, what: str) -> Array:
+    """``(n,)``, NaN for null."""
+    if not isinstance(values, list) or len(values) != n:
+        found = f"{len(values)}" if isinstance(values, list) else _shown(values)
+        raise RefusedError(f"{what} should be {n} numbers, found {found}")
+    out = np.empty(n)
+    for i, value in enumerate(values):
+        if value is None or (isinstance(value, float) and math.isnan(value)):
+            out[i] = math.nan
+        else:
+            out[i] = _number(value, what)
+    return out
+
+
+def _finite(values: Any, n: int, what: str) -> Array:
+    array = _numbers(values, n, what)
+    if not np.all(np.isfinite(array)):
+        raise RefusedError(f"{what} is not finite")
+    return array
+
+
+def _shown(value: Any) -> str:
+    """A value in few characters."""
+    if isinstance(value, str):
+        return repr(value[:40])
+    if isinstance(value, list | Mapping):
+        return f"{type(value).__name__} of {len(value)}"
+    return repr(value)[:40]
+
+
+def in_tool_frame(wrench_at_sensor: Array, sensor: Array) -> Array:
+    """A wrench ``(6,)`` measured in a sensor's frame, at the tool origin in the tool frame.
+
+    Args:
+        wrench_at_sensor: Force and torque about the sensor's origin.
+        sensor: Pose ``(7,)`` of the sensor in the tool frame.
+    """
+    force = poses.rotate(sensor[3:], wrench_at_sensor[:3])
+    torque = poses.rotate(sensor[3:], wrench_at_sensor[3:]) + np.cross(sensor[:3], force)
+    return np.concatenate([force, torque])

@@ -1,0 +1,180 @@
+"""Starts the twin: the bridge and the node, as processes of their own, on this machine alone."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from typing import IO, Any
+
+import yaml
+
+from bt_tasksim.engines.ros.setting import load_setting
+from bt_tasksim.errors import MachineError
+from bt_tasksim.robot import RobotDescription
+from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.twin.environment import bridge_binary, bridge_variables, environment, ros_variables
+
+START = 30.0
+"""Longest time in seconds that a process may take to start."""
+LOOPBACK = "127.0.0.1"
+DOMAIN = 42
+
+
+class Twin:
+    """Bridge and node of a cell; `close` ends both.
+
+    Attributes:
+        port: Of rosbridge.
+        evaluation_port: Of the evaluation channel.
+
+    Args:
+        robot: The robot.
+        configuration: The world at first.
+        port: Port of rosbridge; 0 for a free one.
+        evaluation_port: Likewise, of the evaluation channel.
+        domain: ROS domain.
+        gap: File that says how the twin differs; by default the bundled one.
+        ros: File with topics and names; by default the robot's bundled one.
+        seed: Of factors and noise.
+        log: Where the processes' own words go; by default to this process's standard error.
+        build: Make the twin's environment where it is missing.
+
+    Raises:
+        InputError: A file is no good.
+        MachineError: A process does not start.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        configuration: ActorConfiguration,
+        *,
+        port: int = 0,
+        evaluation_port: int = 0,
+        domain: int = DOMAIN,
+        gap: str = "",
+        ros: str = "",
+        seed: int = 0,
+        log: IO[Any] | None = None,
+        build: bool = False,
+    ) -> None:
+        self._python = environment(build)
+        self.domain, self._log = domain, log
+        self.port = port or free_port()
+        self.evaluation_port = evaluation_port or free_port()
+        self._home = Path(tempfile.mkdtemp(prefix="bt-tasksim-twin-"))
+        self.bridge: subprocess.Popen[Any] | None = None
+        self.node: subprocess.Popen[Any] | None = None
+        setting = load_setting(robot, ros)
+        robot_file = self._home / "robot.yaml"
+        robot_file.write_text(_with_urdf(robot))
+        world = self._home / "configuration.json"
+        world.write_text(configuration.to_json())
+        self._command = [
+            str(self._python / "bin" / "python"),
+            "-m",
+            "bt_tasksim.twin.node",
+            *("--robot", str(robot_file), "--ros", str(setting.source), "--configuration", str(world)),
+            *("--seed", str(seed), "--evaluation-port", str(self.evaluation_port)),
+            *(("--gap", gap) if gap else ()),
+        ]
+        try:
+            self.start_bridge()
+            self.start_node()
+        except BaseException:
+            self.close()
+            raise
+
+    def start_bridge(self) -> None:
+        """Start rosbridge, and wait until it listens.
+
+        Raises:
+            MachineError: It does not.
+        """
+        binary = bridge_binary(self._python)
+        self.bridge = subprocess.Popen(
+            [str(binary), "--no-rosapi", "--bind", f"{LOOPBACK}:{self.port}"],
+            env=bridge_variables(self._python, self.domain, self._home),
+            stdout=self._log or subprocess.DEVNULL,
+            stderr=self._log or subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        end = time.monotonic() + START
+        while time.monotonic() < end:
+            if self.bridge.poll() is not None:
+                raise MachineError(
+                    f"rosbridge ended with status {self.bridge.returncode}; is port {self.port} free?"
+                )
+            with contextlib.suppress(OSError), socket.create_connection((LOOPBACK, self.port), 1.0):
+                return
+            time.sleep(0.02)
+        raise MachineError(f"rosbridge does not listen at port {self.port} after {START:g} s")
+
+    def start_node(self) -> None:
+        """Start the node, and wait until it is ready.
+
+        Raises:
+            MachineError: It is not.
+        """
+        self.node = subprocess.Popen(
+            self._command,
+            env=ros_variables(self.domain),
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            start_new_session=True,
+        )
+        assert self.node.stdout is not None
+        if not select.select([self.node.stdout], [], [], START)[0]:
+            raise MachineError(f"the twin is not ready after {START:g} s")
+        said = self.node.stdout.readline().decode().split()
+        if said[:1] != ["ready"]:
+            raise MachineError("the twin did not start; its reason stands above")
+
+    def ended(self) -> str:
+        """Which process has ended, as a sentence; empty while both run."""
+        for name, process in (("rosbridge", self.bridge), ("the twin", self.node)):
+            if process is not None and process.poll() is not None:
+                return f"{name} has ended with status {process.returncode}"
+        return ""
+
+    def close(self) -> None:
+        """End both processes."""
+        for process in (self.node, self.bridge):
+            if process is None:
+                continue
+            process.terminate()
+            try:
+                process.wait(3.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+            if process.stdout is not None:
+                process.stdout.close()
+        shutil.rmtree(self._home, ignore_errors=True)
+
+    def __enter__(self) -> Twin:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def free_port() -> int:
+    """A port that nobody listens at."""
+    with socket.create_server((LOOPBACK, 0)) as server:
+        return int(server.getsockname()[1])
+
+
+def _with_urdf(robot: RobotDescription) -> str:
+    """The robot's data file with the path of its URDF written out: the twin has no simulator's package."""
+    data = yaml.safe_load(robot.source.read_text())
+    data["urdf"] = os.fspath(robot.urdf)
+    return json.dumps(data)

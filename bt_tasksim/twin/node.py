@@ -1,0 +1,269 @@
+"""The twin as a ROS 2 node: the topics of a robot's cell. Runs in the twin's own virtual environment.
+
+``python -m bt_tasksim.twin.node --robot FILE --ros FILE --configuration FILE`` prints one line with
+``ready PORT``, the port of the evaluation channel, and goes on until it is stopped. One thread runs physics in
+real time and takes messages between two steps; steps that are late are caught up with, up to a tenth of a second.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import signal
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, String
+from trajectory_msgs.msg import JointTrajectory
+
+from bt_tasksim.engines.ros.setting import RosSetting, load_setting
+from bt_tasksim.errors import BtTasksimError, InputError
+from bt_tasksim.poses import Array
+from bt_tasksim.robot import load_robot
+from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.twin.cell import Cell, Readings
+from bt_tasksim.twin.controller import MOST_POINTS, RefusedError, Trajectory
+from bt_tasksim.twin.evaluation import EvaluationServer, hidden_to_json
+from bt_tasksim.twin.gap import load_gap
+
+SENSOR_FAULTS = ("silent", "frozen", "delayed", "nan", "order")
+DELAY = 0.3
+"""Seconds, of the fault ``delayed``."""
+LATE = 0.1
+"""Seconds by which physics may lag and still catch up; more is forgotten, and said."""
+
+
+class TwinNode(Node):  # type: ignore[misc]
+    """Topics in front of a cell.
+
+    Args:
+        cell: The cell.
+        setting: Names of topics, joints and frames.
+    """
+
+    def __init__(self, cell: Cell, setting: RosSetting) -> None:
+        super().__init__("bt_tasksim_twin", start_parameter_services=False, enable_rosout=False)
+        self.cell, self.setting = cell, setting
+        self.fault = ""
+        self._delayed: deque[tuple[float, JointState]] = deque()
+        self._frozen: list[float] = []
+        self._said: dict[str, float] = {}
+        subscribe, publish = self.create_subscription, self.create_publisher
+        # Commands first: where one and the word to hold are both there, the command is taken first.
+        for group, topic in (("arm", setting.arm.command), ("hand", setting.hand.command)):
+            subscribe(JointTrajectory, topic, self._taking(group), 1)
+        if setting.begin:
+            subscribe(String, setting.begin, lambda m: self.cell.begin(m.data[:64]), 10)
+        if setting.hold:
+            subscribe(String, setting.hold, lambda m: self.cell.hold(m.data[:400]), 10)
+        subscribe(Bool, setting.emergency_stop, lambda m: self.cell.press(bool(m.data)), 10)
+        self._joints = publish(JointState, setting.joint_states, 10)
+        self._wrench = publish(WrenchStamped, setting.wrench.topic, 10)
+        self._tips = [publish(WrenchStamped, topic, 10) for topic in setting.tips.topics]
+        self._objects: dict[str, Any] = {}
+        self._wire = np.argsort(setting.order)
+        self._tick = 0
+        self._offset = time.time() - time.monotonic()
+
+    # ---- commands -------------------------------------------------------------------------------------------
+
+    def _taking(self, group: str) -> Callable[[JointTrajectory], None]:
+        names = dict(
+            zip(self.setting.arm.joints + self.setting.hand.joints, self.cell.robot.joints, strict=True)
+        )
+
+        def take(message: JointTrajectory) -> None:
+            try:
+                if len(message.points) > MOST_POINTS:
+                    raise RefusedError(f"{len(message.points)} points, more than {MOST_POINTS}")
+                self.cell.command(
+                    group,
+                    Trajectory(
+                        joints=[names.get(name, name) for name in message.joint_names],
+                        positions=[point.positions for point in message.points],
+                        velocities=[point.velocities for point in message.points],
+                        times=[_seconds(point.time_from_start) for point in message.points],
+                        run=message.header.frame_id,
+                    ),
+                )
+            except RefusedError as error:
+                self.say(f"{group}: a trajectory is refused: {error}", group)
+
+        return take
+
+    # ---- running --------------------------------------------------------------------------------------------
+
+    def step(self) -> None:
+        """One period: physics, and what the sensors say."""
+        self.cell.step()
+        self._tick += 1
+        for reading in self.cell.readings():
+            self._publish(reading)
+
+    def _publish(self, reading: Readings) -> None:
+        now = time.time()
+        stamp = _time(now - (self.cell.time - reading.time))
+        setting = self.setting
+        self._publish_joints(reading, stamp, now)
+        self._wrench.publish(_wrench(reading.wrench, setting.wrench.frame, stamp))
+        for publisher, force in zip(self._tips, reading.tips, strict=True):
+            felt = np.concatenate([force, np.zeros(3)])
+            publisher.publish(_wrench(felt, setting.tips.frame, stamp))
+        gap = self.cell.gap.rates
+        if (
+            setting.objects is not None
+            and self._tick % max(gap["control_rate"] // gap["object_rate"], 1) == 0
+        ):
+            for actor, pose in zip(self.cell.configuration.objects, reading.objects, strict=True):
+                topic = setting.object_topic(actor.name)
+                if topic not in self._objects:
+                    self._objects[topic] = self.create_publisher(PoseStamped, topic, 10)
+                self._objects[topic].publish(_pose(pose, setting.objects.frame, stamp))
+
+    def _publish_joints(self, reading: Readings, stamp: Time, now: float) -> None:
+        message = JointState()
+        message.header.stamp = stamp
+        names = list(self.setting.wire)
+        position = reading.position[self._wire].tolist()
+        if self.fault == "silent":
+            return
+        if self.fault == "frozen":
+            self._frozen = self._frozen or position
+            position = self._frozen
+        elif self.fault == "nan":
+            position[2] = math.nan
+        elif self.fault == "order":
+            names[0], names[1] = names[1], names[0]
+        message.name, message.position = names, position
+        message.velocity = reading.velocity[self._wire].tolist()
+        message.effort = reading.effort[self._wire].tolist()
+        if self.fault == "delayed":
+            self._delayed.append((now + DELAY, message))
+            while self._delayed and self._delayed[0][0] <= now:
+                self._joints.publish(self._delayed.popleft()[1])
+        else:
+            self._joints.publish(message)
+
+    # ---- the evaluation channel -----------------------------------------------------------------------------
+
+    def answer(self, question: dict[str, Any]) -> dict[str, Any]:
+        """Answer a question of the evaluation channel; see `EvaluationClient`."""
+        match question.get("do"):
+            case "load":
+                text, seed = question.get("configuration"), question.get("seed", 0)
+                if not isinstance(text, str) or not isinstance(seed, int):
+                    raise InputError("'load' needs a configuration as text, and a number as seed")
+                configuration = ActorConfiguration.from_json(text)
+                self.cell.load(configuration, seed)
+                self.fault, self._frozen = "", []
+                self._delayed.clear()
+                return {"done": True}
+            case "truth":
+                return hidden_to_json(self.cell.hidden())
+            case "tell":
+                return self.cell.tell()
+            case "fault":
+                self.fault = str(question.get("name", ""))
+                self.cell.watch(self.fault)
+                return {"done": True}
+            case other:
+                raise InputError(f"unknown question '{other}'; known: load, truth, tell, fault")
+
+    def say(self, sentence: str, about: str) -> None:
+        """A line on the standard error, once a second about each thing at most."""
+        now = time.monotonic()
+        if now - self._said.get(about, -1.0) >= 1.0:
+            self._said[about] = now
+            print(f"twin: {sentence}", file=sys.stderr, flush=True)
+
+
+def run(node: TwinNode, server: EvaluationServer) -> None:
+    """Run until ROS is shut down."""
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    period = node.cell.period
+    due = time.monotonic() + period
+    while rclpy.ok():
+        server.answer(node.answer)
+        while (left := due - time.monotonic()) > 0.0:
+            executor.spin_once(timeout_sec=left)
+        node.step()
+        due += period
+        behind = time.monotonic() - due
+        if behind > LATE:
+            node.say(f"{1000 * behind:.0f} ms behind real time, which are left out", "late")
+            due = time.monotonic()
+
+
+def _seconds(duration: Any) -> float:
+    return float(duration.sec) + 1e-9 * float(duration.nanosec)
+
+
+def _time(seconds: float) -> Time:
+    whole = math.floor(seconds)
+    return Time(sec=whole, nanosec=min(int((seconds - whole) * 1e9), 999_999_999))
+
+
+def _wrench(values: Array, frame: str, stamp: Time) -> WrenchStamped:
+    message = WrenchStamped()
+    message.header.stamp, message.header.frame_id = stamp, frame
+    force, torque = message.wrench.force, message.wrench.torque
+    force.x, force.y, force.z, torque.x, torque.y, torque.z = values.tolist()
+    return message
+
+
+def _pose(values: Array, frame: str, stamp: Time) -> PoseStamped:
+    message = PoseStamped()
+    message.header.stamp, message.header.frame_id = stamp, frame
+    p, q = message.pose.position, message.pose.orientation
+    p.x, p.y, p.z, q.w, q.x, q.y, q.z = values.tolist()
+    return message
+
+
+def main() -> int:
+    """Run the twin; returns the exit status."""
+    parser = argparse.ArgumentParser(description="The twin of a robot's cell, as a ROS 2 node.")
+    parser.add_argument("--robot", required=True, metavar="FILE")
+    parser.add_argument("--ros", required=True, metavar="FILE")
+    parser.add_argument("--configuration", required=True, type=Path, metavar="FILE")
+    parser.add_argument("--gap", default="", metavar="FILE")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--evaluation-port", type=int, default=0)
+    options = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        robot = load_robot(options.robot)
+        setting = load_setting(robot, options.ros)
+        configuration = ActorConfiguration.from_json(options.configuration.read_text())
+        cell = Cell(robot, load_gap(options.gap), configuration, options.seed)
+        server = EvaluationServer(options.evaluation_port)
+    except (BtTasksimError, OSError) as error:
+        print(f"twin: {error}", file=sys.stderr)
+        return 2
+    rclpy.init()
+    node = TwinNode(cell, setting)
+    print(f"ready {server.port}", flush=True)
+    try:
+        run(node, server)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 0
+    finally:
+        server.close()
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
