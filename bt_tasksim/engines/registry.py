@@ -10,6 +10,7 @@ from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
 from bt_tasksim.engines.noise import noise_model
 from bt_tasksim.engines.pipeline import EnginePipeline, PostProcessEngine, RenderingEngine
 from bt_tasksim.engines.remote.address import is_remote, parse_remote
+from bt_tasksim.engines.ros.address import is_ros, parse_ros
 from bt_tasksim.errors import InputError, MachineError, nearest
 from bt_tasksim.pacing import Clock, FreeClock, PacedPhysics, RealTimeClock
 from bt_tasksim.robot import RobotDescription
@@ -49,6 +50,7 @@ class EngineOptions:
         key: The client's key file, for engines on other machines.
         timeout: Seconds that a step of an engine in another process may take.
         connect_timeout: Seconds within which it must be there.
+        ros: File with a robot's topics and names; by default the bundled one.
     """
 
     engines: str = "sapien"
@@ -62,6 +64,7 @@ class EngineOptions:
     key: str = ""
     timeout: float = 2.0
     connect_timeout: float = 5.0
+    ros: str = ""
 
     def __post_init__(self) -> None:
         for what, name, known in (
@@ -72,6 +75,8 @@ class EngineOptions:
         ):
             if is_remote(name):
                 parse_remote(name)
+            elif what == "engines" and is_ros(name):
+                parse_ros(name)
             elif name not in known:
                 raise InputError(f"unknown {what} '{name}'{nearest(name, known)}")
         noise_model(self.noise)
@@ -81,12 +86,16 @@ class EngineOptions:
 
     @property
     def remote(self) -> bool:
-        """Some engine is in another process, which serves one client at a time."""
-        return any(map(is_remote, (self.engines, self.perception, self.kinematics, self.renderer)))
+        """Some engine is in another process, which serves one client at a time; a robot does, too."""
+        return is_ros(self.engines) or any(
+            map(is_remote, (self.engines, self.perception, self.kinematics, self.renderer))
+        )
 
     @property
     def label(self) -> str:
         """How results name the perception."""
+        if is_ros(self.engines) and self.perception == "state":
+            return "tracked"
         return f"state, noise {self.noise}" if self.perception == "state" else self.perception
 
 
@@ -97,6 +106,8 @@ def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePip
         InputError: An engine in another process is not one for this robot and version, or its key is no good.
         MachineError: An engine cannot start on this machine, or does not answer from another process.
     """
+    if is_ros(options.engines):
+        return ros_pipeline(robot, options)
     with ExitStack() as built:
 
         def engine(role: str, name: str) -> Any:
@@ -138,6 +149,38 @@ def robot_pipeline(
     kinematics, clock = PinocchioKinematics(robot, patience=PATIENCE), RealTimeClock()
     physics = GuardedRobot(engine, Guard(robot, kinematics.forward), clock)
     return EnginePipeline(kinematics, physics, postprocess, rendering, clock)
+
+
+def ros_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePipeline:
+    """The pipeline for a robot behind rosbridge; what perception adds in simulation, reality has already.
+
+    Raises:
+        InputError: The robot's files are no good, or an option makes no sense for a robot.
+    """
+    from bt_tasksim.engines.ros.cameras import RosCameras
+    from bt_tasksim.engines.ros.engine import RosRobot
+    from bt_tasksim.engines.ros.setting import load_setting
+
+    for what, name in (("kinematics", options.kinematics), ("perception", options.perception)):
+        if is_remote(name):
+            raise InputError(f"a robot's {what} runs in this process, not at '{name}'")
+    if options.rendering:
+        raise InputError("the run of a robot cannot be drawn: leave --video away, and film it")
+    setting, tracked = load_setting(robot, options.ros), options.perception == "state"
+    kinematics = PinocchioKinematics(robot)
+    engine = RosRobot(robot, setting, parse_ros(options.engines), kinematics, tracked)
+    postprocess: PostProcessEngine
+    if tracked:
+        from bt_tasksim.engines.postprocess_state import StatePostProcess
+
+        postprocess = StatePostProcess(robot, noise_model("none"))
+    else:
+        from bt_tasksim.engines.camera_errors import PERFECT
+        from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
+
+        postprocess = CameraPostProcess(robot, PERFECT)
+    rendering = RosCameras(engine) if not tracked else None
+    return robot_pipeline(robot, engine, postprocess, rendering)
 
 
 def build_engine(role: str, name: str, robot: RobotDescription, noise: str = "fine") -> Any:

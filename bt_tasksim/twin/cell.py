@@ -102,7 +102,7 @@ class Cell:
         assert objects is not None
         return objects
 
-    # ---- what comes in --------------------------------------------------------------------------------------
+    # ---- what comes in ----------------------------------------------------------------------------------
 
     def command(self, group: str, trajectory: Trajectory) -> None:
         """A trajectory for ``arm`` or ``hand``, which takes its latency.
@@ -151,7 +151,7 @@ class Cell:
             self.hold("emergency stop")
             self._arm.stop(self.time, self.robot.arm_acceleration)
 
-    # ---- running --------------------------------------------------------------------------------------------
+    # ---- running ----------------------------------------------------------------------------------------
 
     def step(self) -> None:
         """One period of the controllers."""
@@ -194,7 +194,7 @@ class Cell:
             out.append(self._leaving.popleft()[1])
         return out
 
-    # ---- what no tree and no policy sees --------------------------------------------------------------------
+    # ---- what no tree and no policy sees ----------------------------------------------------------------
 
     def hidden(self) -> Hidden:
         """The physics state."""

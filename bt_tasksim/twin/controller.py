@@ -86,7 +86,7 @@ class Controller:
         self._began = now
 
     def check(self, trajectory: Trajectory, now: float) -> tuple[Array, Array, Array | None]:
-        """Times ``(k,)``, positions ``(k, n)`` and, where given, velocities of a trajectory that may begin now.
+        """Times ``(k,)``, positions ``(k, n)`` and, where given, velocities of what may begin now.
 
         Raises:
             RefusedError: It is none for these joints, or beyond their limits.

@@ -44,7 +44,7 @@ class Twin:
         gap: File that says how the twin differs; by default the bundled one.
         ros: File with topics and names; by default the robot's bundled one.
         seed: Of factors and noise.
-        log: Where the processes' own words go; by default to this process's standard error.
+        log: Where the node's own words go; by default to this process's standard error.
         build: Make the twin's environment where it is missing.
 
     Raises:
@@ -103,8 +103,8 @@ class Twin:
         self.bridge = subprocess.Popen(
             [str(binary), "--no-rosapi", "--bind", f"{LOOPBACK}:{self.port}"],
             env=bridge_variables(self._python, self.domain, self._home),
-            stdout=self._log or subprocess.DEVNULL,
-            stderr=self._log or subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
         end = time.monotonic() + START
@@ -144,6 +144,12 @@ class Twin:
             if process is not None and process.poll() is not None:
                 return f"{name} has ended with status {process.returncode}"
         return ""
+
+    def wait(self) -> str:
+        """Wait until a process ends, and say which."""
+        while not (ended := self.ended()):
+            time.sleep(0.2)
+        return ended
 
     def close(self) -> None:
         """End both processes."""

@@ -1,8 +1,9 @@
 """The twin as a ROS 2 node: the topics of a robot's cell. Runs in the twin's own virtual environment.
 
 ``python -m bt_tasksim.twin.node --robot FILE --ros FILE --configuration FILE`` prints one line with
-``ready PORT``, the port of the evaluation channel, and goes on until it is stopped. One thread runs physics in
-real time and takes messages between two steps; steps that are late are caught up with, up to a tenth of a second.
+``ready PORT``, the port of the evaluation channel, and goes on until it is stopped. One thread runs physics
+in real time and takes messages between two steps; steps that are late are caught up with, up to a tenth of a
+second.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ class TwinNode(Node):  # type: ignore[misc]
         self._tick = 0
         self._offset = time.time() - time.monotonic()
 
-    # ---- commands -------------------------------------------------------------------------------------------
+    # ---- commands ---------------------------------------------------------------------------------------
 
     def _taking(self, group: str) -> Callable[[JointTrajectory], None]:
         names = dict(
@@ -102,7 +103,7 @@ class TwinNode(Node):  # type: ignore[misc]
 
         return take
 
-    # ---- running --------------------------------------------------------------------------------------------
+    # ---- running ----------------------------------------------------------------------------------------
 
     def step(self) -> None:
         """One period: physics, and what the sensors say."""
@@ -155,7 +156,7 @@ class TwinNode(Node):  # type: ignore[misc]
         else:
             self._joints.publish(message)
 
-    # ---- the evaluation channel -----------------------------------------------------------------------------
+    # ---- the evaluation channel -------------------------------------------------------------------------
 
     def answer(self, question: dict[str, Any]) -> dict[str, Any]:
         """Answer a question of the evaluation channel; see `EvaluationClient`."""

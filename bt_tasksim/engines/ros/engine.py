@@ -101,12 +101,12 @@ class RosRobot:
 
     def _forget(self) -> None:
         """Nothing has arrived yet."""
-        self._clock = RobotClock()
+        self.clock = RobotClock()
         self._joints: Joints | None = None
         self._before: JointReading | None = None
         self._newest: dict[str, Newest] = {}
 
-    # ---- a run begins ---------------------------------------------------------------------------------------
+    # ---- a run begins -----------------------------------------------------------------------------------
 
     def reset(self, configuration: ActorConfiguration) -> WorldState:
         """See `RealEngine.reset`: connect where need be, end a hold, bring the arm to its start.
@@ -163,7 +163,7 @@ class RosRobot:
     ) -> None:
         def handle(message: Any, arrived: float) -> None:
             value, stamp = read(message, frame)
-            self._newest[topic] = Newest(value, self._clock.convert(stamp, arrived))
+            self._newest[topic] = Newest(value, self.clock.convert(stamp, arrived))
 
         link.subscribe(topic, kind, handle)
 
@@ -249,7 +249,7 @@ class RosRobot:
             f"'{self.setting.arm.command}' active?"
         )
 
-    # ---- commands -------------------------------------------------------------------------------------------
+    # ---- commands ---------------------------------------------------------------------------------------
 
     def send(self, target: JointTarget) -> None:
         """See `RealEngine.send`."""
@@ -285,9 +285,9 @@ class RosRobot:
                 Point(t.position[:n], t.velocity[:n], (i + 1) * self._period) for i, t in enumerate(ramp)
             ]
             joints = self._joints
-            if not points and joints is not None and np.all(np.isfinite(joints.reading.position[:n])):
-                if joints.reading.names == self.robot.joints:
-                    here = joints.reading.position[:n]
+            if not points and joints is not None and joints.reading.names == self.robot.joints:
+                here = joints.reading.position[:n]
+                if np.all(np.isfinite(here)):
                     points = [Point(here, np.zeros(n), self._period)]
             if points:
                 link.publish(setting.arm.command, messages.trajectory(setting.arm.joints, points, self._run))
@@ -309,7 +309,7 @@ class RosRobot:
             },
         )
 
-    # ---- states ---------------------------------------------------------------------------------------------
+    # ---- states -----------------------------------------------------------------------------------------
 
     def latest(self) -> JointReading:
         """See `RealEngine.latest`."""
@@ -374,7 +374,7 @@ class RosRobot:
     def _on_joints(self, message: Any, arrived: float) -> None:
         """Joint states, in the robot's order and names where the wire's are as its file says."""
         came, setting = messages.joint_states(message), self.setting
-        stamp = self._clock.convert(came.stamp, arrived)
+        stamp = self.clock.convert(came.stamp, arrived)
         if came.names == setting.wire:
             order = setting.order
             names = self.robot.joints

@@ -1,4 +1,4 @@
-"""The watchdog's way to a robot behind rosbridge: a connection of its own. Imports the standard library alone."""
+"""The watchdog's way to a robot behind rosbridge: a connection of its own, by the standard library alone."""
 
 from __future__ import annotations
 

@@ -127,58 +127,27 @@ def camera_info(message: Any) -> Calibration:
     return Calibration(size[0], size[1], matrix)
 
 
-def colour_image(message: Any, size: tuple[int, int]) -> tuple[Array, float]:
-    """A sensor_msgs/CompressedImage in colour: ``(height, width, 3)`` uint8 RGB, and its stamp.
-
-    Args:
-        message: PNG or JPEG.
-        size: Width and height that it must have.
-    """
-    import cv2
-
-    pixels, when = _image(message, "colour image", size, cv2.IMREAD_COLOR)
-    if pixels.ndim != 3 or pixels.dtype != np.uint8:
-        raise RefusedError("colour image: no colours of 8 bits")
-    return np.ascontiguousarray(pixels[:, :, ::-1]), when
-
-
-def depth_image(message: Any, size: tuple[int, int]) -> tuple[Array, float]:
-    """A sensor_msgs/CompressedImage of depths: ``(height, width)`` float32 metres, 0 nothing, and its stamp.
-
-    Args:
-        message: A PNG of 16 bits, millimetres; what image_transport writes before it (12 bytes) is skipped.
-        size: Width and height that it must have.
-    """
-    import cv2
-
-    pixels, when = _image(message, "depth image", size, cv2.IMREAD_UNCHANGED)
-    if pixels.ndim != 2 or pixels.dtype != np.uint16:
-        raise RefusedError(f"depth image: should be one channel of 16 bits, found {pixels.dtype}")
-    return pixels.astype(np.float32) / np.float32(1000.0), when
-
-
 _PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff"
 
 
-def _image(message: Any, what: str, size: tuple[int, int], how: int) -> tuple[Array, float]:
-    import cv2
+def image_content(message: Any, what: str, size: tuple[int, int]) -> tuple[bytes, float]:
+    """A sensor_msgs/CompressedImage: the file in it, and its stamp; not yet unpacked.
 
+    What image_transport writes before a depth image (12 bytes) is left out.
+
+    Args:
+        message: PNG or JPEG.
+        what: Its name in sentences.
+        size: Width and height that it must have.
+    """
     data = _mapping(message, what)
     raw = _get(data, "data", what)
-    if isinstance(raw, str):
-        if len(raw) > MOST_BYTES * 4 // 3 + 4:
-            raise RefusedError(f"{what}: {len(raw)} characters are too many")
-        try:
-            content = base64.b64decode(raw, validate=True)
-        except (binascii.Error, ValueError):
-            raise RefusedError(f"{what}: 'data' is not base64") from None
-    elif isinstance(raw, list) and len(raw) <= MOST_BYTES:
-        try:
-            content = bytes(raw)
-        except (TypeError, ValueError):
-            raise RefusedError(f"{what}: 'data' holds no bytes") from None
-    else:
+    if not isinstance(raw, str) or len(raw) > MOST_BYTES * 4 // 3 + 4:
         raise RefusedError(f"{what}: 'data' holds no bytes, or too many")
+    try:
+        content = base64.b64decode(raw, validate=True)
+    except (binascii.Error, ValueError):
+        raise RefusedError(f"{what}: 'data' is not base64") from None
     if content[12:20] == _PNG and not content.startswith(_PNG):
         content = content[12:]
     found = _size(content)
@@ -188,13 +157,39 @@ def _image(message: Any, what: str, size: tuple[int, int], how: int) -> tuple[Ar
         raise RefusedError(
             f"{what}: {found[0]} x {found[1]} pixels, and the camera has {size[0]} x {size[1]}"
         )
+    return content, stamp(data, what)
+
+
+def colours(content: bytes) -> Array:
+    """A picture in colour, unpacked: ``(height, width, 3)`` uint8 RGB."""
+    import cv2
+
+    pixels = _unpacked(content, cv2.IMREAD_COLOR, "colour image")
+    if pixels.ndim != 3 or pixels.dtype != np.uint8:
+        raise RefusedError("colour image: no colours of 8 bits")
+    return np.ascontiguousarray(pixels[:, :, ::-1])
+
+
+def metres(content: bytes) -> Array:
+    """A picture of depths, a PNG of 16 bits in millimetres: ``(height, width)`` metres, 0 nothing."""
+    import cv2
+
+    pixels = _unpacked(content, cv2.IMREAD_UNCHANGED, "depth image")
+    if pixels.ndim != 2 or pixels.dtype != np.uint16:
+        raise RefusedError(f"depth image: should be one channel of 16 bits, found {pixels.dtype}")
+    return pixels.astype(np.float32) / np.float32(1000.0)
+
+
+def _unpacked(content: bytes, how: int, what: str) -> Array:
+    import cv2
+
     try:
         pixels = cv2.imdecode(np.frombuffer(content, np.uint8), how)
     except cv2.error as error:
         raise RefusedError(f"{what}: cannot be read ({error.err})") from None
-    if pixels is None or pixels.shape[:2] != (size[1], size[0]):
+    if pixels is None or pixels.shape[1::-1] != _size(content):
         raise RefusedError(f"{what}: cannot be read")
-    return pixels, stamp(data, what)
+    return np.asarray(pixels)
 
 
 def _size(content: bytes) -> tuple[int, int] | None:
@@ -218,7 +213,7 @@ def _size(content: bytes) -> tuple[int, int] | None:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A point of a trajectory, ``time`` seconds after its begin: ``position (n,)``, and ``velocity`` likewise.
+    """A point of a trajectory, ``time`` seconds after its begin; ``position`` and ``velocity (n,)``.
 
     Without velocities a controller goes straight from point to point.
     """

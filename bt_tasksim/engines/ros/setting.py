@@ -56,7 +56,7 @@ class Tips:
     Attributes:
         topics: Topic of each tip, in the robot's order; empty where contact follows from the drives' effort.
         frame: Frame of these messages.
-        effort: Effort of a hand joint from which its tip counts as pressing, N or Nm; where there are no topics.
+        effort: Of a hand joint, N or Nm, from which its tip counts as pressing; where there are no topics.
     """
 
     topics: tuple[str, ...]
@@ -87,7 +87,7 @@ class RosSetting:
         hand: The hand's.
         wrench: The wrist's sensor.
         tips: The fingertips.
-        objects: Topic of an object's pose with ``{name}`` in it, and its frame; None without a tracking system.
+        objects: Topic of an object's pose with ``{name}`` in it, and its frame; None where none is tracked.
         emergency_stop: Topic.
         begin: Topic that says that a run begins; empty where the cell has none.
         hold: Topic that says hold; empty where the cell has none.

@@ -1,8 +1,9 @@
-"""A WebSocket client for small texts (RFC 6455), of the standard library alone: the watchdog loads no more."""
+"""A WebSocket client for small texts (RFC 6455), by the standard library: the watchdog loads no more."""
 
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import os
 import socket
@@ -47,7 +48,7 @@ class WebSocket:
                 raise OSError("the server speaks no WebSocket")
             self._data += self._read()
         head, _, self._data = self._data.partition(b"\r\n\r\n")
-        accepted = base64.b64encode(hashlib.sha1(key + _MAGIC).digest())  # noqa: S324  # as the protocol says
+        accepted = base64.b64encode(hashlib.sha1(key + _MAGIC).digest())  # as the protocol says
         if not head.startswith(b"HTTP/1.1 101") or accepted not in head:
             raise OSError("the server speaks no WebSocket")
 
@@ -80,10 +81,8 @@ class WebSocket:
 
     def close(self) -> None:
         """Disconnect; a thread that receives gets `OSError`."""
-        try:
+        with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
-        except OSError:
-            pass
         self._socket.close()
 
     def _message(self) -> tuple[int, bytes]:

@@ -1,0 +1,360 @@
+"""Every fault of a run on the twin over ROS, injected at random moments, and what became of the arm.
+
+``python -m benchmarks.faults --times 20 --json benchmarks/results/faults.json`` injects each 20 times and
+prints a table; ``--faults NAME ...`` only some. Times and ways are the twin's own, read through its evaluation
+channel; where the twin itself is killed, the runner's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.sweep import SCENE, sweeping
+from bt_tasksim.engines.ros.setting import load_setting
+from bt_tasksim.engines.ros.websocket import WebSocket
+from bt_tasksim.errors import BtTasksimError
+from bt_tasksim.robot import load_robot
+from bt_tasksim.twin.evaluation import EvaluationClient
+from bt_tasksim.twin.launch import Twin
+
+SENSORS = {
+    "joint states stop": "silent",
+    "joint states frozen": "frozen",
+    "states delayed 300 ms": "delayed",
+    "NaN in a state": "nan",
+    "wrong joint order": "order",
+}
+LEAVES: dict[str, Callable[[Any], Any]] = {}
+PROCESSES = ("bridge killed", "bridge restarted", "twin killed", "watchdog killed")
+SIGNALS = {
+    "SIGINT": signal.SIGINT,
+    "SIGTERM": signal.SIGTERM,
+    "SIGKILL of the runner": signal.SIGKILL,
+    "SIGSTOP of the runner": signal.SIGSTOP,
+}
+
+
+def leaf(name: str) -> Callable[[Callable[[Any], Any]], Callable[[Any], Any]]:
+    """Enter a fault of a leaf under a name."""
+
+    def enter(act: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        LEAVES[name] = act
+        return act
+
+    return enter
+
+
+@leaf("leaf raises")
+def _raise(tool: Any) -> Any:
+    raise ZeroDivisionError("oh")
+
+
+@leaf("leaf blocks 2 s")
+def _block(tool: Any) -> Any:
+    time.sleep(2.0)
+    return tool
+
+
+@leaf("policy gives NaN")
+def _nan(tool: Any) -> Any:
+    return tool * np.nan
+
+
+@leaf("no solution of the inverse kinematics")
+def _far(tool: Any) -> Any:
+    return tool + np.array([3.0, 0, 0, 0, 0, 0, 0])
+
+
+FAULTS = (*SENSORS, *LEAVES, *PROCESSES, "emergency stop", *SIGNALS)
+
+
+@dataclass
+class Seen:
+    """What became of one fault.
+
+    Attributes:
+        held: Seconds from the fault until the arm was told to hold, or stood by itself.
+        still: Seconds until it stood.
+        far: Farthest that a joint got from where it was at the fault, rad.
+        drift: Motion of the arm in the 0.3 s after it stood, rad.
+        by: What held it.
+        said: The message of the run.
+        running: Nodes that had not ended.
+        again: A fresh run afterwards worked.
+    """
+
+    held: float
+    still: float
+    far: float
+    drift: float
+    by: str
+    said: str
+    running: list[str]
+    again: bool
+
+
+class Bench:
+    """A twin to break, and what is needed for it.
+
+    Args:
+        domain: ROS domain.
+    """
+
+    def __init__(self, domain: int = 43) -> None:
+        self.robot = load_robot("panda")
+        self.setting = load_setting(self.robot)
+        self.configuration = SCENE.sample(0)
+        self.twin = Twin(self.robot, self.configuration, domain=domain, log=subprocess.DEVNULL)  # type: ignore[arg-type]
+        self.evaluation = EvaluationClient(self.twin.evaluation_port)
+
+    def press(self, pressed: bool) -> None:
+        """The emergency stop's topic, as another machine in the cell would publish it."""
+        topic = self.setting.emergency_stop
+        button = WebSocket("127.0.0.1", self.twin.port)
+        button.send(json.dumps({"op": "advertise", "topic": topic, "type": "std_msgs/Bool"}))
+        time.sleep(0.3)
+        if pressed:
+            self.evaluation.fault("emergency stop")
+        button.send(json.dumps({"op": "publish", "topic": topic, "msg": {"data": pressed}}))
+        time.sleep(0.2)
+        button.close()
+
+    def restart(self) -> None:
+        """Have both processes run again, and the evaluation channel answer."""
+        if self.twin.bridge is None or self.twin.bridge.poll() is not None:
+            self.twin.start_bridge()
+        if self.twin.node is None or self.twin.node.poll() is not None:
+            self.twin.start_node()
+            self.evaluation.close()
+            self.evaluation = EvaluationClient(self.twin.evaluation_port)
+
+    def at_rest(self, patience: float = 5.0) -> dict[str, Any]:
+        """What the twin says once the arm was held and stands."""
+        end = time.monotonic() + patience
+        while time.monotonic() < end:
+            told = self.evaluation.tell()
+            note = told["fault"]
+            if note and note["held"] is not None and note["still"] is not None:
+                return told
+            time.sleep(0.02)
+        raise AssertionError(f"the arm did not come to rest: {told}")
+
+    def close(self) -> None:
+        """End everything."""
+        self.evaluation.close()
+        self.twin.close()
+
+
+def measure(bench: Bench, fault: str, seed: int) -> Seen:
+    """Inject a fault once, at a moment that follows from the seed."""
+    bench.restart()
+    bench.evaluation.load(bench.configuration)
+    wait = 0.5 + 1.5 * random.Random(f"{fault} {seed}").random()
+    return _by_signal(bench, fault, wait) if fault in SIGNALS else _in_process(bench, fault, wait)
+
+
+def _in_process(bench: Bench, fault: str, wait: float) -> Seen:
+    runner, model = sweeping(bench.twin.port)
+    model.lasts = 6.0
+    broke: list[float] = []
+    _prepare(bench, runner, model, fault, wait, broke)
+    try:
+        try:
+            result = runner.run(0)
+            said = f"{result.status.name}: {result.reason}: {result.why}"
+        except BtTasksimError as error:
+            said = str(error)
+        ended = time.monotonic()
+        running = [n.name for n in runner.tree.iterate() if n.status.name == "RUNNING"]
+        if fault == "twin killed":
+            bench.restart()
+            seconds = ended - broke[0]
+            model.trouble, model.lasts = lambda tool: tool, 0.3
+            again = runner.run(0).status.name == "SUCCESS"
+            return Seen(seconds, seconds, 0.0, 0.0, "the arm is gone with the twin", said, running, again)
+
+        def again_after() -> bool:
+            bench.restart()
+            if fault == "emergency stop":
+                bench.press(False)
+            model.trouble, model.lasts = lambda tool: tool, 0.3
+            return runner.run(0).status.name == "SUCCESS"
+
+        return _after(bench, said, running, again_after)
+    finally:
+        assert runner.pipeline is not None
+        runner.pipeline.close()
+
+
+def _prepare(bench: Bench, runner: Any, model: Any, fault: str, wait: float, broke: list[float]) -> None:
+    """Have the fault happen so many seconds after the first tick."""
+
+    def act() -> None:
+        broke.append(time.monotonic())
+        if fault in SENSORS:
+            bench.evaluation.fault(SENSORS[fault])
+        elif fault == "emergency stop":
+            bench.press(True)
+        elif fault == "watchdog killed":
+            bench.evaluation.fault(fault)
+            os.kill(runner.pipeline.physics.watchdog.pid, signal.SIGKILL)
+        elif fault == "twin killed":
+            assert bench.twin.node is not None
+            bench.twin.node.kill()
+        else:
+            bench.evaluation.fault(fault)
+            assert bench.twin.bridge is not None
+            bench.twin.bridge.kill()
+            if fault == "bridge restarted":
+                bench.twin.bridge.wait()
+                bench.twin.start_bridge()
+
+    began: list[float] = []
+
+    def trouble(tool: Any) -> Any:
+        if not began:
+            began.append(time.monotonic())
+            if fault not in LEAVES:
+                timer = threading.Timer(wait, act)
+                timer.daemon = True
+                timer.start()
+        if fault in LEAVES and time.monotonic() > began[0] + wait:
+            model.trouble = lambda tool: tool
+            bench.evaluation.fault(fault)
+            return LEAVES[fault](tool)
+        return tool
+
+    model.trouble = trouble
+
+
+def _by_signal(bench: Bench, fault: str, wait: float) -> Seen:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "benchmarks.faults", "--run", str(bench.twin.port)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[1],
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("moving"), process.communicate()[1]
+        time.sleep(wait)
+        bench.evaluation.fault(fault)
+        process.send_signal(SIGNALS[fault])
+        told = bench.at_rest()
+        if fault.startswith("SIGSTOP"):
+            process.send_signal(signal.SIGCONT)
+        out, err = process.communicate(timeout=15.0)
+    finally:
+        process.kill()
+        process.wait()
+
+    def again() -> bool:
+        runner, model = sweeping(bench.twin.port)
+        model.lasts = 0.3
+        try:
+            return runner.run(0).status.name == "SUCCESS"
+        finally:
+            assert runner.pipeline is not None
+            runner.pipeline.close()
+
+    running = [] if "[]" in out or fault == "SIGKILL of the runner" else [out]
+    return _after(bench, f"{out} {err}", running, again, told)
+
+
+def _after(
+    bench: Bench, said: str, running: list[str], again: Callable[[], bool], told: dict[str, Any] | None = None
+) -> Seen:
+    told = told or bench.at_rest()
+    time.sleep(0.3)
+    last = bench.evaluation.tell()
+    drift = max(abs(a - b) for a, b in zip(told["position"], last["position"], strict=True))
+    note = last["fault"]
+    return Seen(
+        note["held"], note["still"], note["far"], drift, note["why"], " ".join(said.split()), running, again()
+    )
+
+
+def run_child(port: int) -> None:
+    """A run in a process of its own: a word when the arm moves."""
+    runner, _ = sweeping(port)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
+    told = []
+
+    def moving(step: Any) -> None:
+        if not told and float(step.observation.time) > 0.3:
+            told.append(True)
+            print("moving", flush=True)
+
+    try:
+        result = runner.run(0, record=moving)
+        print("result", result.status.name, result.why, flush=True)
+    except KeyboardInterrupt as stop:
+        running = [n.name for n in runner.tree.iterate() if n.status.name == "RUNNING"]
+        print("stopped", type(stop).__name__, str(stop), running, flush=True)
+    except BtTasksimError as error:
+        print("error", error, flush=True)
+    finally:
+        assert runner.pipeline is not None
+        runner.pipeline.close()
+
+
+@contextlib.contextmanager
+def bench_of(domain: int) -> Iterator[Bench]:
+    """A bench, closed at the end."""
+    bench = Bench(domain)
+    try:
+        yield bench
+    finally:
+        bench.close()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--times", type=int, default=2)
+    parser.add_argument("--faults", nargs="*", default=list(FAULTS), metavar="NAME")
+    parser.add_argument("--domain", type=int, default=43)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--run", type=int, metavar="PORT", help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.run is not None:
+        run_child(options.run)
+        return 0
+    found: dict[str, list[dict[str, Any]]] = {}
+    print(
+        "| fault | held after: median, longest | stands after, longest | farthest joint | again | held by | said |"
+    )
+    print("|---|---|---|---|---|---|---|")
+    with bench_of(options.domain) as bench:
+        for fault in options.faults:
+            seen = [measure(bench, fault, seed) for seed in range(options.times)]
+            found[fault] = [asdict(s) for s in seen]
+            held = [1000 * s.held for s in seen]
+            print(
+                f"| {fault} | {np.median(held):.0f}, {max(held):.0f} ms "
+                f"| {1000 * max(s.still for s in seen):.0f} ms | {max(s.far for s in seen):.3f} rad "
+                f"| {sum(s.again for s in seen)} of {options.times} | {seen[0].by} | {seen[0].said} |",
+                flush=True,
+            )
+    if options.json:
+        from bt_tasksim.files import write_text
+
+        write_text(options.json, json.dumps(found, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

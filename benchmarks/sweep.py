@@ -1,0 +1,53 @@
+"""A tree that keeps an arm moving for as long as it should, and misbehaves when told; on the twin."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim import Runner, Scene
+from bt_tasksim.concept import ConceptModel
+from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.world import Command
+from trees import sequence
+
+SCENE = Scene("panda", objects={"cup": "on table"})
+AMPLITUDE, RATE = 0.1, 4.0
+"""Metres to and fro, and rad/s: up to 0.2 m/s."""
+
+
+class Sweep(ConceptModel):
+    """Moves the tool to and fro along y.
+
+    Attributes:
+        trouble: Called at every tick with the command that it would give; gives the one to use.
+        lasts: Seconds.
+    """
+
+    default_timeout = 10_000.0
+    lasts = 10_000.0
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.trouble = lambda tool: tool
+
+    def begin(self, seen: Any) -> Any:
+        return seen.tool.copy()
+
+    def command(self, action: Any, seen: Any, memory: Any) -> Command:
+        tool = memory.copy()
+        tool[1] += AMPLITUDE / 2.0 * (1.0 - math.cos(RATE * float(seen.elapsed)))
+        return Command(tool=self.trouble(tool))
+
+    def done(self, seen: Any, memory: Any) -> Any:
+        return np.bool_(seen.elapsed >= self.lasts)
+
+
+def sweeping(port: int) -> tuple[Runner, Sweep]:
+    """A runner of a sweep on the twin behind a rosbridge of this machine."""
+    leaf = Sweep(name="sweep")
+    runner = Runner(sequence("root", leaf), SCENE, EngineOptions(engines=f"ros:127.0.0.1:{port}"))
+    runner.longest = 10_000.0
+    return runner, leaf

@@ -1,0 +1,130 @@
+"""Pictures of a robot's real cameras, in the rendering role."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from bt_tasksim.engines.pipeline import CameraModel, Image
+from bt_tasksim.engines.ros import messages
+from bt_tasksim.engines.ros.link import PATIENCE, Link
+from bt_tasksim.engines.ros.messages import Calibration, RefusedError
+from bt_tasksim.engines.ros.setting import CameraTopics
+from bt_tasksim.errors import InputError, MachineError, nearest
+from bt_tasksim.world import WorldState
+
+if TYPE_CHECKING:
+    from bt_tasksim.engines.ros.engine import RosRobot
+    from bt_tasksim.scene import ActorConfiguration
+
+STALE = 1.0
+"""Seconds after which a picture shows what was, not what is."""
+TOGETHER = 0.05
+"""Seconds by which colour and depth of one instant may differ."""
+EVERY = 100
+"""Milliseconds between two pictures that are fetched."""
+KEPT = 4
+
+
+@dataclass
+class Pictures:
+    """What has come from one camera: messages with the time at which they were taken, newest last."""
+
+    topics: CameraTopics
+    calibration: Calibration | None = None
+    colour: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=KEPT))
+    depth: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=KEPT))
+
+
+class RosCameras:
+    """A rendering engine that draws nothing: it hands on the newest pictures.
+
+    Args:
+        robot: The robot's engine, whose connection it uses.
+    """
+
+    def __init__(self, robot: RosRobot) -> None:
+        if not robot.setting.cameras:
+            raise InputError(f"'{robot.setting.source}' names no cameras; perception 'camera' needs some")
+        self._robot = robot
+        self._link: Link | None = None
+        self._cameras: Mapping[str, Pictures] = {}
+
+    def reset(self, configuration: ActorConfiguration) -> None:
+        """See `RenderingEngine.reset`: wait until every camera has spoken.
+
+        Raises:
+            MachineError: One has not.
+        """
+        link = self._robot.link
+        if link is None or link.lost:
+            raise MachineError("there is no connection to the robot")
+        if link is not self._link:
+            self._link = link
+            self._cameras = {k: Pictures(v) for k, v in self._robot.setting.cameras.items()}
+            for pictures in self._cameras.values():
+                self._subscribe(link, pictures)
+        end = time.monotonic() + PATIENCE
+        for name, pictures in self._cameras.items():
+            while pictures.calibration is None or not (pictures.colour and pictures.depth):
+                if link.lost or time.monotonic() > end:
+                    topics = pictures.topics
+                    raise MachineError(
+                        link.lost
+                        or f"no usable picture of camera '{name}' has come for {PATIENCE:g} s on "
+                        f"{topics.colour}, {topics.depth} and {topics.info}"
+                    )
+                time.sleep(0.01)
+
+    def _subscribe(self, link: Link, pictures: Pictures) -> None:
+        clock = self._robot.clock
+
+        def info(message: Any, arrived: float) -> None:
+            pictures.calibration = messages.camera_info(message)
+
+        def keep(into: deque[tuple[float, Any]], what: str) -> Any:
+            def handle(message: Any, arrived: float) -> None:
+                if pictures.calibration is None:
+                    return
+                size = (pictures.calibration.width, pictures.calibration.height)
+                content, stamp = messages.image_content(message, what, size)
+                into.append((clock.convert(stamp, arrived), content))
+
+            return handle
+
+        topics, kind = pictures.topics, "sensor_msgs/CompressedImage"
+        link.subscribe(topics.info, "sensor_msgs/CameraInfo", info, EVERY)
+        link.subscribe(topics.colour, kind, keep(pictures.colour, "colour image"), EVERY)
+        link.subscribe(topics.depth, kind, keep(pictures.depth, "depth image"), EVERY)
+
+    def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
+        """See `RenderingEngine.render`: the newest pair of pictures.
+
+        Raises:
+            InputError: There is no such camera.
+            MachineError: What has come is too old or cannot be read.
+        """
+        pictures = self._cameras.get(camera)
+        if pictures is None:
+            raise InputError(
+                f"no camera '{camera}' in '{self._robot.setting.source}'{nearest(camera, self._cameras)}"
+            )
+        assert pictures.calibration is not None
+        known, now = pictures.calibration, time.monotonic()
+        model = CameraModel(camera, known.width, known.height, known.matrix, pictures.topics.pose)
+        why = "nothing has come"
+        for taken, colour in reversed(tuple(pictures.colour)):
+            if now - taken > STALE:
+                why = f"the newest picture is {now - taken:.1f} s old"
+                break
+            for other, metres in reversed(tuple(pictures.depth)):
+                if abs(taken - other) > TOGETHER:
+                    continue
+                try:
+                    return Image(model, messages.colours(colour), messages.metres(metres) if depth else None)
+                except RefusedError as error:
+                    why = str(error)
+        raise MachineError(f"camera '{camera}': {why}")
