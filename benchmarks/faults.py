@@ -1,8 +1,8 @@
 """Every fault of a run on the twin over ROS, injected at random moments, and what became of the arm.
 
 ``python -m benchmarks.faults --times 20 --json benchmarks/results/faults.json`` injects each 20 times and
-prints a table; ``--faults NAME ...`` only some. Times and ways are the twin's own, read through its evaluation
-channel; where the twin itself is killed, the runner's.
+prints a table; ``--faults NAME ...`` only some. Times and ways are the twin's own, read through its
+evaluation channel; where the twin itself is killed, the runner's.
 """
 
 from __future__ import annotations
@@ -190,6 +190,7 @@ def _in_process(bench: Bench, fault: str, wait: float) -> Seen:
 
         def again_after() -> bool:
             bench.restart()
+            bench.evaluation.fault("")  # the sensors work again
             if fault == "emergency stop":
                 bench.press(False)
             model.trouble, model.lasts = lambda tool: tool, 0.3
@@ -334,9 +335,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         run_child(options.run)
         return 0
     found: dict[str, list[dict[str, Any]]] = {}
-    print(
-        "| fault | held after: median, longest | stands after, longest | farthest joint | again | held by | said |"
-    )
+    print("| fault | held after: median, longest | stands after | farthest joint | again | by | said |")
     print("|---|---|---|---|---|---|---|")
     with bench_of(options.domain) as bench:
         for fault in options.faults:

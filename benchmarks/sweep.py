@@ -34,14 +34,17 @@ class Sweep(ConceptModel):
         self.trouble = lambda tool: tool
 
     def begin(self, seen: Any) -> Any:
+        """Where the tool is at first."""
         return seen.tool.copy()
 
     def command(self, action: Any, seen: Any, memory: Any) -> Command:
+        """The next point of the way."""
         tool = memory.copy()
         tool[1] += AMPLITUDE / 2.0 * (1.0 - math.cos(RATE * float(seen.elapsed)))
         return Command(tool=self.trouble(tool))
 
     def done(self, seen: Any, memory: Any) -> Any:
+        """It has lasted long enough."""
         return np.bool_(seen.elapsed >= self.lasts)
 
 

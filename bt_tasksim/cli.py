@@ -494,9 +494,7 @@ def _twin(options: argparse.Namespace) -> int:
             build=True,
         ) as twin,
     ):
-        print(
-            f"twin of {scene.robot}, seed {options.seed}: ros:127.0.0.1:{twin.port}, real time; Ctrl-C ends it"
-        )
+        print(f"twin of {scene.robot}, seed {options.seed}, in real time; Ctrl-C ends it")
         print(f"  bt-tasksim run {options.tree} --seed {options.seed} --engines ros:127.0.0.1:{twin.port}")
         print(f"  evaluation channel at port {twin.evaluation_port}", flush=True)
         try:

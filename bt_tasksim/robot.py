@@ -170,6 +170,15 @@ class RobotDescription:
             out = out + hand[..., i + 1 : i + 2] * xp.asarray(self.synergy_directions[i])
         return out
 
+    @cached_property
+    def hand_range(self) -> tuple[Array, Array]:
+        """Lowest and highest positions ``(n_hand,)`` that a hand command can ask for."""
+        low = np.minimum(self.hand_open, self.hand_closed)
+        high = np.maximum(self.hand_open, self.hand_closed)
+        for direction in self.synergy_directions:
+            low, high = low + np.minimum(direction, 0.0), high + np.maximum(direction, 0.0)
+        return low, high
+
     def closure(self, hand_position: Array) -> Array:
         """Closure ``(...)`` in [0, 1] of hand joint positions ``(..., n_hand)``: the least-squares fit."""
         weights = self._closure_weights

@@ -131,6 +131,8 @@ class PinocchioKinematics:
         if self._target is None:
             start = np.array(state.joint_position, float)
             start[: self._n] = np.minimum(np.maximum(start[: self._n], self._lower), self._upper)
+            low, high = self.robot.hand_range
+            start[self._n :] = np.minimum(np.maximum(start[self._n :], low), high)  # encoders tremble
             self._target, self._goal = start, start
         tool, hand = command.tool, command.hand
         fresh = False

@@ -180,10 +180,11 @@ class GuardedRobot:
         return state
 
     def _beat(self) -> None:
-        if self.watchdog is not None:
-            if trouble := self.watchdog.trouble():
-                raise self.guard.stop("watchdog", trouble)
-            self.watchdog.beat()
+        with self._lock:  # a beat after a hold would begin the watch again
+            if self.watchdog is not None and not self._held:
+                if trouble := self.watchdog.trouble():
+                    raise self.guard.stop("watchdog", trouble)
+                self.watchdog.beat()
 
     def _emergency(self, why: str) -> None:
         """On the thread of whatever pressed it: the arm holds at once."""

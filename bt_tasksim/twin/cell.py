@@ -89,10 +89,7 @@ class Cell:
 
     def _controllers(self, start: Array) -> tuple[Controller, Controller]:
         robot, n = self.robot, self._n
-        low = np.minimum(robot.hand_open, robot.hand_closed)
-        high = np.maximum(robot.hand_open, robot.hand_closed)
-        for direction in robot.synergy_directions:
-            low, high = low + np.minimum(direction, 0.0), high + np.maximum(direction, 0.0)
+        low, high = robot.hand_range
         speed = np.maximum(high - low, 1e-3) * robot.hand_speed * 2.0
         arm = Controller(robot.arm_joints, robot.arm_lower, robot.arm_upper, robot.arm_velocity, start[:n])
         return arm, Controller(robot.hand_joints, low, high, speed, start[n:])

@@ -96,12 +96,11 @@ class RosRobot:
         self._names = dict(zip(setting.arm.joints + setting.hand.joints, robot.joints, strict=True))
         self._objects: tuple[str, ...] = ()
         self._held, self._pressed, self._run = True, False, ""
-        self._period = 0.05
+        self._period, self.clock = 0.05, RobotClock()
         self._forget()
 
     def _forget(self) -> None:
-        """Nothing has arrived yet."""
-        self.clock = RobotClock()
+        """Only what arrives from now on counts."""
         self._joints: Joints | None = None
         self._before: JointReading | None = None
         self._newest: dict[str, Newest] = {}
@@ -117,6 +116,7 @@ class RosRobot:
         self._period = 1.0 / configuration.control_frequency
         link = self._connected(configuration)
         self._run, self._held = uuid.uuid4().hex[:12], False
+        self._forget()
         self._expect_messages()
         if self._pressed:
             raise MachineError(f"the emergency stop is pressed ({self.setting.emergency_stop}); release it")
@@ -136,8 +136,7 @@ class RosRobot:
         if self.link is not None and not self.link.lost and objects == self._objects:
             return self.link
         self.close()
-        self._forget()
-        self._pressed = False
+        self._pressed, self.clock = False, RobotClock()
         link, setting = Link(self.address), self.setting
         self.link, self._objects = link, objects
         for topic in (setting.arm.command, setting.hand.command):
