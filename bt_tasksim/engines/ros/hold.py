@@ -77,7 +77,10 @@ class RosHold:
         if self._word:
             self._say({"op": "publish", "topic": self._word, "msg": {"data": f"watchdog: {why}"[:400]}})
         known = self._position
-        if known is not None and time.monotonic() - known[0] < FRESH:
+        if known is None or time.monotonic() - known[0] > FRESH:
+            if not self._word:
+                raise OSError("where the arm is is not known, and the robot takes no word to hold")
+        else:
             point = {"positions": known[1], "velocities": [0.0] * len(self._joints)}
             point["time_from_start"] = {"sec": 0, "nanosec": round(STOP * 1e9)}  # type: ignore[assignment]
             message = {"joint_names": self._joints, "points": [point]}
