@@ -1,0 +1,157 @@
+"""The same trees and policies in SAPIEN, in MuJoCo and on the twin over ROS, on the same draws.
+
+``python -m benchmarks.gap --episodes 100 --json benchmarks/results/gap.json`` runs `pick_and_throw` and
+`shelf_to_shelf`, each with the programmed and with the learned grasp, and prints a table with 95 % intervals.
+On the twin, success is judged by its own hidden state, read through the evaluation channel after the run; the
+run is in real time (about ten seconds an episode), in the other two as fast as it goes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.faults import bench_of
+from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.errors import BtTasksimError
+from bt_tasksim.files import write_text
+from bt_tasksim.judge import at_rest, judge
+from bt_tasksim.robot import load_robot
+from bt_tasksim.runner import SETTLE, Runner
+from bt_tasksim.training.evaluation import Job, evaluate, wilson
+from bt_tasksim.twin.evaluation import EvaluationClient
+from bt_tasksim.world import Hidden
+from trees.load import load_source
+
+FIRST_SEED = 70_000
+"""Seeds from here on were never run while the twin or its engine were changed."""
+SCENARIOS = ("pick_and_throw", "shelf_to_shelf")
+GRASPS = {"programmed": (("Grasp", "programmed"),), "learned": (("Grasp", "grasp-panda"),)}
+ENGINES = ("sapien", "mujoco", "twin")
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One episode, in short: whether it succeeded, a countable reason where not, and a sentence."""
+
+    seed: int
+    success: bool
+    reason: str
+    why: str
+
+
+def in_process(scenario: str, grasp: str, engines: str, seeds: Sequence[int]) -> list[Episode]:
+    """Episodes of a simulation in this process."""
+    job = Job(scenario, options=EngineOptions(engines=engines), policies=GRASPS[grasp])
+    found = evaluate(job, seeds)
+    return [Episode(o.seed, o.success, o.reason, o.why) for o in found.outcomes]
+
+
+def on_the_twin(scenario: str, grasp: str, seeds: Sequence[int], domain: int) -> list[Episode]:
+    """Episodes over ROS, judged by the twin's own truth."""
+    source = load_source(scenario, policies=GRASPS[grasp])
+    robot = load_robot(source.scene.robot)
+    found = []
+    with bench_of(domain) as bench:
+        options = EngineOptions(engines=f"ros:127.0.0.1:{bench.twin.port}")
+        runner = Runner(source.build(), source.scene, options)
+        assert runner.pipeline is not None
+        try:
+            for seed in seeds:
+                found.append(_one(runner, robot, bench.evaluation, seed))
+        finally:
+            runner.pipeline.close()
+    return found
+
+
+def _one(runner: Runner, robot: Any, evaluation: EvaluationClient, seed: int) -> Episode:
+    configuration = runner.scene.sample(seed)
+    evaluation.load(configuration, seed)
+    try:
+        result = runner.run(seed)
+        ended, reason, why = result.status.name == "SUCCESS", result.reason, result.why
+    except BtTasksimError as error:
+        ended, reason, why = False, type(error).__name__, str(error)
+    truth = _settled(evaluation)
+    model = configuration.world_model([tip.name for tip in robot.tips], robot.opening)
+    verdict = judge(configuration, model, truth)
+    if ended:
+        reason, why = verdict.reason, verdict.why
+    return Episode(seed, ended and verdict.success, reason, why)
+
+
+def _settled(evaluation: EvaluationClient) -> Hidden:
+    """The truth once things have come to rest, or have not for as long as a simulation would wait."""
+    end, quiet = time.monotonic() + SETTLE, 0
+    while True:
+        truth = evaluation.truth()
+        quiet = quiet + 1 if at_rest(truth) else 0
+        if quiet >= 4 or time.monotonic() > end:
+            return truth
+        time.sleep(0.05)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--episodes", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--scenarios", nargs="*", default=list(SCENARIOS), choices=SCENARIOS)
+    parser.add_argument("--grasps", nargs="*", default=list(GRASPS), choices=GRASPS)
+    parser.add_argument("--engines", nargs="*", default=list(ENGINES), choices=ENGINES)
+    parser.add_argument("--domain", type=int, default=45)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args(arguments)
+    seeds = range(options.seed, options.seed + options.episodes)
+    rows: list[dict[str, Any]] = []
+    print("| scenario | grasp | engines | success | 95 % interval | failures |")
+    print("|---|---|---|---|---|---|")
+    for scenario in options.scenarios:
+        for grasp in options.grasps:
+            for engines in options.engines:
+                episodes = _episodes(scenario, grasp, engines, seeds, options.domain)
+                rows.append(_row(scenario, grasp, engines, episodes))
+                print(_line(rows[-1]), flush=True)
+                if options.json:
+                    write_text(options.json, json.dumps(rows, indent=1) + "\n")
+    return 0
+
+
+def _episodes(scenario: str, grasp: str, engines: str, seeds: Sequence[int], domain: int) -> list[Episode]:
+    if engines == "twin":
+        return on_the_twin(scenario, grasp, seeds, domain)
+    return in_process(scenario, grasp, engines, seeds)
+
+
+def _row(scenario: str, grasp: str, engines: str, episodes: list[Episode]) -> dict[str, Any]:
+    successes = sum(e.success for e in episodes)
+    return {
+        "scenario": scenario,
+        "grasp": grasp,
+        "engines": engines,
+        "episodes": len(episodes),
+        "successes": successes,
+        "confidence_interval": list(wilson(successes, len(episodes))),
+        "failures": dict(Counter(e.reason for e in episodes if not e.success).most_common()),
+        "outcomes": [asdict(e) for e in episodes],
+    }
+
+
+def _line(row: dict[str, Any]) -> str:
+    low, high = row["confidence_interval"]
+    failures = ", ".join(f"{n} x {reason}" for reason, n in row["failures"].items())
+    return (
+        f"| {row['scenario']} | {row['grasp']} | {row['engines']} | {row['successes']} of {row['episodes']} "
+        f"| {100 * low:.0f} to {100 * high:.0f} % | {failures} |"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
