@@ -58,17 +58,14 @@ def on_the_twin(scenario: str, grasp: str, seeds: Sequence[int], domain: int) ->
     """Episodes over ROS, judged by the twin's own truth."""
     source = load_source(scenario, policies=GRASPS[grasp])
     robot = load_robot(source.scene.robot)
-    found = []
     with bench_of(domain) as bench:
         options = EngineOptions(engines=f"ros:127.0.0.1:{bench.twin.port}")
         runner = Runner(source.build(), source.scene, options)
         assert runner.pipeline is not None
         try:
-            for seed in seeds:
-                found.append(_one(runner, robot, bench.evaluation, seed))
+            return [_one(runner, robot, bench.evaluation, seed) for seed in seeds]
         finally:
             runner.pipeline.close()
-    return found
 
 
 def _one(runner: Runner, robot: Any, evaluation: EvaluationClient, seed: int) -> Episode:
