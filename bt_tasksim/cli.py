@@ -495,7 +495,9 @@ def _twin(options: argparse.Namespace) -> int:
         ) as twin,
     ):
         print(f"twin of {scene.robot}, seed {options.seed}, in real time; Ctrl-C ends it")
-        print(f"  bt-tasksim run {options.tree} --seed {options.seed} --engines ros:127.0.0.1:{twin.port}")
+        with_robot = f" --robot {options.robot}" if options.robot else ""
+        where = f"--seed {options.seed} --engines ros:127.0.0.1:{twin.port}"
+        print(f"  bt-tasksim run {options.tree}{with_robot} {where}")
         print(f"  evaluation channel at port {twin.evaluation_port}", flush=True)
         try:
             raise MachineError(twin.wait())

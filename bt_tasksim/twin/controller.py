@@ -110,8 +110,8 @@ class Controller:
             raise RefusedError(f"{k} points; there should be 1 to {MOST_POINTS}")
         order = [list(trajectory.joints).index(name) for name in self.joints]
         if len(trajectory.times) != k or len(trajectory.velocities) != k:
-            given = f"{len(trajectory.velocities)} velocities and {len(trajectory.times)} times"
-            raise RefusedError(f"{k} points, {given}")
+            found = f"{len(trajectory.velocities)} velocities and {len(trajectory.times)} times"
+            raise RefusedError(f"{k} points, {found}")
         times = np.asarray(trajectory.times, float)
         if not np.all(np.diff(times, prepend=0.0) > 0.0) or not times[-1] <= LONGEST:
             raise RefusedError(f"times should rise from above 0 to at most {LONGEST:g} s")
