@@ -157,6 +157,7 @@ def _parser() -> argparse.ArgumentParser:
     twin.add_argument("--ros", default="", metavar="FILE", help="topics, by default the robot's bundled ones")
     twin.add_argument("--gap", default="", metavar="FILE", help="how it differs from the simulation")
     twin.add_argument("--evaluation-port", type=_port, default=0, metavar="P", help="default: a free one")
+    twin.add_argument("--camera", action="store_true", help="publish pictures, too, for --perception camera")
     twin.add_argument("--domain", type=_domain, default=42, metavar="D", help="ROS domain, default 42")
 
     new_key = add("new-key", _new_key, "Make the key files of an engine's server and its clients.")
@@ -492,6 +493,7 @@ def _twin(options: argparse.Namespace) -> int:
             seed=options.seed,
             log=sys.stderr,
             build=True,
+            camera=options.camera,
         ) as twin,
     ):
         print(f"twin of {scene.robot}, seed {options.seed}, in real time; Ctrl-C ends it")

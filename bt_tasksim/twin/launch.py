@@ -9,6 +9,7 @@ import select
 import shutil
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -17,10 +18,11 @@ from typing import IO, Any
 import yaml
 
 from bt_tasksim.engines.ros.setting import load_setting
-from bt_tasksim.errors import MachineError
+from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.twin.environment import bridge_binary, bridge_variables, environment, ros_variables
+from bt_tasksim.twin.environment import bridge_binary, bridge_variables, environment, root, ros_variables
+from bt_tasksim.twin.gap import load_gap
 
 START = 30.0
 """Longest time in seconds that a process may take to start."""
@@ -46,6 +48,7 @@ class Twin:
         seed: Of factors and noise.
         log: Where the node's own words go; by default to this process's standard error.
         build: Make the twin's environment where it is missing.
+        camera: Publish pictures, too; needs a renderer on this machine.
 
     Raises:
         InputError: A file is no good.
@@ -65,6 +68,7 @@ class Twin:
         seed: int = 0,
         log: IO[Any] | None = None,
         build: bool = False,
+        camera: bool = False,
     ) -> None:
         self._python = environment(build)
         self.domain, self._log = domain, log
@@ -73,7 +77,10 @@ class Twin:
         self._home = Path(tempfile.mkdtemp(prefix="bt-tasksim-twin-"))
         self.bridge: subprocess.Popen[Any] | None = None
         self.node: subprocess.Popen[Any] | None = None
+        self.camera: subprocess.Popen[Any] | None = None
         setting = load_setting(robot, ros)
+        if camera and not setting.cameras:
+            raise InputError(f"'{setting.source}' names no cameras")
         robot_file = self._home / "robot.yaml"
         robot_file.write_text(_with_urdf(robot))
         world = self._home / "configuration.json"
@@ -89,6 +96,9 @@ class Twin:
         try:
             self.start_bridge()
             self.start_node()
+            if camera:
+                rate = load_gap(gap).rates["camera_rate"]
+                self.start_camera(str(robot.source), str(setting.source), rate)
         except BaseException:
             self.close()
             raise
@@ -100,6 +110,8 @@ class Twin:
             MachineError: It does not.
         """
         binary = bridge_binary(self._python)
+        with contextlib.suppress(OSError), socket.create_connection((LOOPBACK, self.port), 1.0):
+            raise MachineError(f"somebody listens at port {self.port} already; choose another one")
         self.bridge = subprocess.Popen(
             [str(binary), "--no-rosapi", "--bind", f"{LOOPBACK}:{self.port}"],
             env=bridge_variables(self._python, self.domain, self._home),
@@ -131,16 +143,34 @@ class Twin:
             stderr=self._log,
             start_new_session=True,
         )
-        assert self.node.stdout is not None
-        if not select.select([self.node.stdout], [], [], START)[0]:
-            raise MachineError(f"the twin is not ready after {START:g} s")
-        said = self.node.stdout.readline().decode().split()
-        if said[:1] != ["ready"]:
-            raise MachineError("the twin did not start; its reason stands above")
+        _wait_until_ready(self.node, "the twin")
+
+    def start_camera(self, robot: str, ros: str, rate: int) -> None:
+        """Start the camera, and wait for its first picture.
+
+        Raises:
+            MachineError: There is none.
+        """
+        self.camera = subprocess.Popen(
+            [
+                *(sys.executable, "-m", "bt_tasksim.twin.camera", "--robot", robot, "--ros", ros),
+                *("--port", str(self.port), "--evaluation-port", str(self.evaluation_port)),
+                *("--rate", str(rate)),
+            ],
+            env={**os.environ, "PYTHONPATH": str(root())},
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            start_new_session=True,
+        )
+        _wait_until_ready(self.camera, "the twin's camera")
 
     def ended(self) -> str:
         """Which process has ended, as a sentence; empty while both run."""
-        for name, process in (("rosbridge", self.bridge), ("the twin", self.node)):
+        for name, process in (
+            ("rosbridge", self.bridge),
+            ("the twin", self.node),
+            ("the twin's camera", self.camera),
+        ):
             if process is not None and process.poll() is not None:
                 return f"{name} has ended with status {process.returncode}"
         return ""
@@ -152,8 +182,8 @@ class Twin:
         return ended
 
     def close(self) -> None:
-        """End both processes."""
-        for process in (self.node, self.bridge):
+        """End every process."""
+        for process in (self.camera, self.node, self.bridge):
             if process is None:
                 continue
             process.terminate()
@@ -171,6 +201,14 @@ class Twin:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _wait_until_ready(process: subprocess.Popen[Any], name: str) -> None:
+    assert process.stdout is not None
+    if not select.select([process.stdout], [], [], START)[0]:
+        raise MachineError(f"{name} is not ready after {START:g} s")
+    if process.stdout.readline().split()[:1] != [b"ready"]:
+        raise MachineError(f"{name} did not start; its reason stands above")
 
 
 def free_port() -> int:

@@ -75,7 +75,7 @@ class TwinNode(Node):  # type: ignore[misc]
         self._objects: dict[str, Any] = {}
         self._wire = np.argsort(setting.order)
         self._tick = 0
-        self._offset = time.time() - time.monotonic()
+        self._worlds = 0
 
     # ---- commands ---------------------------------------------------------------------------------------
 
@@ -169,7 +169,10 @@ class TwinNode(Node):  # type: ignore[misc]
                 self.cell.load(configuration, seed)
                 self.fault, self._frozen = "", []
                 self._delayed.clear()
+                self._worlds += 1
                 return {"done": True}
+            case "picture":
+                return self._picture(question.get("known"))
             case "truth":
                 return hidden_to_json(self.cell.hidden())
             case "tell":
@@ -179,7 +182,21 @@ class TwinNode(Node):  # type: ignore[misc]
                 self.cell.watch(self.fault)
                 return {"done": True}
             case other:
-                raise InputError(f"unknown question '{other}'; known: load, truth, tell, fault")
+                raise InputError(f"unknown question '{other}'; known: load, truth, tell, fault, picture")
+
+    def _picture(self, known: Any) -> dict[str, Any]:
+        """What a camera needs: where everything is, and the world where it is not the one that is known."""
+        state = self.cell.state
+        text = None if known == self._worlds else self.cell.configuration.to_json()
+        return {
+            "world": self._worlds,
+            "configuration": text,
+            "stamp": time.time(),
+            "time": self.cell.time,
+            "joint_position": state.joint_position.tolist(),
+            "tool_pose": state.tool_pose.tolist(),
+            "objects": [] if state.objects is None else state.objects.tolist(),
+        }
 
     def say(self, sentence: str, about: str) -> None:
         """A line on the standard error, once a second about each thing at most."""

@@ -38,6 +38,12 @@ class Pictures:
     colour: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=KEPT))
     depth: deque[tuple[float, Any]] = field(default_factory=lambda: deque(maxlen=KEPT))
 
+    def fresh(self, now: float) -> bool:
+        """There is a picture of colour and one of depth that show what is now."""
+        if self.calibration is None:
+            return False
+        return all(newest and now - newest[-1][0] <= STALE for newest in (self.colour, self.depth))
+
 
 class RosCameras:
     """A rendering engine that draws nothing: it hands on the newest pictures.
@@ -69,7 +75,7 @@ class RosCameras:
                 self._subscribe(link, pictures)
         end = time.monotonic() + PATIENCE
         for name, pictures in self._cameras.items():
-            while pictures.calibration is None or not (pictures.colour and pictures.depth):
+            while not pictures.fresh(time.monotonic()):  # a bridge hands on old ones to whoever is new
                 if link.lost or time.monotonic() > end:
                     topics = pictures.topics
                     raise MachineError(
@@ -80,8 +86,6 @@ class RosCameras:
                 time.sleep(0.01)
 
     def _subscribe(self, link: Link, pictures: Pictures) -> None:
-        clock = self._robot.clock
-
         def info(message: Any, arrived: float) -> None:
             pictures.calibration = messages.camera_info(message)
 
@@ -91,7 +95,7 @@ class RosCameras:
                     return
                 size = (pictures.calibration.width, pictures.calibration.height)
                 content, stamp = messages.image_content(message, what, size)
-                into.append((clock.convert(stamp, arrived), content))
+                into.append((self._robot.clock.convert(stamp, arrived), content))
 
             return handle
 

@@ -185,8 +185,13 @@ class RosRobot:
     def _silent(self) -> list[str]:
         setting = self.setting
         wanted = [setting.wrench.topic, *setting.tips.topics, *map(setting.object_topic, self._objects)]
+        now = time.monotonic()
         silent = [] if self._joints is not None else [setting.joint_states]
-        return silent + [topic for topic in wanted if topic not in self._newest]
+        for topic in wanted:
+            newest = self._newest.get(topic)
+            if newest is None or now - newest.stamp > STALE:
+                silent.append(topic)
+        return silent
 
     def _approach(self, goal: Array) -> None:
         """Go to where the run begins, slowly, and wait until the arm stands there.

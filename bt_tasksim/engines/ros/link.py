@@ -73,6 +73,8 @@ class Link:
         self._ros: Any = roslibpy.Ros(address.host, address.port, transport="asyncio")
         self._ros.factory.maxRetries = 0  # nothing is sent late on a connection that came back by itself
         self._ros.on("close", self._closed)
+        # JSON's reader looks at the encoding, too; in pure Python a second look takes longer than the rest.
+        self._ros.factory.on_ready(lambda protocol: setattr(protocol, "utf8validateIncoming", False))
         try:
             self._ros.run(timeout=PATIENCE)
         except Exception as error:

@@ -136,5 +136,6 @@ class WebSocket:
         else:
             head = struct.pack("!BBQ", 0x80 | kind, 0x80 | 127, n)
         mask = os.urandom(4)
-        masked = bytes(b ^ mask[i & 3] for i, b in enumerate(content))
-        self._socket.sendall(head + mask + masked)
+        repeated = (mask * (n // 4 + 1))[:n]
+        masked = int.from_bytes(content, "big") ^ int.from_bytes(repeated, "big")
+        self._socket.sendall(head + mask + masked.to_bytes(n, "big"))
