@@ -1,6 +1,6 @@
 # make demo   a demonstration becomes a tree, and the tree runs      make test   all tests
 # make bench  measurements, as ratios                                make lint   format, lint, types, imports
-# make twin   a robot's cell to connect to: ROS 2 and a simulation
+# make twin   a robot's cell to connect to: ROS 2 and a simulation      make test-twin   tests over real ROS processes
 # Each does all the set-up first; a second call finds it done. Nothing outside this folder changes.
 
 SHELL := /bin/bash
@@ -11,13 +11,19 @@ PYTEST_FLAGS ?= -n logical --maxprocesses 4
 
 TWIN := .twin
 
-.PHONY: twin twin-environment demo test bench lint format style types imports setup clean
+.PHONY: twin twin-environment test-twin demo test bench lint format style types imports setup clean
 
 demo: setup
 	$(VENV)/bin/bt-tasksim demo
 
+LIVE := tests/bt_tasksim/twin/test_live.py
+
 test: setup
-	$(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
+	$(VENV)/bin/python -m pytest $(PYTEST_FLAGS) --ignore $(LIVE)
+
+# Real ROS processes in real time: one test after the other.
+test-twin: setup twin-environment
+	$(VENV)/bin/python -m pytest $(LIVE)
 
 bench: setup
 	$(VENV)/bin/bt-tasksim bench

@@ -70,6 +70,9 @@ class Twin:
         build: bool = False,
         camera: bool = False,
     ) -> None:
+        setting, rates = load_setting(robot, ros), load_gap(gap).rates
+        if camera and not setting.cameras:
+            raise InputError(f"'{setting.source}' names no cameras")
         self._python = environment(build)
         self.domain, self._log = domain, log
         self.port = port or free_port()
@@ -78,9 +81,6 @@ class Twin:
         self.bridge: subprocess.Popen[Any] | None = None
         self.node: subprocess.Popen[Any] | None = None
         self.camera: subprocess.Popen[Any] | None = None
-        setting = load_setting(robot, ros)
-        if camera and not setting.cameras:
-            raise InputError(f"'{setting.source}' names no cameras")
         robot_file = self._home / "robot.yaml"
         robot_file.write_text(_with_urdf(robot))
         world = self._home / "configuration.json"
@@ -91,14 +91,13 @@ class Twin:
             "bt_tasksim.twin.node",
             *("--robot", str(robot_file), "--ros", str(setting.source), "--configuration", str(world)),
             *("--seed", str(seed), "--evaluation-port", str(self.evaluation_port)),
-            *(("--gap", gap) if gap else ()),
+            *(("--gap", os.path.abspath(gap)) if gap else ()),
         ]
         try:
             self.start_bridge()
             self.start_node()
             if camera:
-                rate = load_gap(gap).rates["camera_rate"]
-                self.start_camera(str(robot.source), str(setting.source), rate)
+                self.start_camera(str(robot.source), str(setting.source), rates["camera_rate"])
         except BaseException:
             self.close()
             raise

@@ -36,6 +36,8 @@ def test_mujoco_is_chosen_by_its_name():
         ({"noise": "none"}, "state, noise none"),
         ({"perception": "camera"}, "camera"),
         ({"perception": "remote:localhost:5599"}, "remote:localhost:5599"),
+        ({"engines": "ros:localhost:9090"}, "tracked"),
+        ({"engines": "ros:localhost:9090", "perception": "camera"}, "camera"),
     ],
 )
 def test_results_say_which_perception_it_was(options, label):
@@ -51,6 +53,9 @@ def test_results_say_which_perception_it_was(options, label):
         ({"noise": "nome"}, r"unknown noise model 'nome'; did you mean 'none'\?"),
         ({"kinematics": "pinochio"}, r"unknown kinematics 'pinochio'; did you mean 'pinocchio'\?"),
         ({"renderer": "sapient"}, r"unknown rendering 'sapient'; did you mean 'sapien'\?"),
+        ({"engines": "ros:here"}, "'ros:here' should read ros:HOST:PORT, such as ros:127.0.0.1:9090"),
+        ({"engines": "ros:here:0"}, "'ros:here:0' should end with a port from 1 to 65535"),
+        ({"renderer": "ros:here:1"}, "unknown rendering 'ros:here:1'"),
         ({"engines": "remote:here"}, "'remote:here' should read remote:HOST:PORT"),
         ({"renderer": "remote:here:0"}, "'remote:here:0' should end with a port from 1 to 65535"),
         ({"timeout": 0.0}, "a time-out is a positive number of seconds"),
@@ -86,3 +91,31 @@ def test_what_is_not_installed_is_said(monkeypatch):
         monkeypatch.delitem(sys.modules, name)
     with pytest.raises(MachineError, match=r"need the extra 'remote' .*pip install 'bt-tasksim\[remote\]'"):
         build_pipeline(load_robot("panda"), EngineOptions(engines="remote:localhost:5599"))
+
+
+def test_a_robot_is_guarded_and_in_real_time():
+    line = build_pipeline(load_robot("panda"), EngineOptions(engines="ros:127.0.0.1:9090", noise="hard"))
+    assert line.real and type(line.physics).__name__ == "GuardedRobot" and line.rendering is None
+    assert line.postprocess.noise.name == "none"  # the tracking system has errors of its own
+    assert line.hidden() is None
+    line.close()
+    images = build_pipeline(
+        load_robot("panda"), EngineOptions(engines="ros:127.0.0.1:9090", perception="camera")
+    )
+    assert images.postprocess.errors.constant == 0.0 and type(images.rendering).__name__ == "RosCameras"
+
+
+@pytest.mark.parametrize(
+    ("robot", "options", "sentence"),
+    [
+        ("panda", {"rendering": True}, "leave --video away"),
+        ("panda", {"perception": "remote:localhost:1"}, "a robot's perception runs in this process"),
+        ("panda", {"kinematics": "remote:localhost:1"}, "a robot's kinematics runs in this process"),
+        ("panda", {"ros": "nowhere.yaml"}, r"no file 'nowhere\.yaml'"),
+        ("so100", {}, "no file says how 'so100' speaks ROS"),
+        ("xarm7_ability", {"perception": "camera"}, "names no cameras"),
+    ],
+)
+def test_what_a_robot_cannot_have(robot, options, sentence):
+    with pytest.raises(InputError, match=sentence):
+        build_pipeline(load_robot(robot), EngineOptions(engines="ros:127.0.0.1:9090", **options))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import logging
 import random
@@ -14,12 +15,15 @@ import time
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 from benchmarks.faults import Bench, measure
 from benchmarks.sweep import sweeping
+from bt_tasksim.engines.registry import EngineOptions, build_pipeline
 from bt_tasksim.engines.ros.websocket import WebSocket
+from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.judge import at_rest, judge
 from bt_tasksim.robot import load_robot
 from trees.load import load_source
@@ -222,6 +226,63 @@ def test_wrong_states_are_refused_and_the_run_goes_on(bench: Bench, caplog: Any)
     for topic in kinds:
         assert any(line.startswith(f"{topic}: ") for line in said), said
     assert len(said) < 60  # once a second and topic
+
+
+def test_pictures_of_a_camera_in_the_cell(bench: Bench, caplog: Any) -> None:
+    """A driver publishes; the newest pair is handed on, a damaged one is not, an old one is an error."""
+    bench.restart()
+    bench.evaluation.load(bench.configuration)
+    topics = bench.setting.cameras["scene"]
+    driver, stop = Stranger(bench.twin.port), threading.Event()
+    driver.advertise(topics.info, "sensor_msgs/CameraInfo")
+    driver.advertise(topics.colour, "sensor_msgs/CompressedImage")
+    driver.advertise(topics.depth, "sensor_msgs/CompressedImage")
+    colour = np.zeros((48, 64, 3), np.uint8)
+    colour[10:20, 30:40] = (10, 200, 60)
+    depth = np.full((48, 64), 1234, np.uint16)
+    damaged: list[str] = []
+
+    def publish() -> None:
+        while not stop.wait(0.1):
+            now = time.time()
+            header = {"stamp": {"sec": int(now), "nanosec": int(now % 1 * 1e9)}, "frame_id": "camera"}
+            info = {"header": header, "width": 64, "height": 48, "d": [0.0] * 5}
+            driver.publish(topics.info, {**info, "k": [60.0, 0, 32, 0, 60.0, 24, 0, 0, 1]})
+            for topic, pixels in ((topics.colour, colour[:, :, ::-1]), (topics.depth, depth)):
+                content = cv2.imencode(".png", np.ascontiguousarray(pixels))[1].tobytes()
+                data = base64.b64encode(content).decode()
+                driver.publish(
+                    topic, {"header": header, "format": "png", "data": damaged[0] if damaged else data}
+                )
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    robot = load_robot("panda")
+    options = EngineOptions(engines=f"ros:127.0.0.1:{bench.twin.port}", perception="camera")
+    pipeline = build_pipeline(robot, options)
+    try:
+        engine, cameras = pipeline.physics.engine, pipeline.rendering
+        state = engine.reset(bench.configuration)
+        assert state.objects is None  # nothing is tracked where there are pictures
+        cameras.reset(bench.configuration)
+        image = cameras.render(state, "scene", depth=True)
+        assert np.array_equal(image.colour, colour) and np.allclose(image.depth, 1.234)
+        assert image.camera.matrix[0, 0] == 60.0 and np.allclose(image.camera.pose, topics.pose)
+        with pytest.raises(InputError, match="no camera 'ceiling'"):
+            cameras.render(state, "ceiling")
+        with caplog.at_level(logging.WARNING, logger="bt_tasksim.ros"):
+            damaged.append(base64.b64encode(b"no picture at all").decode())
+            time.sleep(0.5)
+            assert np.array_equal(cameras.render(state, "scene").colour, colour)
+            time.sleep(1.2)
+        with pytest.raises(MachineError, match="camera 'scene': the newest picture is"):
+            cameras.render(state, "scene")
+        assert any("neither PNG nor JPEG" in r.message for r in caplog.records)
+    finally:
+        stop.set()
+        thread.join()
+        pipeline.close()
+        driver.socket.close()
 
 
 def test_bytes_that_are_no_protocol(bench: Bench) -> None:
