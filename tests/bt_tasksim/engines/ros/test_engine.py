@@ -1,0 +1,184 @@
+"""The robot's engine with a link that only remembers: what it makes of messages, and what it sends."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.engines.remote.address import Address
+from bt_tasksim.engines.ros.engine import STALE, RosRobot
+from bt_tasksim.engines.ros.messages import RefusedError
+from bt_tasksim.engines.ros.setting import load_setting
+from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.resources import asset
+from bt_tasksim.robot import load_robot
+from bt_tasksim.safety.engine import RealEngine
+from bt_tasksim.world import JointTarget
+
+ROBOT = load_robot("panda")
+KINEMATICS = PinocchioKinematics(ROBOT)
+START = np.concatenate([ROBOT.rest, ROBOT.hand_open])
+
+
+class Link:
+    """In the place of a connection."""
+
+    def __init__(self) -> None:
+        self.lost, self.sent = "", []
+
+    def publish(self, topic: str, message: dict[str, Any]) -> None:
+        self.sent.append((topic, message))
+
+    def close(self) -> None:
+        self.lost = "closed"
+
+
+def engine(tmp_path: Path | None = None, **changes: Any) -> RosRobot:
+    file = ""
+    if changes:
+        data = yaml.safe_load(asset("robots", "ros", "panda.yaml").read_text())
+        file = str(tmp_path / "cell.yaml")
+        Path(file).write_text(yaml.safe_dump({**data, **changes}))
+    made = RosRobot(ROBOT, load_setting(ROBOT, file), Address("127.0.0.1", 1), KINEMATICS)
+    made.link = Link()
+    made._began = time.monotonic()
+    return made
+
+
+def states(names: Any, position: Any, stamp: float, **more: Any) -> dict[str, Any]:
+    header = {"stamp": {"sec": int(stamp), "nanosec": int(stamp % 1 * 1e9)}, "frame_id": ""}
+    return {"header": header, "name": list(names), "position": list(position), **more}
+
+
+def feel(robot: RosRobot) -> None:
+    """Everything has spoken just now."""
+    now = time.monotonic()
+    robot._on_joints(states(robot.setting.wire, START[np.argsort(robot.setting.order)], now), now)
+    from bt_tasksim.engines.ros.engine import Newest
+
+    for topic in (robot.setting.wrench.topic, *robot.setting.tips.topics):
+        robot._newest[topic] = Newest(np.arange(6.0), now)
+
+
+def test_it_is_an_engine_of_a_real_robot() -> None:
+    assert isinstance(engine(), RealEngine)
+
+
+def test_joint_states_come_in_the_robots_order(tmp_path: Path) -> None:
+    wire = [*reversed(ROBOT.joints), "lift"]
+    robot = engine(tmp_path, joint_states={"topic": "/js", "joints": wire})
+    robot._on_joints(states(wire, [*reversed(START.tolist()), 9.0], 5.0), 100.0)
+    reading = robot.latest()
+    assert reading.names == ROBOT.joints and np.array_equal(reading.position, START)
+    assert not reading.velocity.any() and reading.stamp == pytest.approx(100.0)
+    robot._on_joints(states(wire, [*reversed((START + 0.01).tolist()), 9.0], 5.1), 100.1)
+    assert np.allclose(robot.latest().velocity, 0.1)  # none was said: from the way
+
+
+def test_another_order_is_left_to_the_guard() -> None:
+    robot = engine()
+    wrong = [ROBOT.joints[1], ROBOT.joints[0], *ROBOT.joints[2:]]
+    robot._on_joints(states(wrong, START, 5.0), 100.0)
+    assert robot.latest().names == tuple(wrong)
+    with pytest.raises(MachineError, match="in another order"):
+        robot._held = False
+        robot._checked()
+
+
+def test_nonsense_leaves_the_last_state() -> None:
+    robot = engine()
+    feel(robot)
+    before = robot.latest()
+    with pytest.raises(RefusedError):
+        robot._on_joints({"name": [1]}, 0.0)
+    assert robot.latest() is before
+
+
+def test_a_command_ends_at_rest_and_carries_its_run() -> None:
+    robot = engine()
+    robot._held, robot._run = False, "run"
+    velocity = np.zeros(9)
+    velocity[1] = 1.0
+    robot.send(JointTarget(START, velocity, 0.15))
+    (arm_topic, arm), (hand_topic, hand) = robot.link.sent
+    assert (arm_topic, hand_topic) == (robot.setting.arm.command, robot.setting.hand.command)
+    assert arm["header"]["frame_id"] == hand["header"]["frame_id"] == "run"
+    first, last = arm["points"]
+    assert first["positions"] == ROBOT.rest.tolist() and first["velocities"][1] == 1.0
+    assert not any(last["velocities"]) and last["positions"][1] > first["positions"][1]
+    assert first["time_from_start"]["nanosec"] == 50_000_000
+    assert last["time_from_start"]["nanosec"] == round(1e9 * (0.05 + 1.0 / 7.5))  # as fast as it may brake
+    assert hand["points"][0]["velocities"] == [] and len(hand["points"]) == 1
+
+
+def test_after_a_hold_nothing_is_sent() -> None:
+    robot = engine()
+    robot._held = False
+    feel(robot)
+    robot.hold((), "why not")
+    (topic, stop), (word_topic, word) = robot.link.sent
+    assert topic == robot.setting.arm.command and word_topic == robot.setting.hold
+    assert word == {"data": "why not"} and stop["points"][0]["positions"] == ROBOT.rest.tolist()
+    with pytest.raises(MachineError, match="holds until a new run begins"):
+        robot.send(JointTarget(START, np.zeros(9)))
+    assert len(robot.link.sent) == 2
+    ramp = tuple(JointTarget(START + 0.01 * k, np.zeros(9)) for k in range(3))
+    robot.hold(ramp, "again")
+    assert len(robot.link.sent[2][1]["points"]) == 3
+
+
+def test_a_lost_connection_is_said_by_everything() -> None:
+    robot = engine()
+    feel(robot)
+    robot._held = False
+    robot.link.lost = "the connection is lost"
+    target = JointTarget(START, np.zeros(9))
+    for act in (robot.latest, robot.state, lambda: robot.send(target), lambda: robot.hold((), "")):
+        with pytest.raises(MachineError, match="the connection is lost"):
+            act()
+
+
+def test_old_forces_and_unseen_objects_are_errors() -> None:
+    robot = engine()
+    feel(robot)
+    state = robot.state()
+    assert state.wrench.tolist() == [0, 1, 2, 3, 4, 5] and state.tip_force.tolist() == [[0, 1, 2]] * 2
+    assert np.allclose(state.tool_pose, KINEMATICS.forward(START)) and state.objects.shape == (0, 7)
+    robot._objects = ("cup",)
+    with pytest.raises(MachineError, match="nothing has come on /objects/cup/pose"):
+        robot.state()
+    robot._objects = ()
+    time.sleep(STALE + 0.02)
+    with pytest.raises(MachineError, match="stale: nothing usable on /wrist/wrench"):
+        robot.state()
+
+
+def test_contact_from_the_drives_effort(tmp_path: Path) -> None:
+    robot = engine(tmp_path, tips={"effort": 5.0})
+    feel(robot)
+    now = time.monotonic()
+    effort = [0.0] * 7 + [-8.0, 3.0]
+    robot._on_joints(states(robot.setting.wire, START, now, effort=effort), now)
+    assert robot.state().tip_force.tolist() == [[0, 0, 8], [0, 0, 0]]
+
+
+def test_the_emergency_stop_is_pressed_once_and_held_down() -> None:
+    robot = engine()
+    pressed: list[str] = []
+    robot.emergency.listen(pressed.append)
+    for data in (False, True, True):
+        robot._on_emergency({"data": data}, 0.0)
+    assert pressed == ["/emergency_stop"] and robot.emergency.held_down()
+    robot._on_emergency({"data": False}, 0.0)
+    assert not robot.emergency.held_down() and robot.emergency.why == "/emergency_stop"
+
+
+def test_tracking_must_be_somewhere(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="use --perception camera"):
+        engine(tmp_path, objects=None)
