@@ -498,6 +498,7 @@ def _twin(options: argparse.Namespace) -> int:
     ):
         print(f"twin of {scene.robot}, seed {options.seed}, in real time; Ctrl-C ends it")
         with_robot = f" --robot {options.robot}" if options.robot else ""
+            with_robot += f" --ros {options.ros}" if options.ros else ""
         where = f"--seed {options.seed} --engines ros:127.0.0.1:{twin.port}"
         print(f"  bt-tasksim run {options.tree}{with_robot} {where}")
         print(f"  evaluation channel at port {twin.evaluation_port}", flush=True)
