@@ -497,16 +497,14 @@ def _twin(options: argparse.Namespace) -> int:
         ) as twin,
     ):
         print(f"twin of {scene.robot}, seed {options.seed}, in real time; Ctrl-C ends it")
-        with_robot = f" --robot {options.robot}" if options.robot else ""
-            with_robot += f" --ros {options.ros}" if options.ros else ""
+        chosen = f" --robot {options.robot}" if options.robot else ""
+        chosen += f" --ros {options.ros}" if options.ros else ""
         where = f"--seed {options.seed} --engines ros:127.0.0.1:{twin.port}"
-        print(f"  bt-tasksim run {options.tree}{with_robot} {where}")
+        print(f"  bt-tasksim run {options.tree}{chosen} {where}")
         print(f"  evaluation channel at port {twin.evaluation_port}", flush=True)
         try:
             raise MachineError(twin.wait())
-        except Terminated:
-            return 0
-        except KeyboardInterrupt:
+        except KeyboardInterrupt:  # SIGTERM, too
             return 0
 
 
