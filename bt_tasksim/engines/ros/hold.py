@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import threading
@@ -14,6 +15,8 @@ FRESH = 0.5
 """Seconds for which a position counts as the robot's present one."""
 STOP = 0.1
 """Seconds in which the arm is told to come to stand."""
+AGAIN = 0.5
+"""Seconds between two attempts to connect again."""
 EVERY = 20
 """Milliseconds between two joint states that are looked at."""
 
@@ -33,29 +36,24 @@ class RosHold:
     def __init__(self, host: str, port: int, states: str, command: str, joints: list[str], word: str) -> None:
         self._host, self._port = host, port
         self._states, self._command, self._joints, self._word = states, command, joints, word
+        self._lock = threading.Lock()
         self._socket: WebSocket | None = None
         self._position: tuple[float, list[float]] | None = None
 
     def open(self) -> None:
         """See `HoldChannel.open`."""
-        self.close()
-        socket = WebSocket(self._host, self._port)
-        self._socket = socket
-        for topic, kind in (
-            (self._command, "trajectory_msgs/JointTrajectory"),
-            (self._word, "std_msgs/String"),
-        ):
-            if topic:
-                self._say({"op": "advertise", "topic": topic, "type": kind})
-        self._say(
-            {
-                "op": "subscribe",
-                "topic": self._states,
-                "type": "sensor_msgs/JointState",
-                "throttle_rate": EVERY,
-                "queue_length": 1,
-            }
-        )
+        with self._lock:
+            socket = WebSocket(self._host, self._port)
+            self.close()
+            self._socket = socket
+            for topic, kind in (
+                (self._command, "trajectory_msgs/JointTrajectory"),
+                (self._word, "std_msgs/String"),
+            ):
+                if topic:
+                    self._say({"op": "advertise", "topic": topic, "type": kind})
+            states = {"topic": self._states, "type": "sensor_msgs/JointState"}
+            self._say({"op": "subscribe", **states, "throttle_rate": EVERY, "queue_length": 1})
         threading.Thread(target=self._listen, args=(socket,), daemon=True).start()
 
     def hold(self, why: str) -> None:
@@ -97,10 +95,19 @@ class RosHold:
             try:
                 text = socket.receive()
             except OSError:
+                self._connect_again(socket)
                 return
             position = _position(text, self._joints)
             if position is not None:
                 self._position = (time.monotonic(), position)
+
+    def _connect_again(self, lost: WebSocket) -> None:
+        """A bridge that was started anew is connected to, so that a hold need not wait for that."""
+        while self._socket is lost:
+            time.sleep(AGAIN)
+            with contextlib.suppress(OSError):
+                if self._socket is lost:
+                    self.open()
 
 
 def _position(text: str | None, joints: list[str]) -> list[float] | None:

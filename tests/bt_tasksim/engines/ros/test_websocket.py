@@ -52,6 +52,9 @@ class Server:
 
         return asyncio.run_coroutine_threadsafe(go(), self.loop).result(5.0)
 
+    def drop(self) -> None:
+        asyncio.run_coroutine_threadsafe(self.clients[-1].close(), self.loop).result(5.0)
+
     def close(self) -> None:
         if not self.loop.is_closed():
             self.loop.call_soon_threadsafe(self.end.set)
@@ -117,6 +120,23 @@ def test_the_watchdog_says_hold_and_where_the_arm_is(server: Server) -> None:
     hold.close()
     with pytest.raises(OSError):
         RosHold("127.0.0.1", 1, "/states", "/arm", ["a"], "").hold("nobody there")
+
+
+def test_the_watchdog_connects_again(server: Server) -> None:
+    hold = RosHold("127.0.0.1", server.port, "/states", "/arm", ["a"], "/hold")
+    hold.open()
+    deadline = time.monotonic() + 5.0
+    while len(server.heard) < 3 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    server.drop()
+    while len(server.heard) < 6 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert len(server.clients) == 2 and json.loads(server.heard[5])["op"] == "subscribe"
+    hold.hold("at once")
+    while len(server.heard) < 7 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert json.loads(server.heard[6])["msg"]["data"] == "watchdog: at once"
+    hold.close()
 
 
 def test_the_channel_loads_nothing_heavy() -> None:
