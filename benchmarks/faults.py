@@ -181,6 +181,8 @@ def _in_process(bench: Bench, fault: str, wait: float) -> Seen:
             said = str(error)
         ended = time.monotonic()
         running = [n.name for n in runner.tree.iterate() if n.status.name == "RUNNING"]
+        if fault not in LEAVES and not broke:
+            raise RuntimeError(f"the run ended before the fault: {said}")
         if fault == "twin killed":
             bench.restart()
             seconds = ended - broke[0]

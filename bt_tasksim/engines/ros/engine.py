@@ -42,6 +42,8 @@ SETTLE = 5.0
 """Seconds within which it must."""
 MATCH = 0.3
 """Seconds after which whoever listens to a topic has found whoever publishes there."""
+ANNOUNCED = 2.0
+"""Seconds for which each command comes with the word that its run has begun: a first one may get lost."""
 TRAJECTORY, TEXT = "trajectory_msgs/JointTrajectory", "std_msgs/String"
 
 
@@ -96,7 +98,7 @@ class RosRobot:
         self._names = dict(zip(setting.arm.joints + setting.hand.joints, robot.joints, strict=True))
         self._objects: tuple[str, ...] = ()
         self._held, self._pressed, self._run = True, False, ""
-        self._period, self.clock = 0.05, RobotClock()
+        self._period, self.clock, self._announced = 0.05, RobotClock(), 0.0
         self._forget()
 
     def _forget(self) -> None:
@@ -120,9 +122,9 @@ class RosRobot:
         self._expect_messages()
         if self._pressed:
             raise MachineError(f"the emergency stop is pressed ({self.setting.emergency_stop}); release it")
-        if self.setting.begin:
-            link.publish(self.setting.begin, {"data": self._run})
-            time.sleep(0.05)
+        self._announced = time.monotonic() + ANNOUNCED
+        self._announce(link)
+        time.sleep(0.05)
         goal = np.array(
             configuration.joint_position or np.concatenate([self.robot.rest, self.robot.hand_open])
         )
@@ -275,9 +277,15 @@ class RosRobot:
             if self._held:
                 raise MachineError("the robot holds until a new run begins")
             link = self._alive()
+            self._announce(link)
             link.publish(setting.arm.command, messages.trajectory(setting.arm.joints, arm, self._run))
             closing = (Point(hand, None, period),)
             link.publish(setting.hand.command, messages.trajectory(setting.hand.joints, closing, self._run))
+
+    def _announce(self, link: Link) -> None:
+        """Say that this run has begun; a cell that knows it, or has ended it, does nothing about that."""
+        if self.setting.begin and time.monotonic() < self._announced:
+            link.publish(self.setting.begin, {"data": self._run})
 
     def hold(self, ramp: Sequence[JointTarget], why: str) -> None:
         """See `RealEngine.hold`: the ramp as a trajectory, or one point where the arm is; then the word."""

@@ -117,6 +117,16 @@ def test_a_command_ends_at_rest_and_carries_its_run() -> None:
     assert hand["points"][0]["velocities"] == [] and len(hand["points"]) == 1
 
 
+def test_a_young_run_is_announced_with_its_commands() -> None:
+    robot = engine()
+    robot._held, robot._run, robot._announced = False, "run", time.monotonic() + 0.1
+    robot.send(JointTarget(START, np.zeros(9), 0.15))
+    assert robot.link.sent[0] == (robot.setting.begin, {"data": "run"}) and len(robot.link.sent) == 3
+    time.sleep(0.1)
+    robot.send(JointTarget(START, np.zeros(9), 0.15))
+    assert len(robot.link.sent) == 5
+
+
 def test_after_a_hold_nothing_is_sent() -> None:
     robot = engine()
     robot._held = False
