@@ -180,7 +180,7 @@ def _in_process(bench: Bench, fault: str, wait: float) -> Seen:
         except BtTasksimError as error:
             said = str(error)
         ended = time.monotonic()
-        running = [n.name for n in runner.tree.iterate() if n.status.name == "RUNNING"]
+        running = _running(runner)
         if fault not in LEAVES and not broke:
             raise RuntimeError(f"the run ended before the fault: {said}")
         if fault == "twin killed":
@@ -290,6 +290,11 @@ def _after(
     )
 
 
+def _running(runner: Any) -> list[str]:
+    """Names of the nodes that have not ended."""
+    return [node.name for node in runner.tree.iterate() if node.status.name == "RUNNING"]
+
+
 def run_child(port: int) -> None:
     """A run in a process of its own: a word when the arm moves."""
     runner, _ = sweeping(port)
@@ -303,10 +308,9 @@ def run_child(port: int) -> None:
 
     try:
         result = runner.run(0, record=moving)
-        print("result", result.status.name, result.why, flush=True)
+        print("result", result.status.name, result.why, _running(runner), flush=True)
     except KeyboardInterrupt as stop:
-        running = [n.name for n in runner.tree.iterate() if n.status.name == "RUNNING"]
-        print("stopped", type(stop).__name__, str(stop), running, flush=True)
+        print("stopped", type(stop).__name__, str(stop), _running(runner), flush=True)
     except BtTasksimError as error:
         print("error", error, flush=True)
     finally:

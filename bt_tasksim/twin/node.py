@@ -73,7 +73,8 @@ class TwinNode(Node):  # type: ignore[misc]
         self._wrench = publish(WrenchStamped, setting.wrench.topic, 10)
         self._tips = [publish(WrenchStamped, topic, 10) for topic in setting.tips.topics]
         self._objects: dict[str, Any] = {}
-        self._wire = np.argsort(setting.order)
+        here = {int(wire): own for own, wire in enumerate(setting.order)}
+        self._wire = [here.get(k, -1) for k in range(len(setting.wire))]
         self._tick = 0
         self._worlds = 0
 
@@ -132,11 +133,15 @@ class TwinNode(Node):  # type: ignore[misc]
                     self._objects[topic] = self.create_publisher(PoseStamped, topic, 10)
                 self._objects[topic].publish(_pose(pose, setting.objects.frame, stamp))
 
+    def _on_the_wire(self, values: Array) -> list[float]:
+        """Values of the robot's joints in the wire's order; other joints there stand at zero."""
+        return [float(values[k]) if k >= 0 else 0.0 for k in self._wire]
+
     def _publish_joints(self, reading: Readings, stamp: Time, now: float) -> None:
         message = JointState()
         message.header.stamp = stamp
         names = list(self.setting.wire)
-        position = reading.position[self._wire].tolist()
+        position = self._on_the_wire(reading.position)
         if self.fault == "silent":
             return
         if self.fault == "frozen":
@@ -147,8 +152,8 @@ class TwinNode(Node):  # type: ignore[misc]
         elif self.fault == "order":
             names[0], names[1] = names[1], names[0]
         message.name, message.position = names, position
-        message.velocity = reading.velocity[self._wire].tolist()
-        message.effort = reading.effort[self._wire].tolist()
+        message.velocity = self._on_the_wire(reading.velocity)
+        message.effort = self._on_the_wire(reading.effort)
         if self.fault == "delayed":
             self._delayed.append((now + DELAY, message))
             while self._delayed and self._delayed[0][0] <= now:
@@ -276,6 +281,9 @@ def main() -> int:
         run(node, server)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
+    except BtTasksimError as error:
+        print(f"twin: {error}", file=sys.stderr)
+        return 1
     finally:
         server.close()
         node.destroy_node()
