@@ -117,6 +117,8 @@ class Grasp(ConceptModel):
         standoff: How far before the grasp pose the straight approach begins.
         speed: Peak speed of the tool.
         grip: Closure that is commanded when closing; 1 presses as hard as the hand's drives may.
+        tightening: Share of the hand's speed at which a learned grasp tightens once opposing fingers have
+            contact. Below 1 force grows bit by bit: done early the grasp is gentle, done late it is firm.
         force_limit: Force at the wrist at which the task is broken off.
     """
 
@@ -126,6 +128,7 @@ class Grasp(ConceptModel):
     standoff: Metres = 0.10
     speed: MetresPerSecond = 0.5
     grip: Ratio = 1.0
+    tightening: Ratio = 1.0
     force_limit: Newtons = FORCE_LIMIT
 
     reaches = (HOLDING,)
@@ -251,9 +254,8 @@ class Grasp(ConceptModel):
         middle = grasp_features.found_middle(offset, met, memory)
         target = grasp_features.displaced(sample(memory.path, seen.elapsed - delay), offset)
         asked = poses.clip(self.grip + offset[..., CLOSE], 0.0, 1.0)
-        xp = array_namespace(memory.closing)
-        closed = grasp_features.closed(pace, asked, seen, memory)
-        return Motion(delay, offset, middle, target, xp.where(memory.closing >= 0.0, closed, memory.preshape))
+        closed = grasp_features.closed(pace, asked, self.tightening, seen, memory)
+        return Motion(delay, offset, middle, target, closed)
 
     def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:
         """Where the estimate says: the programmed grasp trusts it."""
@@ -307,10 +309,19 @@ def _commanded(motion: Motion) -> Command:
 
 def _tilt(before: Array, now: Array) -> Array:
     """Angle ``(...)`` in radians between the vertical axes of two poses ``(..., 7)`` of an object."""
+    if type(now) is np.ndarray and now.ndim == 1:
+        a, b = _vertical(before), _vertical(now)
+        return np.float64(math.acos(min(max(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], -1.0), 1.0)))
     up = poses.constant([0.0, 0.0, 1.0], now)
     cosine = poses.dot(poses.rotate(before[..., 3:], up), poses.rotate(now[..., 3:], up))
     xp = array_namespace(now)
     return xp.acos(poses.clip(cosine, -1.0, 1.0))
+
+
+def _vertical(pose: Array) -> tuple[float, float, float]:
+    """The vertical axis of a pose ``(7,)``."""
+    w, x, y, z = pose[3:].tolist()
+    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
 def _approach_begins(path: Path, standoff: float) -> Array:

@@ -184,15 +184,19 @@ def pace(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Array:
     return xp.where(seen.elapsed - memory.delay >= memory.begins, asked, 1.0)
 
 
-def closed(pace: Array, asked: Array, seen: Seen, memory: GraspMemory) -> Array:
-    """The closure ``(...)`` to command while the hand closes to what is ``asked`` for.
+def closed(pace: Array, asked: Array, tightening: float, seen: Seen, memory: GraspMemory) -> Array:
+    """The closure ``(...)`` to command: the preshape, and once the hand closes what is ``asked`` for.
 
-    At a pace below 1 the fingers come as much slower than the hand can, until opposing ones have contact.
+    At a pace below 1 the fingers come as much slower than the hand can, and from contact of opposing ones on
+    the hand tightens at ``tightening`` of its speed.
     """
+    if memory.closing.ndim == 0 and memory.closing < 0.0:
+        return memory.preshape
     xp = array_namespace(memory.closed)
-    step = pace * seen.robot.hand_speed * seen.world.control_period
-    held_back = (pace < 1.0) & ~xp.asarray(seen.opposed())
-    return xp.where(held_back, xp.minimum(asked, memory.closed + step), asked)
+    share = xp.where(xp.asarray(seen.opposed()), tightening, pace)
+    step = share * seen.robot.hand_speed * seen.world.control_period
+    reached = xp.where((pace < 1.0) & (share < 1.0), xp.minimum(asked, memory.closed + step), asked)
+    return xp.where(memory.closing >= 0.0, reached, memory.preshape)
 
 
 def displaced(reference: Array, offset: Array) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 
 from benchmarks.experiments import judged, pictures
-from benchmarks.experiments.common import Request, share
+from benchmarks.experiments.common import Request, policy_of, share
 from benchmarks.experiments.training import POLICIES, learn
 from bt_tasksim.policy import PROGRAMMED
 from bt_tasksim.training.config import TrainConfig
@@ -23,16 +23,16 @@ from trees.scenarios import grasp_fast_heavy, grasp_gentle_lift
 
 FOLLOWERS = {"gentle": grasp_gentle_lift, "fast": grasp_fast_heavy}
 STEPS, DRAWS = 300_000, 300
-OWN_GRIP = 1.0
-"""Closure of the programmed grasp, and of the grasp that the main policy was trained with."""
+LESS = 0.7
+"""A weaker grip for the programmed grasp."""
 
 
-def tree(follower: str, grip: float) -> Behaviour:
-    """A follower's tree, with a grasp that closes to ``grip``."""
+def tree(follower: str, grip: float, tightening: float) -> Behaviour:
+    """A follower's tree, with a grasp that closes to ``grip`` and tightens at a share of the hand's speed."""
     root = FOLLOWERS[follower].build()
     for leaf in root.iterate():
         if isinstance(leaf, Grasp):
-            leaf.grip = grip
+            leaf.grip, leaf.tightening = grip, tightening
     return root
 
 
@@ -45,27 +45,23 @@ def train(request: Request) -> None:
         learn(module.build, module.scene(), out, config, request.workers, name)
 
 
-def rows(request: Request) -> list[tuple[str, str, float]]:
-    """Who is asked: label, policy, and the closure that it starts from."""
-    folder = request.policies or POLICIES
-    own = [(f"learned before the {f} pick", folder / f"grasp-{f}", grasp_gentle_lift.GRIP) for f in FOLLOWERS]
-    out: list[tuple[str, str, float]] = [(a, str(p), g) for a, p, g in own if Path(p).is_dir()]
-    if request.policy:
-        out.append(("learned in grasp_then_pick", request.policy, OWN_GRIP))
-    return [
-        *out,
-        ("programmed, full grip", PROGRAMMED, OWN_GRIP),
-        ("programmed, grip 0.7", PROGRAMMED, grasp_gentle_lift.GRIP),
-    ]
+def rows(request: Request) -> list[tuple[str, str, float, float]]:
+    """Who is asked: label, policy, and the grip and tightening that it was made for."""
+    folder, slow = request.policies or POLICIES, grasp_gentle_lift.TIGHTENING
+    own = [(f"learned before the {f} pick", folder / f"grasp-{f}") for f in FOLLOWERS]
+    out = [(label, str(p), 1.0, slow) for label, p in own if p.is_dir()]
+    out.append(("learned in grasp_then_pick", str(policy_of(request, "panda")), 1.0, 1.0))
+    weaker = (f"programmed, grip {LESS:g}", PROGRAMMED, LESS, 1.0)
+    return [*out, ("programmed, full grip", PROGRAMMED, 1.0, 1.0), weaker]
 
 
 def measure(request: Request) -> dict[str, Any]:
     """The cross table."""
     cells: list[dict[str, Any]] = []
     seeds = request.seeds(DRAWS)
-    for label, policy, grip in rows(request):
+    for label, policy, grip, tightening in rows(request):
         for follower, module in FOLLOWERS.items():
-            case = judged.Case(functools.partial(tree, follower, grip), module.scene(), policy)
+            case = judged.Case(functools.partial(tree, follower, grip, tightening), module.scene(), policy)
             draws = judged.judge(case, seeds, request.workers)
             forces = [d.force for d in draws if d.done and d.force > 0.0]
             found = judged.counts(draws)

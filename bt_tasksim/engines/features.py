@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 
 import numpy as np
@@ -69,6 +70,8 @@ class _Instant:
 
     def nearest(self) -> int:
         """Index of the object nearest to the tool; -1 where there is none, or none was ever seen (NaN)."""
+        if len(self.objects) == 1:
+            return -1 if math.isnan(self.objects[0, 0]) else 0
         gap = self.objects[:, :3] - self.tool[:3]
         distance = (gap * gap).sum(-1)
         seen = ~np.isnan(distance)

@@ -20,8 +20,8 @@ MASS, FRICTION = (0.05, 0.15), (0.3, 0.9)
 LIFT, SPEED = 0.15, 0.15
 SQUEEZE = 12.0
 """N, of both fingers together: a cup of 150 g needs about 3."""
-GRIP = 0.7
-"""A policy's offset of at most 0.5 leads from here to a hand that is open as well as to one that is shut."""
+TIGHTENING = 0.2
+"""Each finger of the Panda presses 1 N more in each control period: done early is gentle, done late firm."""
 
 
 def scene(robot: str = "panda") -> Scene:
@@ -39,6 +39,6 @@ def build() -> Behaviour:
     """The tree."""
     return sequence(
         "grasp, gentle lift",
-        Train(Grasp("target", grip=GRIP, timeout=10.0)),
+        Train(Grasp("target", tightening=TIGHTENING, timeout=10.0)),
         Pick("target", distance=LIFT, speed=SPEED, squeeze=SQUEEZE),
     )
