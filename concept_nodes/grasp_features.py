@@ -54,6 +54,7 @@ def layout(robot: RobotDescription) -> dict[str, int]:
         "offsets": 5,
         "hand joints": n_hand,
         "closing speed": 1,
+        "squeeze": 1,
         "contacts": n_tips,
         "contacts so far": n_tips,
         "first contact along the approach": 1,
@@ -76,6 +77,7 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
     joints = (seen.observation.hand_position - opened) / span
     numbers = (
         (seen.closure - memory.closure) / 0.1,
+        (memory.closed - seen.closure) / 0.2,
         memory.first / 0.03,
         poses.clip(seen.elapsed - memory.delay - memory.path.duration, -1.0, 2.0),
         poses.clip(memory.delay, 0.0, 4.0),
@@ -85,8 +87,8 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
     if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
         rest = numbers
         parts = [
-            local[:3] / 0.03, turn / 0.2, behind / 0.01, memory.offset / _SCALE, joints, rest[:1],
-            seen.contacts, memory.touched, rest[1:], memory.estimate, pushed / 0.01,
+            local[:3] / 0.03, turn / 0.2, behind / 0.01, memory.offset / _SCALE, joints, rest[:2],
+            seen.contacts, memory.touched, rest[2:], memory.estimate, pushed / 0.01,
         ]  # fmt: skip
         return np.concatenate(parts)
     xp = array_namespace(seen.tool)
@@ -97,10 +99,10 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
         behind / 0.01,
         memory.offset / constant(SCALE, seen.tool),
         joints,
-        columns[0],
+        *columns[:2],
         xp.astype(seen.contacts, seen.tool.dtype),
         memory.touched,
-        *columns[1:],
+        *columns[2:],
         memory.estimate,
         pushed / 0.01,
     ]
@@ -188,7 +190,7 @@ def closed(pace: Array, asked: Array, tightening: float, seen: Seen, memory: Gra
     """The closure ``(...)`` to command: the preshape, and once the hand closes what is ``asked`` for.
 
     At a pace below 1 the fingers come as much slower than the hand can, and from contact of opposing ones on
-    the hand tightens at ``tightening`` of its speed.
+    the hand tightens at ``tightening`` of its speed: force grows bit by bit until the grasp is done.
     """
     if memory.closing.ndim == 0 and memory.closing < 0.0:
         return memory.preshape

@@ -27,12 +27,12 @@ LESS = 0.7
 """A weaker grip for the programmed grasp."""
 
 
-def tree(follower: str, grip: float, tightening: float) -> Behaviour:
-    """A follower's tree, with a grasp that closes to ``grip`` and tightens at a share of the hand's speed."""
+def tree(follower: str, grip: float) -> Behaviour:
+    """A follower's tree, with a grasp that closes to ``grip``."""
     root = FOLLOWERS[follower].build()
     for leaf in root.iterate():
         if isinstance(leaf, Grasp):
-            leaf.grip, leaf.tightening = grip, tightening
+            leaf.grip = grip
     return root
 
 
@@ -45,23 +45,26 @@ def train(request: Request) -> None:
         learn(module.build, module.scene(), out, config, request.workers, name)
 
 
-def rows(request: Request) -> list[tuple[str, str, float, float]]:
-    """Who is asked: label, policy, and the grip and tightening that it was made for."""
-    folder, slow = request.policies or POLICIES, grasp_gentle_lift.TIGHTENING
+def rows(request: Request) -> list[tuple[str, str, float]]:
+    """Who is asked: label, policy and grip."""
+    folder = request.policies or POLICIES
     own = [(f"learned before the {f} pick", folder / f"grasp-{f}") for f in FOLLOWERS]
-    out = [(label, str(p), 1.0, slow) for label, p in own if p.is_dir()]
-    out.append(("learned in grasp_then_pick", str(policy_of(request, "panda")), 1.0, 1.0))
-    weaker = (f"programmed, grip {LESS:g}", PROGRAMMED, LESS, 1.0)
-    return [*out, ("programmed, full grip", PROGRAMMED, 1.0, 1.0), weaker]
+    out = [(label, str(p), 1.0) for label, p in own if p.is_dir()]
+    out.append(("learned in grasp_then_pick", str(policy_of(request, "panda")), 1.0))
+    programmed = [
+        ("programmed, full grip", PROGRAMMED, 1.0),
+        (f"programmed, grip {LESS:g}", PROGRAMMED, LESS),
+    ]
+    return [*out, *programmed]
 
 
 def measure(request: Request) -> dict[str, Any]:
     """The cross table."""
     cells: list[dict[str, Any]] = []
     seeds = request.seeds(DRAWS)
-    for label, policy, grip, tightening in rows(request):
+    for label, policy, grip in rows(request):
         for follower, module in FOLLOWERS.items():
-            case = judged.Case(functools.partial(tree, follower, grip, tightening), module.scene(), policy)
+            case = judged.Case(functools.partial(tree, follower, grip), module.scene(), policy)
             draws = judged.judge(case, seeds, request.workers)
             forces = [d.force for d in draws if d.done and d.force > 0.0]
             found = judged.counts(draws)

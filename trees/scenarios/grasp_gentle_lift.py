@@ -20,8 +20,6 @@ MASS, FRICTION = (0.05, 0.15), (0.3, 0.9)
 LIFT, SPEED = 0.15, 0.15
 SQUEEZE = 12.0
 """N, of both fingers together: a cup of 150 g needs about 3."""
-TIGHTENING = 0.2
-"""Each finger of the Panda presses 1 N more in each control period: done early is gentle, done late firm."""
 
 
 def scene(robot: str = "panda") -> Scene:
@@ -39,6 +37,6 @@ def build() -> Behaviour:
     """The tree."""
     return sequence(
         "grasp, gentle lift",
-        Train(Grasp("target", tightening=TIGHTENING, timeout=10.0)),
+        Train(Grasp("target", timeout=10.0)),
         Pick("target", distance=LIFT, speed=SPEED, squeeze=SQUEEZE),
     )
