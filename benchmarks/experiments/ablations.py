@@ -38,7 +38,7 @@ VARIANTS = ("full", "fixed time", "shaping alone")
 SEEDS = (0, 1, 2)
 STEPS, DRAWS = 200_000, 200
 NOISES = ("original", "hard")
-HOLDS = (0.4, 0.8, 1.2, 1.6, 2.0, 2.4)
+HOLDS = (0.8, 1.2, 1.6, 2.0, 2.4, 2.8)
 """Seconds of closing from which the fixed time is chosen, on training draws."""
 HOLD_FILE = "hold.json"
 WINDOW = 600
