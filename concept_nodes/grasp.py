@@ -223,6 +223,8 @@ class Grasp(ConceptModel):
         return _commanded(motion), self._after(motion, seen, memory)
 
     def _after(self, motion: Motion, seen: Seen, memory: GraspMemory) -> GraspMemory:
+        if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+            return self._after_one(motion, seen, memory)
         delay, target = motion.delay, motion.target
         gap = poses.norm(seen.tool[..., :3] - target[..., :3])
         arrived = (seen.elapsed - delay >= memory.path.duration) & (gap < self.tolerance)
@@ -247,6 +249,37 @@ class Grasp(ConceptModel):
             settled=xp.where(good, memory.settled + 1, 0),
             touched=touched,
             first=xp.where(fresh, along, memory.first),
+        )
+
+    def _after_one(self, motion: Motion, seen: Seen, memory: GraspMemory) -> GraspMemory:
+        """`_after` for one grasp, in plain numbers: they are quicker than arrays of one."""
+        closing, closure = float(memory.closing), seen.closure
+        begun, settled = closing >= 0.0, np.int64(0)
+        if begun:
+            closing += seen.world.control_period
+            still = abs(float(closure) - float(memory.closure)) < 0.01
+            settled = memory.settled + 1 if still and seen.opposed() else settled
+        else:
+            late = float(seen.elapsed) - float(motion.delay) - float(memory.path.duration)
+            gap = poses.norm(seen.tool[:3] - motion.target[:3]) if 0.0 <= late < 1.0 else 0.0
+            closing = 0.0 if late >= 0.0 and gap < self.tolerance else closing
+        touched, first = memory.touched, memory.first
+        if True in seen.contacts.tolist():
+            if max(touched.tolist()) == 0.0:
+                first = poses.transform(poses.inverse(memory.goal), seen.tool[:3])[2]
+            touched = np.where(seen.contacts, 1.0, touched)
+        return memory._replace(
+            now=seen.object(self.target),
+            delay=motion.delay,
+            offset=motion.offset,
+            middle=motion.middle,
+            target=motion.target,
+            closed=motion.closed,
+            closing=np.float64(closing),
+            closure=closure,
+            settled=settled,
+            touched=touched,
+            first=first,
         )
 
     def _motion(self, action: Array, seen: Seen, memory: GraspMemory) -> Motion:
@@ -276,10 +309,23 @@ class Grasp(ConceptModel):
 
     def violated(self, seen: Seen, memory: GraspMemory) -> Array:
         """The hand has closed on nothing, presses too hard, or has pushed the object away or over."""
+        if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+            return np.bool_(self._violated_one(seen, memory))
         empty = (memory.closing > 0.8) & (seen.closure > 0.97 * self.grip)
         now = seen.object(self.target)
         pushed = poses.norm(now[..., :3] - memory.start[..., :3]) > PUSHED
         return empty | strained(seen, self.force_limit) | pushed | (_tilt(memory.start, now) > TIPPED)
+
+    def _violated_one(self, seen: Seen, memory: GraspMemory) -> bool:
+        """`violated` for one grasp: what is decided first ends it."""
+        if memory.closing > 0.8 and seen.closure > 0.97 * self.grip:
+            return True
+        now = seen.object(self.target)
+        return bool(
+            strained(seen, self.force_limit)
+            or poses.norm(now[:3] - memory.start[:3]) > PUSHED
+            or _tilt(memory.start, now) > TIPPED
+        )
 
     def necessary_cost(self, seen: Seen, memory: GraspMemory) -> Array:
         """How far the hand is from holding the object where it stands, from 0 on.
@@ -288,6 +334,10 @@ class Grasp(ConceptModel):
         opposing fingertips have no contact; and how far the object was pushed, over 0.05 m.
         """
         gap = seen.observation.tips - seen.observation.contact_points
+        if type(gap) is np.ndarray and gap.ndim == 2:
+            mean = sum(math.sqrt(x * x + y * y + z * z) for x, y, z in gap.tolist()) / len(gap)
+            far = float(poses.norm(seen.object(self.target)[:3] - memory.start[:3]))
+            return np.float64(mean / 0.1 + (0.0 if seen.opposed() else 0.3) + far / 0.05)
         xp = array_namespace(gap)
         distance = xp.mean(xp.sqrt(xp.sum(gap * gap, axis=-1)), axis=-1)
         pushed = poses.norm(seen.object(self.target)[..., :3] - memory.start[..., :3])

@@ -75,6 +75,21 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
     robot = seen.robot
     opened, span = constant(robot.hand_open, seen.tool), constant(_span(robot), seen.tool)
     joints = (seen.observation.hand_position - opened) / span
+    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+        late = float(seen.elapsed) - float(memory.delay) - float(memory.path.duration)
+        closure = float(seen.closure)
+        rest = [
+            min(max(late, -1.0), 2.0),
+            min(float(memory.delay), 4.0),
+            min(max(float(memory.closing), -0.1), 2.0),
+            min(int(memory.settled) / 3.0, 2.0),
+        ]
+        parts = [
+            local[:3] / 0.03, turn / 0.2, behind / 0.01, memory.offset / _SCALE, joints,
+            [(closure - float(memory.closure)) / 0.1, (float(memory.closed) - closure) / 0.2],
+            seen.contacts, memory.touched, [float(memory.first) / 0.03], rest, memory.estimate, pushed / 0.01,
+        ]  # fmt: skip
+        return np.concatenate(parts)
     numbers = (
         (seen.closure - memory.closure) / 0.1,
         (memory.closed - seen.closure) / 0.2,
@@ -84,13 +99,6 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
         poses.clip(memory.closing, -0.1, 2.0),
         poses.clip(memory.settled / 3.0, 0.0, 2.0),
     )
-    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
-        rest = numbers
-        parts = [
-            local[:3] / 0.03, turn / 0.2, behind / 0.01, memory.offset / _SCALE, joints, rest[:2],
-            seen.contacts, memory.touched, rest[2:], memory.estimate, pushed / 0.01,
-        ]  # fmt: skip
-        return np.concatenate(parts)
     xp = array_namespace(seen.tool)
     columns = [xp.astype(n, seen.tool.dtype)[..., None] for n in numbers]
     parts = [
@@ -123,12 +131,18 @@ class Met(NamedTuple):
 
 def met(action: Array, seen: Seen, memory: GraspMemory) -> Met:
     """See `Met`; nothing for an action in `HASTE`, and before the straight approach."""
+    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+        begun = float(seen.elapsed) - float(memory.delay) >= float(memory.begins)
+        if not begun or action[PACE] >= HASTE or True not in seen.contacts.tolist():
+            return _NOTHING_MET
+        if memory.closing >= 0.0:
+            return Met(np.False_, np.bool_(not seen.opposed()))
+        ahead = poses.transform(poses.inverse(memory.target), seen.tool[:3])[2]
+        return Met(ahead < -OBSTRUCTED, ahead < -OBSTRUCTED)
     xp = array_namespace(memory.delay)
     touching = xp.any(xp.astype(seen.contacts, xp.bool), axis=-1)
     begun = seen.elapsed - memory.delay >= memory.begins
     feels = begun & touching & (action[..., PACE] < HASTE)
-    if feels.ndim == 0 and not feels:
-        return Met(feels, feels)
     ahead = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])[..., 2]
     closing = memory.closing >= 0.0
     stands = feels & ~closing & (ahead < -OBSTRUCTED)
@@ -143,15 +157,10 @@ def moved_offset(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Ar
     something the hand goes back, towards `WITHDRAWS`. While it searches, the action across the fingers says
     how fast it goes aside, and what it has gone stays (`found_middle`).
     """
-    asked = poses.clip(action[..., :PACE], -1.0, 1.0)
     share = seen.world.control_period / PERIOD
     if type(action) is np.ndarray and action.ndim == 1:
-        gap = (asked * abs(asked) + memory.middle) * _SCALE - memory.offset
-        if met.stands:
-            gap[ALONG] -= WITHDRAWS
-        if met.searches:
-            gap[ACROSS] = asked[ACROSS] * RATE[ACROSS] * share
-        return memory.offset + np.minimum(np.maximum(gap, -_BACK_RATE * share), _RATE * share)
+        return _moved(action.tolist(), met, share, memory.middle.tolist(), memory.offset.tolist())
+    asked = poses.clip(action[..., :PACE], -1.0, 1.0)
     xp = array_namespace(memory.offset)
     back_rate, rate = constant(_BACK_RATE, memory.offset), constant(RATE, memory.offset)
     gap = (asked * abs(asked) + memory.middle) * constant(SCALE, memory.offset) - memory.offset
@@ -181,6 +190,11 @@ def pace(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Array:
     Then it is 1 for `HASTE`, and for the middle of an action `CAREFUL`, or 0 while a finger stands on
     something.
     """
+    if type(action) is np.ndarray and action.ndim == 1:
+        if float(seen.elapsed) - float(memory.delay) < float(memory.begins):
+            return np.float64(1.0)
+        one = (0.0 if met.stands else CAREFUL) + EAGER * float(action[PACE])
+        return np.float64(min(max(one, 0.0), 1.0))
     xp = array_namespace(memory.delay)
     asked = poses.clip(xp.where(met.stands, 0.0, CAREFUL) + EAGER * action[..., PACE], 0.0, 1.0)
     return xp.where(seen.elapsed - memory.delay >= memory.begins, asked, 1.0)
@@ -192,8 +206,14 @@ def closed(pace: Array, asked: Array, tightening: float, seen: Seen, memory: Gra
     At a pace below 1 the fingers come as much slower than the hand can, and from contact of opposing ones on
     the hand tightens at ``tightening`` of its speed: force grows bit by bit until the grasp is done.
     """
-    if memory.closing.ndim == 0 and memory.closing < 0.0:
-        return memory.preshape
+    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+        if not memory.closing >= 0.0:
+            return memory.preshape
+        own = tightening if seen.opposed() else float(pace)
+        if pace >= 1.0 or own >= 1.0:
+            return asked
+        further = float(memory.closed) + own * seen.robot.hand_speed * seen.world.control_period
+        return np.float64(min(float(asked), further))
     xp = array_namespace(memory.closed)
     share = xp.where(xp.asarray(seen.opposed()), tightening, pace)
     step = share * seen.robot.hand_speed * seen.world.control_period
@@ -217,8 +237,24 @@ def displaced(reference: Array, offset: Array) -> Array:
     return poses.multiply(reference, xp.concat([offset[..., :3], turn], axis=-1))
 
 
+def _moved(action: list[float], met: Met, share: float, middle: list[float], offset: list[float]) -> Array:
+    """`moved_offset` for one grasp, in plain numbers."""
+    out = []
+    for k, scale in enumerate(SCALE):
+        asked = min(max(action[k], -1.0), 1.0)
+        gap = (asked * abs(asked) + middle[k]) * scale - offset[k]
+        if k == ALONG and met.stands:
+            gap -= WITHDRAWS
+        elif k == ACROSS and met.searches:
+            gap = asked * RATE[k] * share
+        back = BACK_RATE if k == ALONG else RATE[k]
+        out.append(offset[k] + min(max(gap, -back * share), RATE[k] * share))
+    return np.array(out)
+
+
 _NOTHING = 1e-12
-_SCALE, _RATE = np.array(SCALE), np.array(RATE)
+_NOTHING_MET = Met(np.False_, np.False_)
+_SCALE = np.array(SCALE)
 _BACK_RATE = np.array([BACK_RATE if k == ALONG else rate for k, rate in enumerate(RATE)])
 _BACK = [WITHDRAWS if k == ALONG else 0.0 for k in range(CLOSE + 1)]
 _BESIDE = [float(k == ACROSS) for k in range(CLOSE + 1)]

@@ -84,9 +84,9 @@ def contact_points(shapes: list[Shape], now: _Instant, tips: Array) -> Array:
     if which < 0:
         return tips.copy()
     pose = now.objects[which]
-    back = poses.inverse(pose)
-    local = np.array([poses.transform(back, tip) for tip in tips])
-    return np.array([poses.transform(pose, p) for p in nearest_point(shapes[which], local)])
+    back, there = poses.inverse(pose).tolist(), pose.tolist()
+    local = np.array([poses.point(back, tip) for tip in tips.tolist()])
+    return np.array([poses.point(there, p) for p in nearest_point(shapes[which], local).tolist()])
 
 
 def motion(before: _Instant | None, now: _Instant) -> Array:
