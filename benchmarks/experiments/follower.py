@@ -22,7 +22,7 @@ from concept_nodes import Grasp
 from trees.scenarios import grasp_fast_heavy, grasp_gentle_lift
 
 FOLLOWERS = {"gentle": grasp_gentle_lift, "fast": grasp_fast_heavy}
-STEPS, DRAWS = 300_000, 300
+STEPS, DRAWS = 250_000, 300
 LESS = 0.7
 """A weaker grip for the programmed grasp."""
 
