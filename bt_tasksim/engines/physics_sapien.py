@@ -19,13 +19,19 @@ from bt_tasksim.world import Hidden, JointTarget, WorldState
 CONTACT_OFFSET = {"robot": 0.001, "object": 0.003, "fixture": 0.027}
 """Metres by body; PhysX looks for contacts of two bodies within the sum of theirs. It must exceed what a
 falling object covers in one step (2.2 m/s after 25 cm: 22 mm), or the object is stopped only inside."""
+SKIN = 5e-4
+"""Metres at which what touches the hand comes to rest before it. PhysX knows the exact distance of bodies
+that are apart; of bodies that overlap, where edge meets edge, its estimate is now and then wrong by
+millimetres for one step, and kicks what is light."""
 FALLING = (0.1, 1.5)
 """Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are `FINE` times
 shorter: a tilted object that lands spins so fast that it would be millimetres deep within one step."""
 FINE = 8
 WATCHED = 4
-"""Control periods after the hand was moved or a contact came or went, in which overlaps are looked for at
+"""Control periods after the hand closed fast or a contact came or went, in which overlaps are looked for at
 every step; at other times at the period's end."""
+FAST = 0.6
+"""Share of the hand's own speed from which it closes fast."""
 TOUCH_DISTANCE = 0.002
 """Metres of separation beyond which a contact of PhysX carries no force and counts for nothing."""
 SUPPORT_DISTANCE = 5e-4
@@ -180,7 +186,9 @@ class SapienPhysics:
             for shape in link.get_collision_shapes():
                 bits = 0 if name in tip_of else _ARM_BIT
                 shape.set_collision_groups([1, 1, bits, 0])
-                shape.set_contact_offset(CONTACT_OFFSET["robot"])
+                skin = SKIN if in_hand else 0.0
+                shape.set_contact_offset(CONTACT_OFFSET["robot"] + skin)
+                shape.set_rest_offset(skin)
                 if name in robot.pad_links:
                     shape.set_physical_material(pads)
                     shape.set_patch_radius(robot.pads.patch_radius)
@@ -208,6 +216,10 @@ class SapienPhysics:
         articulation.set_qpos(q)
         self._target = start.copy()
         self._velocity_target = np.zeros_like(start)
+        self._asked = [(value, 0.0) for value in start.tolist()]
+        span = np.abs(robot.hand_closed - robot.hand_open)
+        self._n_arm = n_arm
+        self._fast = np.where(span > 0.0, FAST * robot.hand_speed * span, np.inf).tolist()
         for joint, value in zip(self._joints, start, strict=True):
             joint.set_drive_target(float(value))
             joint.set_drive_velocity_target(0.0)
@@ -228,17 +240,15 @@ class SapienPhysics:
     def step(self, target: JointTarget) -> WorldState:
         """See `PhysicsEngine.step`."""
         self._last_dt = self._dt
-        position, velocity = target.position, target.velocity
-        changed = (position != self._target) | (velocity != self._velocity_target)
-        if changed.any():
-            p, v = position.tolist(), velocity.tolist()
-            for i in changed.nonzero()[0].tolist():
-                joint = self._joints[i]
-                joint.set_drive_target(p[i])
-                joint.set_drive_velocity_target(v[i])
-            if changed[len(self.robot.arm_joints) :].any():
+        asked = list(zip(target.position.tolist(), target.velocity.tolist(), strict=True))
+        if asked != self._asked:
+            for joint, now, before in zip(self._joints, asked, self._asked, strict=True):
+                if now != before:
+                    joint.set_drive_target(now[0])
+                    joint.set_drive_velocity_target(now[1])
+            if any(abs(v) > fast for (_, v), fast in zip(asked[self._n_arm :], self._fast, strict=True)):
                 self._watch = WATCHED
-            self._target, self._velocity_target = position, velocity
+            self._target, self._velocity_target, self._asked = target.position, target.velocity, asked
         if self._disturbed != _DISTURBANCE_OVER:
             for _ in range(self._substeps):
                 self._disturbed_step()
@@ -246,9 +256,10 @@ class SapienPhysics:
             self._fine_steps(self._substeps)
         elif self._watch > 0:
             self._watch -= 1
-            for _ in range(self._substeps):
+            for k in range(self._substeps):
+                if k > 0:
+                    self._read_depth()
                 self._system.step()
-                self._read_depth()
         else:
             step = self._system.step
             for _ in range(self._substeps):
@@ -372,7 +383,7 @@ class SapienPhysics:
                 tip_force[j] -= (x, y, z)
             if kind_b == "object":
                 hand_force[j] += math.sqrt(x * x + y * y + z * z)
-                distance[j] = min(distance[j], max(separation, 0.0))
+                distance[j] = min(distance[j], max(separation - SKIN, 0.0))
         self._tip_force = tip_force
         touched = [force > 0.0 for force in hand_force]
         if touched != self._touched or support != self._support:

@@ -81,7 +81,7 @@ def collect(env: Any, task: Task) -> Lane:
         action = network(features) + noise[k]
         rows.append(features)
         actions.append(action)
-        features, reward, terminated, truncated, info = env.step(np.clip(action, -1.0, 1.0))
+        features, reward, terminated, truncated, info = env.step(np.minimum(np.maximum(action, -1.0), 1.0))
         rewards.append(reward)
         total, length = total + reward, length + 1
         over = terminated or truncated
