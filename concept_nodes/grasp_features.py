@@ -66,6 +66,8 @@ def layout(robot: RobotDescription) -> dict[str, int]:
 
 def features(seen: Seen, memory: GraspMemory) -> Array:
     """The features ``(..., n)``, all of the order of one."""
+    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+        return _features_one(seen, memory)
     local = poses.multiply(poses.inverse(memory.goal), seen.tool)
     turn = poses.rotation_vector(local[..., 3:])[..., 2:]
     behind = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])
@@ -75,21 +77,6 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
     robot = seen.robot
     opened, span = constant(robot.hand_open, seen.tool), constant(_span(robot), seen.tool)
     joints = (seen.observation.hand_position - opened) / span
-    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
-        late = float(seen.elapsed) - float(memory.delay) - float(memory.path.duration)
-        closure = float(seen.closure)
-        rest = [
-            min(max(late, -1.0), 2.0),
-            min(float(memory.delay), 4.0),
-            min(max(float(memory.closing), -0.1), 2.0),
-            min(int(memory.settled) / 3.0, 2.0),
-        ]
-        parts = [
-            local[:3] / 0.03, turn / 0.2, behind / 0.01, memory.offset / _SCALE, joints,
-            [(closure - float(memory.closure)) / 0.1, (float(memory.closed) - closure) / 0.2],
-            seen.contacts, memory.touched, [float(memory.first) / 0.03], rest, memory.estimate, pushed / 0.01,
-        ]  # fmt: skip
-        return np.concatenate(parts)
     numbers = (
         (seen.closure - memory.closure) / 0.1,
         (memory.closed - seen.closure) / 0.2,
@@ -115,6 +102,37 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
         pushed / 0.01,
     ]
     return xp.concat(parts, axis=-1)
+
+
+def _features_one(seen: Seen, memory: GraspMemory) -> Array:
+    """`features` of one grasp, in plain numbers: they are quicker than arrays of one to five."""
+    tool, robot = seen.tool, seen.robot
+    x, y, z, w, i, j, k = poses.multiply(poses.inverse(memory.goal), tool).tolist()
+    _, _, turn = poses.rotation_vector(np.array([w, i, j, k])).tolist()
+    behind = poses.transform(poses.inverse(memory.target), tool[:3]).tolist()
+    pushed = poses.rotate(poses.quat_conjugate(memory.goal[3:]), memory.now[:3] - memory.start[:3]).tolist()
+    joints = (seen.observation.hand_position - robot.hand_open) / _span(robot)
+    closure, delay = float(seen.closure), float(memory.delay)
+    late = float(seen.elapsed) - delay - float(memory.path.duration)
+    return np.array(
+        [
+            x / 0.03, y / 0.03, z / 0.03, turn / 0.2,
+            *[v / 0.01 for v in behind],
+            *[v / scale for v, scale in zip(memory.offset.tolist(), SCALE, strict=True)],
+            *joints.tolist(),
+            (closure - float(memory.closure)) / 0.1,
+            (float(memory.closed) - closure) / 0.2,
+            *seen.contacts.tolist(),
+            *memory.touched.tolist(),
+            float(memory.first) / 0.03,
+            min(max(late, -1.0), 2.0),
+            min(delay, 4.0),
+            min(max(float(memory.closing), -0.1), 2.0),
+            min(int(memory.settled) / 3.0, 2.0),
+            *memory.estimate.tolist(),
+            *[v / 0.01 for v in pushed],
+        ]
+    )  # fmt: skip
 
 
 class Met(NamedTuple):

@@ -161,13 +161,33 @@ class SapienPhysics:
         self._keep.append(entity)
 
     def _articulation_builder(self) -> Any:
-        """The robot's builder; reading the URDF takes milliseconds, so it is read once an engine."""
+        """The robot's builder; reading the URDF takes milliseconds, so it is read once an engine.
+
+        Frames at the ends of a robot, fixed links that nothing can touch, are left out: PhysX would move them.
+        """
         if self._builder is None:
+            robot = self.robot
             loader = self._scene.create_urdf_loader()
             loader.fix_root_link = True
-            self._builder = loader.parse(str(self.robot.urdf))[0][0]
-            for link in self._builder.link_builders:
+            self._builder = loader.parse(str(robot.urdf))[0][0]
+            links = self._builder.link_builders
+            for link in links:
                 link.visual_records.clear()
+            needed = {robot.base_link, robot.wrist_link, *robot.pad_links}
+            needed |= {tip.links[0] for tip in robot.tips}
+            self._tool_frame = (robot.tool_link, robot.tool_pose)
+            while ends := [link for link in links if link.name not in needed and _is_end(link, links)]:
+                for link in ends:
+                    if link.name == self._tool_frame[0]:
+                        joint = link.joint_record
+                        frame = poses.multiply(
+                            _array(joint.pose_in_parent), poses.inverse(_array(joint.pose_in_child))
+                        )
+                        self._tool_frame = (link.parent.name, poses.multiply(frame, self._tool_frame[1]))
+                links = [link for link in links if link not in ends]
+            for index, link in enumerate(links):
+                link.index = index
+            self._builder.link_builders = links
         return self._builder
 
     def _build_robot(self, configuration: ActorConfiguration) -> None:
@@ -223,11 +243,11 @@ class SapienPhysics:
         for joint, value in zip(self._joints, start, strict=True):
             joint.set_drive_target(float(value))
             joint.set_drive_velocity_target(0.0)
-        self._tool_link = links[robot.tool_link]
+        self._tool_link, self._tool_pose = links[self._tool_frame[0]], self._tool_frame[1]
         self._wrist = [link.name for link in articulation.get_links()].index(robot.wrist_link)
         wrist = links[robot.wrist_link]
         joint = next(j for j in articulation.get_joints() if j.child_link == wrist)
-        self._tool_identity = bool(np.array_equal(robot.tool_pose, [0, 0, 0, 1, 0, 0, 0]))
+        self._tool_identity = bool(np.array_equal(self._tool_pose, [0, 0, 0, 1, 0, 0, 0]))
         frame = poses.multiply(_array(wrist.entity_pose), _array(joint.pose_in_child))
         in_joint = poses.multiply(poses.inverse(frame), self._tool())
         self._lever = in_joint[:3].tolist()
@@ -338,7 +358,7 @@ class SapienPhysics:
 
     def _tool(self) -> Array:
         tool = _array(self._tool_link.entity_pose)
-        return tool if self._tool_identity else poses.multiply(tool, self.robot.tool_pose)
+        return tool if self._tool_identity else poses.multiply(tool, self._tool_pose)
 
     def _read_contacts(self) -> None:
         n = len(self._objects)
@@ -455,6 +475,12 @@ def _list(pose: Any) -> list[float]:
 
 def _array(pose: Any) -> Array:
     return np.array(_list(pose))
+
+
+def _is_end(link: Any, links: list[Any]) -> bool:
+    """A fixed link without shapes that carries no other."""
+    carries = any(other.parent is link for other in links)
+    return link.joint_record.joint_type == "fixed" and not link.collision_records and not carries
 
 
 def _links_below(articulation: Any, root: Any) -> set[str]:
