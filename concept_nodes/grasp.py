@@ -295,6 +295,8 @@ class Grasp(ConceptModel):
 
     def _asked(self, offset: Array) -> Array:
         """The closure ``(...)`` that offsets ``(..., 5)`` ask for in the end."""
+        if type(offset) is np.ndarray and offset.ndim == 1:
+            return np.float64(min(max(self.grip + float(offset[CLOSE]), 0.0), 1.0))
         return poses.clip(self.grip + offset[..., CLOSE], 0.0, 1.0)
 
     def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:

@@ -107,10 +107,12 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
 def _features_one(seen: Seen, memory: GraspMemory) -> Array:
     """`features` of one grasp, in plain numbers: they are quicker than arrays of one to five."""
     tool, robot = seen.tool, seen.robot
-    x, y, z, w, i, j, k = poses.multiply(poses.inverse(memory.goal), tool).tolist()
-    _, _, turn = poses.rotation_vector(np.array([w, i, j, k])).tolist()
-    behind = poses.transform(poses.inverse(memory.target), tool[:3]).tolist()
-    pushed = poses.rotate(poses.quat_conjugate(memory.goal[3:]), memory.now[:3] - memory.start[:3]).tolist()
+    there, goal = tool.tolist(), memory.goal.tolist()
+    x, y, z, *turned = poses.composed(poses.inverted(goal), there)
+    turn = float(poses.rotation_vector(np.array(turned))[2])
+    behind = poses.point(poses.inverted(memory.target.tolist()), there[:3])
+    moved = (memory.now[:3] - memory.start[:3]).tolist()
+    pushed = poses.point([0.0, 0.0, 0.0, goal[3], -goal[4], -goal[5], -goal[6]], moved)
     joints = (seen.observation.hand_position - robot.hand_open) / _span(robot)
     closure, delay = float(seen.closure), float(memory.delay)
     late = float(seen.elapsed) - delay - float(memory.path.duration)

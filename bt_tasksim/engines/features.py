@@ -11,7 +11,7 @@ from bt_tasksim import poses
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.shapes import Shape, nearest_point
+from bt_tasksim.shapes import Shape
 from bt_tasksim.world import Observation, WorldState
 
 TOUCH = 0.2
@@ -83,10 +83,9 @@ def contact_points(shapes: list[Shape], now: _Instant, tips: Array) -> Array:
     which = now.nearest()
     if which < 0:
         return tips.copy()
-    pose = now.objects[which]
-    back, there = poses.inverse(pose).tolist(), pose.tolist()
-    local = np.array([poses.point(back, tip) for tip in tips.tolist()])
-    return np.array([poses.point(there, p) for p in nearest_point(shapes[which], local).tolist()])
+    there, nearest = now.objects[which].tolist(), shapes[which].surface.one
+    back = poses.inverted(there)
+    return np.array([poses.point(there, nearest(*poses.point(back, tip))) for tip in tips.tolist()])
 
 
 def motion(before: _Instant | None, now: _Instant) -> Array:

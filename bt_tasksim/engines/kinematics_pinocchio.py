@@ -74,6 +74,7 @@ class PinocchioKinematics:
         self._full_frame = self._full.getFrameId("tool", pin.FrameType.OP_FRAME)
         self._lower, self._upper, self._rest = robot.arm_lower, robot.arm_upper, robot.rest
         self._limits = (self._lower.tolist(), self._upper.tolist())
+        self._pull = _PULL * robot.posture
         self._rows = np.flatnonzero(robot.task_mask > 0.0)
         self._masked = len(self._rows) < 6
         self._weights = (robot.task_mask * ([1.0] * 3 + [_LENGTH] * 3))[self._rows]
@@ -161,7 +162,7 @@ class PinocchioKinematics:
         """Joints ``(n_arm,)`` for the tool pose, continuous with the last solution where that is possible."""
         pose = se3(tool)
         last = self._goal[: self._n]
-        pull = _PULL * self.robot.posture * (self._rest - last)
+        pull = self._pull * (self._rest - last)
         largest = _largest(pull)
         if largest > _PULL_LIMIT:
             pull *= _PULL_LIMIT / largest

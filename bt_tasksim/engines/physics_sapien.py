@@ -163,7 +163,7 @@ class SapienPhysics:
     def _articulation_builder(self) -> Any:
         """The robot's builder; reading the URDF takes milliseconds, so it is read once an engine.
 
-        Frames at the ends of a robot, fixed links that nothing can touch, are left out: PhysX would move them.
+        Frames at a robot's ends, fixed links that nothing can touch, are left out: PhysX would move them.
         """
         if self._builder is None:
             robot = self.robot
@@ -220,22 +220,17 @@ class SapienPhysics:
         self._joints = [joints[name] for name in robot.joints]
         self._index = np.array([order.index(name) for name in robot.joints])
         n_arm = len(robot.arm_joints)
-        self._stiffness = robot.drive_array("stiffness")
-        self._damping = robot.drive_array("damping")
-        self._limit = robot.drive_array("force_limit")
+        gains = [robot.drive_array(what).tolist() for what in ("stiffness", "damping", "force_limit")]
+        self._gains = gains
         for i, joint in enumerate(self._joints):
             drive = robot.arm_drive if i < n_arm else robot.hand_drive
             joint.set_friction(0.1 if i < n_arm else 0.0)
             joint.set_armature([drive.armature])
-            joint.set_drive_properties(
-                self._stiffness[i], self._damping[i], force_limit=self._limit[i], mode="force"
-            )
+            joint.set_drive_properties(gains[0][i], gains[1][i], force_limit=gains[2][i], mode="force")
         start = np.array(configuration.joint_position or np.concatenate([robot.rest, robot.hand_open]))
         q = np.zeros(len(order), np.float32)
         q[self._index] = start
         articulation.set_qpos(q)
-        self._target = start.copy()
-        self._velocity_target = np.zeros_like(start)
         self._asked = [(value, 0.0) for value in start.tolist()]
         span = np.abs(robot.hand_closed - robot.hand_open)
         self._n_arm = n_arm
@@ -243,7 +238,7 @@ class SapienPhysics:
         for joint, value in zip(self._joints, start, strict=True):
             joint.set_drive_target(float(value))
             joint.set_drive_velocity_target(0.0)
-        self._tool_link, self._tool_pose = links[self._tool_frame[0]], self._tool_frame[1]
+        self._tool_link, self._tool_pose = links[self._tool_frame[0]], self._tool_frame[1].tolist()
         self._wrist = [link.name for link in articulation.get_links()].index(robot.wrist_link)
         wrist = links[robot.wrist_link]
         joint = next(j for j in articulation.get_joints() if j.child_link == wrist)
@@ -252,8 +247,7 @@ class SapienPhysics:
         in_joint = poses.multiply(poses.inverse(frame), self._tool())
         self._lever = in_joint[:3].tolist()
         self._to_tool = [0.0, 0.0, 0.0, *(in_joint[3:] * _CONJUGATE).tolist()]
-        self._tip_links = [links[tip.links[0]] for tip in robot.tips]
-        self._tip_points = [list(tip.point) for tip in robot.tips]
+        self._tips = [(links[tip.links[0]], list(tip.point)) for tip in robot.tips]
 
     # ---- running ----------------------------------------------------------------------------------------
 
@@ -268,7 +262,7 @@ class SapienPhysics:
                     joint.set_drive_velocity_target(now[1])
             if any(abs(v) > fast for (_, v), fast in zip(asked[self._n_arm :], self._fast, strict=True)):
                 self._watch = WATCHED
-            self._target, self._velocity_target, self._asked = target.position, target.velocity, asked
+            self._asked = asked
         if self._disturbed != _DISTURBANCE_OVER:
             for _ in range(self._substeps):
                 self._disturbed_step()
@@ -309,19 +303,14 @@ class SapienPhysics:
 
     def _state(self) -> WorldState:
         articulation = self._articulation
-        q = articulation.get_qpos()[self._index].astype(np.float64)
-        v = articulation.get_qvel()[self._index].astype(np.float64)
+        q, v = articulation.get_qpos()[self._index].tolist(), articulation.get_qvel()[self._index].tolist()
         # The drives' own law; SAPIEN reports no effort of drives.
-        effort = self._stiffness * (self._target - q) + self._damping * (self._velocity_target - v)
-        np.minimum(effort, self._limit, out=effort)
-        np.maximum(effort, -self._limit, out=effort)
+        effort = [
+            max(min(k * (to - x) + d * (speed - u), limit), -limit)
+            for k, d, limit, x, u, (to, speed) in zip(*self._gains, q, v, self._asked, strict=True)
+        ]
         tool = self._tool()
-        tips = np.array(
-            [
-                poses.point(_list(link.entity_pose), point)
-                for link, point in zip(self._tip_links, self._tip_points, strict=True)
-            ]
-        )
+        tips = np.array([poses.point(_list(link.entity_pose), point) for link, point in self._tips])
         objects = np.array([_list(body.entity_pose) for body in self._objects]).reshape(-1, 7)
         moving = [[*b.linear_velocity.tolist(), *b.angular_velocity.tolist()] for b in self._objects]
         velocities = np.array(moving).reshape(-1, 6)
@@ -332,9 +321,9 @@ class SapienPhysics:
         )
         return WorldState(
             time=np.float64(self._time),
-            joint_position=q,
-            joint_velocity=v,
-            joint_effort=effort,
+            joint_position=np.array(q),
+            joint_velocity=np.array(v),
+            joint_effort=np.array(effort),
             tip_force=self._tip_force,
             wrench=self._wrench(),
             tool_pose=tool,
@@ -357,8 +346,8 @@ class SapienPhysics:
         return np.array([*poses.point(frame, [-x, -y, -z]), *poses.point(frame, moment)])
 
     def _tool(self) -> Array:
-        tool = _array(self._tool_link.entity_pose)
-        return tool if self._tool_identity else poses.multiply(tool, self._tool_pose)
+        tool = _list(self._tool_link.entity_pose)
+        return np.array(tool if self._tool_identity else poses.composed(tool, self._tool_pose))
 
     def _read_contacts(self) -> None:
         n = len(self._objects)

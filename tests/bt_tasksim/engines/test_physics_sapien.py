@@ -190,6 +190,29 @@ def test_both_fingertips_press_against_each_other():
     assert hidden.hand_distance[0] == 0.0 and not hidden.support[0].any()
 
 
+@pytest.mark.parametrize(
+    ("robot", "kind"), [("panda", "box"), ("panda", "diamond"), ("xarm7_ability", "box")]
+)
+def test_the_hands_skin_keeps_what_it_presses_from_overlapping(robot, kind):
+    runner = holding(kind, 0.2, robot=robot)
+    hidden = runner.pipeline.hidden()
+    assert hidden.hand_force[0] > 10.0 and hidden.hand_distance[0] == 0.0, "what rests on the skin touches"
+    assert hidden.penetration < 2e-4, runner.pipeline.physics.deepest_pair
+
+
+@pytest.mark.parametrize("robot", ["panda", "xarm7_ability"])
+def test_frames_that_physx_need_not_move_are_where_kinematics_says(robot):
+    from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+
+    still = Still(scene(robot=robot).sample(0))
+    kinematics, q = PinocchioKinematics(load_robot(robot)), still.state.joint_position
+    tool = kinematics.forward(q)
+    assert np.allclose(still.state.tool_pose[:3], tool[:3], atol=1e-5)
+    assert abs(still.state.tool_pose[3:] @ tool[3:]) == pytest.approx(1.0, abs=1e-6)
+    assert np.allclose(still.state.tips, kinematics.tips(q), atol=1e-5)
+    assert not any("tcp" in name or name.endswith("_tip") for name in still.physics._links)
+
+
 def test_effort_is_the_drives_own_law():
     runner = holding("box", 0.2)
     robot, state = runner.robot, runner.pipeline.state
