@@ -155,18 +155,25 @@ def text(found: Mapping[str, Any], who: str) -> str:
 
 
 def untrained(robot: str) -> Network:
-    """The middle of a learned action, careful and slow; done when the hand has held still.
+    """The middle of a learned action, careful and slow; done when the hand is still and as firm as it gets.
 
     It is as large as a policy that is learned, so that it takes as long.
     """
-    layout = Grasp.layout(load_robot(robot))
-    names = list(layout)
-    settled = sum(layout[n] for n in names[: names.index("time") + 1]) - 1
-    n = sum(layout.values())
+    description = load_robot(robot)
+    layout = Grasp.layout(description)
+    ends = dict(zip(layout, np.cumsum(list(layout.values())).tolist(), strict=True))
+    n, joints = ends[next(reversed(layout))], len(description.hand_joints)
     first, second, last = np.zeros((64, n)), np.zeros((64, 64)), np.zeros((Grasp.actions + 1, 64))
-    # Of 1, after three ticks of a still hand, tanh twice makes 0.61, and of 2/3 it makes 0.49.
-    first[0, settled], second[0, 0], last[-1, 0] = 0.9, 1.0, 1.0
-    return Network(np.zeros(n), np.ones(n), [(w, np.zeros(len(w))) for w in (first, second, last)])
+    biases = np.zeros(64), np.zeros(64), np.zeros(Grasp.actions + 1)
+    first[0, ends["time"] - 1] = 0.9  # ticks of a still hand; 1 after three
+    # The closure that is commanded: what the hand has, and how much the command is beyond it.
+    moved = np.diag(description.hand_closed - description.hand_open) + description.hand_open
+    first[1, ends["hand joints"] - joints : ends["hand joints"]] = [description.closure(q) for q in moved]
+    first[1, ends["squeeze"] - 1] = 0.2
+    first[1], biases[0][1] = 400.0 * first[1], -400.0 * 0.985
+    second[0, :2], biases[1][0] = (20.0, 10.0), -20.0 * 0.63 - 10.0  # both: 1.7, else below -1.8
+    last[-1, 0] = 1.0
+    return Network(np.zeros(n), np.ones(n), list(zip((first, second, last), biases, strict=True)))
 
 
 def measure(robot: str, noise: str, policy: str | None, seeds: range, workers: int) -> Evaluation:

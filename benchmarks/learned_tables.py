@@ -82,9 +82,7 @@ def learning(results: Results) -> str:
     found = results.get("learning") or {}
     lines = ["| measured | | bar |", "|---|---|---|"]
     for row in ROWS:
-        value = f"{found[row.key]:.{row.digits}f} {row.unit}".strip() if row.key in found else NOT_YET
-        if row.digits < 0 and row.key in found:
-            value = f"{found[row.key]:.1e}"
+        value = row.text(found[row.key]) if row.key in found else NOT_YET
         lines.append(f"| {row.label} | {value} | {row.bar} |")
     return "\n".join(lines)
 

@@ -57,6 +57,10 @@ class Row:
     digits: int = 0
     bar: str = ""
 
+    def text(self, value: float) -> str:
+        """A value with its unit."""
+        return f"{value:.1e}" if self.digits < 0 else f"{value:.{self.digits}f} {self.unit}".strip()
+
 
 ROWS = (
     Row("steps_1", "`grasp_then_pick`, control periods, 1 process", "1/s"),
@@ -266,10 +270,7 @@ def main(arguments: list[str] | None = None) -> int:
         found |= inference(2000 if quick else 20000, options.policy)
     for row in ROWS:
         if row.key in found:
-            value = (
-                f"{found[row.key]:.1e}" if row.digits < 0 else f"{found[row.key]:.{row.digits}f} {row.unit}"
-            )
-            print(f"{row.label:64}{value:>12}{f'   (bar: {row.bar})' if row.bar else ''}")
+            print(f"{row.label:64}{row.text(found[row.key]):>12}{f'   (bar: {row.bar})' if row.bar else ''}")
     if not options.only:
         write_text(options.json, json.dumps(found, indent=2) + "\n")
         print(f"wrote {options.json}")

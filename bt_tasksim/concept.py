@@ -139,6 +139,7 @@ class ConceptNode(ContextLeaf, abc.ABC):
         self._active = False
         self._lost = 0
         self._decided = None
+        self._nearer = 0.0
         self.activations += 1
 
     def tick(self) -> Iterator[Behaviour]:
@@ -210,7 +211,8 @@ class ConceptNode(ContextLeaf, abc.ABC):
     def _act(self, action: Action, seen: Seen) -> Status:
         """Carry a decision out."""
         model, memory, context = self._model, self.memory, self.context
-        if bool(action.terminate):
+        self._nearer += float(action.terminate)
+        if self._nearer >= 1.0:
             for goal in model.ends:
                 context.end(goal, model.actor)
             for goal in model.reaches:

@@ -74,6 +74,9 @@ class Seen:
     def opposed(self) -> Array:
         """Boolean ``(...)``: at least one fingertip of each opposing group touches something."""
         contacts = self.observation.contacts
+        if type(contacts) is np.ndarray and contacts.ndim == 1:
+            touching = contacts.tolist()
+            return np.bool_(all(any(touching[i] for i in group) for group in self.robot.opposition))
         out = contacts[..., self.robot.opposition[0][0]] | False
         for n, group in enumerate(self.robot.opposition):
             touched = contacts[..., group[0]]

@@ -11,6 +11,7 @@ Formulas: J. Sola, "Quaternion kinematics for the error-state Kalman filter", ar
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import array_api_compat
@@ -53,7 +54,7 @@ def _mul(a: list[float], b: list[float]) -> list[float]:
     ]
 
 
-def _rot(q: list[float], v: list[float]) -> list[float]:
+def _rot(q: list[float], v: Sequence[float]) -> list[float]:
     w, x, y, z = q
     vx, vy, vz = v
     tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
@@ -121,7 +122,20 @@ def dot(a: Array, b: Array) -> Array:
     return xp.sum(a * b, axis=-1)
 
 
-def point(pose: list[float], local: list[float]) -> list[float]:
+def composed(a: list[float], b: list[float]) -> list[float]:
+    """`multiply` of two poses in plain floats."""
+    x, y, z = _rot(a[3:], b[:3])
+    return [a[0] + x, a[1] + y, a[2] + z, *_mul(a[3:], b[3:])]
+
+
+def inverted(pose: list[float]) -> list[float]:
+    """`inverse` of a pose in plain floats."""
+    x, y, z, qw, qx, qy, qz = pose
+    r = _rot([qw, -qx, -qy, -qz], [x, y, z])
+    return [-r[0], -r[1], -r[2], qw, -qx, -qy, -qz]
+
+
+def point(pose: list[float], local: Sequence[float]) -> list[float]:
     """A point given in the frame of one pose, in its parent, all in plain floats."""
     x, y, z = _rot(pose[3:], local)
     return [pose[0] + x, pose[1] + y, pose[2] + z]
@@ -144,9 +158,7 @@ def rotate(q: Array, v: Array) -> Array:
 def multiply(a: Array, b: Array) -> Array:
     """Composition ``a * b`` of poses ``(..., 7)``: the frame ``b``, given in ``a``, in ``a``'s parent."""
     if _single(a) and _single(b):
-        al, bl = a.tolist(), b.tolist()
-        r = _rot(al[3:], bl[:3])
-        return np.array([al[0] + r[0], al[1] + r[1], al[2] + r[2], *_mul(al[3:], bl[3:])])
+        return np.array(composed(a.tolist(), b.tolist()))
     xp = array_namespace(a, b)
     position = a[..., :3] + rotate(a[..., 3:], b[..., :3])
     rotation = quat_multiply(a[..., 3:], b[..., 3:])
@@ -156,9 +168,7 @@ def multiply(a: Array, b: Array) -> Array:
 def inverse(pose: Array) -> Array:
     """Inverse of poses ``(..., 7)``."""
     if _single(pose):
-        x, y, z, qw, qx, qy, qz = pose.tolist()
-        r = _rot([qw, -qx, -qy, -qz], [x, y, z])
-        return np.array([-r[0], -r[1], -r[2], qw, -qx, -qy, -qz])
+        return np.array(inverted(pose.tolist()))
     xp = array_namespace(pose)
     q = quat_conjugate(pose[..., 3:])
     return xp.concat([-rotate(q, pose[..., :3]), q], axis=-1)

@@ -36,6 +36,9 @@ class Surface(Protocol):
     def nearest(self, point: Array) -> Array:
         """The nearest points ``(..., 3)`` to points ``(..., 3)``, in the solid's frame, metres."""
 
+    def one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """`nearest` of a single point, in plain floats."""
+
 
 @dataclass(frozen=True)
 class Ellipse:
@@ -110,7 +113,7 @@ class PrismSurface:
     def nearest(self, point: Array) -> Array:
         """See `Surface`."""
         if type(point) is np.ndarray and point.size <= 3 * _FEW:
-            return np.array([self._one(*p) for p in point.reshape(-1, 3).tolist()]).reshape(point.shape)
+            return np.array([self.one(*p) for p in point.reshape(-1, 3).tolist()]).reshape(point.shape)
         xp = array_namespace(point)
         z, h = point[..., 2], self.half_height
         outline, inside = self.footprint.nearest_batch(point[..., :2])
@@ -121,7 +124,8 @@ class PrismSurface:
         height = xp.where(to_cap, cap, xp.clip(z, -h, h))
         return xp.concat([flat, height[..., None]], axis=-1)
 
-    def _one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+    def one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """See `Surface`."""
         h = self.half_height
         fx, fy, inside = self.footprint.nearest(x, y)
         if inside and h - abs(z) < math.hypot(x - fx, y - fy):
@@ -139,7 +143,7 @@ class SuperellipsoidSurface:
     def nearest(self, point: Array) -> Array:
         """See `Surface`."""
         if type(point) is np.ndarray and point.size <= 3 * _FEW:
-            return np.array([self._one(*p) for p in point.reshape(-1, 3).tolist()]).reshape(point.shape)
+            return np.array([self.one(*p) for p in point.reshape(-1, 3).tolist()]).reshape(point.shape)
         p = np.asarray(point, float)
         size = np.array(self.half_size)
         level = np.max(np.abs(p), axis=-1, keepdims=True)
@@ -147,7 +151,8 @@ class SuperellipsoidSurface:
         scale = superellipsoid_scale(p / size, *self.exponents)
         return array_namespace(point).asarray(p * scale[..., None])
 
-    def _one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+    def one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """See `Surface`."""
         a, b, c = self.half_size
         e1, e2 = self.exponents
         u, v, w = abs(x / a), abs(y / b), abs(z / c)

@@ -54,6 +54,7 @@ def layout(robot: RobotDescription) -> dict[str, int]:
         "offsets": 5,
         "hand joints": n_hand,
         "closing speed": 1,
+        "squeeze": 1,
         "contacts": n_tips,
         "contacts so far": n_tips,
         "first contact along the approach": 1,
@@ -65,6 +66,8 @@ def layout(robot: RobotDescription) -> dict[str, int]:
 
 def features(seen: Seen, memory: GraspMemory) -> Array:
     """The features ``(..., n)``, all of the order of one."""
+    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+        return _features_one(seen, memory)
     local = poses.multiply(poses.inverse(memory.goal), seen.tool)
     turn = poses.rotation_vector(local[..., 3:])[..., 2:]
     behind = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])
@@ -76,19 +79,13 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
     joints = (seen.observation.hand_position - opened) / span
     numbers = (
         (seen.closure - memory.closure) / 0.1,
+        (memory.closed - seen.closure) / 0.2,
         memory.first / 0.03,
         poses.clip(seen.elapsed - memory.delay - memory.path.duration, -1.0, 2.0),
         poses.clip(memory.delay, 0.0, 4.0),
         poses.clip(memory.closing, -0.1, 2.0),
         poses.clip(memory.settled / 3.0, 0.0, 2.0),
     )
-    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
-        rest = numbers
-        parts = [
-            local[:3] / 0.03, turn / 0.2, behind / 0.01, memory.offset / _SCALE, joints, rest[:1],
-            seen.contacts, memory.touched, rest[1:], memory.estimate, pushed / 0.01,
-        ]  # fmt: skip
-        return np.concatenate(parts)
     xp = array_namespace(seen.tool)
     columns = [xp.astype(n, seen.tool.dtype)[..., None] for n in numbers]
     parts = [
@@ -97,14 +94,47 @@ def features(seen: Seen, memory: GraspMemory) -> Array:
         behind / 0.01,
         memory.offset / constant(SCALE, seen.tool),
         joints,
-        columns[0],
+        *columns[:2],
         xp.astype(seen.contacts, seen.tool.dtype),
         memory.touched,
-        *columns[1:],
+        *columns[2:],
         memory.estimate,
         pushed / 0.01,
     ]
     return xp.concat(parts, axis=-1)
+
+
+def _features_one(seen: Seen, memory: GraspMemory) -> Array:
+    """`features` of one grasp, in plain numbers: they are quicker than arrays of one to five."""
+    tool, robot = seen.tool, seen.robot
+    there, goal = tool.tolist(), memory.goal.tolist()
+    x, y, z, *turned = poses.composed(poses.inverted(goal), there)
+    turn = float(poses.rotation_vector(np.array(turned))[2])
+    behind = poses.point(poses.inverted(memory.target.tolist()), there[:3])
+    moved = (memory.now[:3] - memory.start[:3]).tolist()
+    pushed = poses.point([0.0, 0.0, 0.0, goal[3], -goal[4], -goal[5], -goal[6]], moved)
+    joints = (seen.observation.hand_position - robot.hand_open) / _span(robot)
+    closure, delay = float(seen.closure), float(memory.delay)
+    late = float(seen.elapsed) - delay - float(memory.path.duration)
+    return np.array(
+        [
+            x / 0.03, y / 0.03, z / 0.03, turn / 0.2,
+            *[v / 0.01 for v in behind],
+            *[v / scale for v, scale in zip(memory.offset.tolist(), SCALE, strict=True)],
+            *joints.tolist(),
+            (closure - float(memory.closure)) / 0.1,
+            (float(memory.closed) - closure) / 0.2,
+            *seen.contacts.tolist(),
+            *memory.touched.tolist(),
+            float(memory.first) / 0.03,
+            min(max(late, -1.0), 2.0),
+            min(delay, 4.0),
+            min(max(float(memory.closing), -0.1), 2.0),
+            min(int(memory.settled) / 3.0, 2.0),
+            *memory.estimate.tolist(),
+            *[v / 0.01 for v in pushed],
+        ]
+    )  # fmt: skip
 
 
 class Met(NamedTuple):
@@ -121,12 +151,18 @@ class Met(NamedTuple):
 
 def met(action: Array, seen: Seen, memory: GraspMemory) -> Met:
     """See `Met`; nothing for an action in `HASTE`, and before the straight approach."""
+    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+        begun = float(seen.elapsed) - float(memory.delay) >= float(memory.begins)
+        if not begun or action[PACE] >= HASTE or True not in seen.contacts.tolist():
+            return _NOTHING_MET
+        if memory.closing >= 0.0:
+            return Met(np.False_, np.bool_(not seen.opposed()))
+        ahead = poses.transform(poses.inverse(memory.target), seen.tool[:3])[2]
+        return Met(ahead < -OBSTRUCTED, ahead < -OBSTRUCTED)
     xp = array_namespace(memory.delay)
     touching = xp.any(xp.astype(seen.contacts, xp.bool), axis=-1)
     begun = seen.elapsed - memory.delay >= memory.begins
     feels = begun & touching & (action[..., PACE] < HASTE)
-    if feels.ndim == 0 and not feels:
-        return Met(feels, feels)
     ahead = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])[..., 2]
     closing = memory.closing >= 0.0
     stands = feels & ~closing & (ahead < -OBSTRUCTED)
@@ -141,15 +177,10 @@ def moved_offset(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Ar
     something the hand goes back, towards `WITHDRAWS`. While it searches, the action across the fingers says
     how fast it goes aside, and what it has gone stays (`found_middle`).
     """
-    asked = poses.clip(action[..., :PACE], -1.0, 1.0)
     share = seen.world.control_period / PERIOD
     if type(action) is np.ndarray and action.ndim == 1:
-        gap = (asked * abs(asked) + memory.middle) * _SCALE - memory.offset
-        if met.stands:
-            gap[ALONG] -= WITHDRAWS
-        if met.searches:
-            gap[ACROSS] = asked[ACROSS] * RATE[ACROSS] * share
-        return memory.offset + np.minimum(np.maximum(gap, -_BACK_RATE * share), _RATE * share)
+        return _moved(action.tolist(), met, share, memory.middle.tolist(), memory.offset.tolist())
+    asked = poses.clip(action[..., :PACE], -1.0, 1.0)
     xp = array_namespace(memory.offset)
     back_rate, rate = constant(_BACK_RATE, memory.offset), constant(RATE, memory.offset)
     gap = (asked * abs(asked) + memory.middle) * constant(SCALE, memory.offset) - memory.offset
@@ -179,20 +210,35 @@ def pace(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Array:
     Then it is 1 for `HASTE`, and for the middle of an action `CAREFUL`, or 0 while a finger stands on
     something.
     """
+    if type(action) is np.ndarray and action.ndim == 1:
+        if float(seen.elapsed) - float(memory.delay) < float(memory.begins):
+            return np.float64(1.0)
+        one = (0.0 if met.stands else CAREFUL) + EAGER * float(action[PACE])
+        return np.float64(min(max(one, 0.0), 1.0))
     xp = array_namespace(memory.delay)
     asked = poses.clip(xp.where(met.stands, 0.0, CAREFUL) + EAGER * action[..., PACE], 0.0, 1.0)
     return xp.where(seen.elapsed - memory.delay >= memory.begins, asked, 1.0)
 
 
-def closed(pace: Array, asked: Array, seen: Seen, memory: GraspMemory) -> Array:
-    """The closure ``(...)`` to command while the hand closes to what is ``asked`` for.
+def closed(pace: Array, asked: Array, tightening: float, seen: Seen, memory: GraspMemory) -> Array:
+    """The closure ``(...)`` to command: the preshape, and once the hand closes what is ``asked`` for.
 
-    At a pace below 1 the fingers come as much slower than the hand can, until opposing ones have contact.
+    At a pace below 1 the fingers come as much slower than the hand can, and from contact of opposing ones on
+    the hand tightens at ``tightening`` of its speed: force grows bit by bit until the grasp is done.
     """
+    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
+        if not memory.closing >= 0.0:
+            return memory.preshape
+        own = tightening if seen.opposed() else float(pace)
+        if pace >= 1.0 or own >= 1.0:
+            return asked
+        further = float(memory.closed) + own * seen.robot.hand_speed * seen.world.control_period
+        return np.float64(min(float(asked), further))
     xp = array_namespace(memory.closed)
-    step = pace * seen.robot.hand_speed * seen.world.control_period
-    held_back = (pace < 1.0) & ~xp.asarray(seen.opposed())
-    return xp.where(held_back, xp.minimum(asked, memory.closed + step), asked)
+    share = xp.where(xp.asarray(seen.opposed()), tightening, pace)
+    step = share * seen.robot.hand_speed * seen.world.control_period
+    reached = xp.where((pace < 1.0) & (share < 1.0), xp.minimum(asked, memory.closed + step), asked)
+    return xp.where(memory.closing >= 0.0, reached, memory.preshape)
 
 
 def displaced(reference: Array, offset: Array) -> Array:
@@ -211,8 +257,24 @@ def displaced(reference: Array, offset: Array) -> Array:
     return poses.multiply(reference, xp.concat([offset[..., :3], turn], axis=-1))
 
 
+def _moved(action: list[float], met: Met, share: float, middle: list[float], offset: list[float]) -> Array:
+    """`moved_offset` for one grasp, in plain numbers."""
+    out = []
+    for k, scale in enumerate(SCALE):
+        asked = min(max(action[k], -1.0), 1.0)
+        gap = (asked * abs(asked) + middle[k]) * scale - offset[k]
+        if k == ALONG and met.stands:
+            gap -= WITHDRAWS
+        elif k == ACROSS and met.searches:
+            gap = asked * RATE[k] * share
+        back = BACK_RATE if k == ALONG else RATE[k]
+        out.append(offset[k] + min(max(gap, -back * share), RATE[k] * share))
+    return np.array(out)
+
+
 _NOTHING = 1e-12
-_SCALE, _RATE = np.array(SCALE), np.array(RATE)
+_NOTHING_MET = Met(np.False_, np.False_)
+_SCALE = np.array(SCALE)
 _BACK_RATE = np.array([BACK_RATE if k == ALONG else rate for k, rate in enumerate(RATE)])
 _BACK = [WITHDRAWS if k == ALONG else 0.0 for k in range(CLOSE + 1)]
 _BESIDE = [float(k == ACROSS) for k in range(CLOSE + 1)]

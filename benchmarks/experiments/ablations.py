@@ -36,9 +36,9 @@ from trees.scenarios import grasp_then_pick
 
 VARIANTS = ("full", "fixed time", "shaping alone")
 SEEDS = (0, 1, 2)
-STEPS, DRAWS = 200_000, 300
+STEPS, DRAWS = 200_000, 200
 NOISES = ("original", "hard")
-HOLDS = (0.4, 0.8, 1.2, 1.6, 2.0, 2.4)
+HOLDS = (0.8, 1.2, 1.6, 2.0, 2.4, 2.8)
 """Seconds of closing from which the fixed time is chosen, on training draws."""
 HOLD_FILE = "hold.json"
 WINDOW = 600
@@ -86,7 +86,7 @@ def config(variant: str, seed: int, steps: int) -> TrainConfig:
         seed=seed,
         success_window=WINDOW,
         lesson_share=1.0,
-        evaluate_every=6,
+        evaluate_every=12,
         evaluation_draws=100,
         reward=Reward(sufficient=variant != "shaping alone"),
     )

@@ -14,7 +14,7 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 
 from benchmarks.experiments import judged, pictures
-from benchmarks.experiments.common import Request, share
+from benchmarks.experiments.common import Request, policy_of, share
 from benchmarks.experiments.training import POLICIES, learn
 from bt_tasksim.policy import PROGRAMMED
 from bt_tasksim.training.config import TrainConfig
@@ -22,9 +22,9 @@ from concept_nodes import Grasp
 from trees.scenarios import grasp_fast_heavy, grasp_gentle_lift
 
 FOLLOWERS = {"gentle": grasp_gentle_lift, "fast": grasp_fast_heavy}
-STEPS, DRAWS = 300_000, 300
-OWN_GRIP = 1.0
-"""Closure of the programmed grasp, and of the grasp that the main policy was trained with."""
+STEPS, DRAWS = 250_000, 300
+LESS = 0.7
+"""A weaker grip for the programmed grasp."""
 
 
 def tree(follower: str, grip: float) -> Behaviour:
@@ -46,17 +46,16 @@ def train(request: Request) -> None:
 
 
 def rows(request: Request) -> list[tuple[str, str, float]]:
-    """Who is asked: label, policy, and the closure that it starts from."""
+    """Who is asked: label, policy and grip."""
     folder = request.policies or POLICIES
-    own = [(f"learned before the {f} pick", folder / f"grasp-{f}", grasp_gentle_lift.GRIP) for f in FOLLOWERS]
-    out: list[tuple[str, str, float]] = [(a, str(p), g) for a, p, g in own if Path(p).is_dir()]
-    if request.policy:
-        out.append(("learned in grasp_then_pick", request.policy, OWN_GRIP))
-    return [
-        *out,
-        ("programmed, full grip", PROGRAMMED, OWN_GRIP),
-        ("programmed, grip 0.7", PROGRAMMED, grasp_gentle_lift.GRIP),
+    own = [(f"learned before the {f} pick", folder / f"grasp-{f}") for f in FOLLOWERS]
+    out = [(label, str(p), 1.0) for label, p in own if p.is_dir()]
+    out.append(("learned in grasp_then_pick", str(policy_of(request, "panda")), 1.0))
+    programmed = [
+        ("programmed, full grip", PROGRAMMED, 1.0),
+        (f"programmed, grip {LESS:g}", PROGRAMMED, LESS),
     ]
+    return [*out, *programmed]
 
 
 def measure(request: Request) -> dict[str, Any]:

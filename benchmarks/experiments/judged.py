@@ -99,12 +99,13 @@ def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
         env.reset(seed=seed, options={"draw": seed})
     except InputError as error:
         return Draw(seed, False, False, "never began", str(error), 0, 0.0)
-    decisions = 0
+    decisions, nearer = 0, 0.0
     while True:
         decision = env._decision
         assert decision is not None
         action = policy.act(decision.leaf.model, decision.seen, decision.memory)
-        signal = 1.0 if bool(action.terminate) else -1.0
+        nearer += float(action.terminate)
+        signal = 1.0 if nearer >= 1.0 else -1.0
         motion = np.clip(np.asarray(action.motion, float), -1.0, 1.0)
         _, _, terminated, truncated, info = env.step(np.append(motion, signal))
         decisions += 1

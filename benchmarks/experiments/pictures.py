@@ -75,9 +75,9 @@ def curves(
         axes.plot(x, y, color=colour, label=label, linewidth=1.4, marker="." if len(x) < 60 else "")
     for k, (name, level) in enumerate((lines or {}).items()):
         axes.axhline(100 * level, color="#444", linestyle=("--", ":")[k % 2], linewidth=1.0, label=name)
-    for x, text in marks:
+    for k, (x, text) in enumerate(marks):
         axes.axvline(x / 1000, color="#bbb", linewidth=0.8)
-        axes.text(x / 1000, 2, f" {text}", fontsize=7, color="#666")
+        axes.text(x / 1000, 2 + 5 * (len(marks) - 1 - k), f" {text}", fontsize=7, color="#666")
     axes.set_ylim(0, 101)
     axes.set_xlim(left=0)
     axes.set_xlabel("decisions, thousands")

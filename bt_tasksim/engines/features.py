@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 
 import numpy as np
@@ -10,7 +11,7 @@ from bt_tasksim import poses
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.shapes import Shape, nearest_point
+from bt_tasksim.shapes import Shape
 from bt_tasksim.world import Observation, WorldState
 
 TOUCH = 0.2
@@ -69,6 +70,8 @@ class _Instant:
 
     def nearest(self) -> int:
         """Index of the object nearest to the tool; -1 where there is none, or none was ever seen (NaN)."""
+        if len(self.objects) == 1:
+            return -1 if math.isnan(self.objects[0, 0]) else 0
         gap = self.objects[:, :3] - self.tool[:3]
         distance = (gap * gap).sum(-1)
         seen = ~np.isnan(distance)
@@ -80,10 +83,9 @@ def contact_points(shapes: list[Shape], now: _Instant, tips: Array) -> Array:
     which = now.nearest()
     if which < 0:
         return tips.copy()
-    pose = now.objects[which]
-    back = poses.inverse(pose)
-    local = np.array([poses.transform(back, tip) for tip in tips])
-    return np.array([poses.transform(pose, p) for p in nearest_point(shapes[which], local)])
+    there, nearest = now.objects[which].tolist(), shapes[which].surface.one
+    back = poses.inverted(there)
+    return np.array([poses.point(there, nearest(*poses.point(back, tip))) for tip in tips.tolist()])
 
 
 def motion(before: _Instant | None, now: _Instant) -> Array:

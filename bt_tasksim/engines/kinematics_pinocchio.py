@@ -81,6 +81,7 @@ class PinocchioKinematics:
         self._full_frame = self._full.getFrameId("tool", pin.FrameType.OP_FRAME)
         self._lower, self._upper, self._rest = robot.arm_lower, robot.arm_upper, robot.rest
         self._limits = (self._lower.tolist(), self._upper.tolist())
+        self._pull = _PULL * robot.posture
         self._rows = np.flatnonzero(robot.task_mask > 0.0)
         self._masked = len(self._rows) < 6
         self._weights = (robot.task_mask * ([1.0] * 3 + [_LENGTH] * 3))[self._rows]
@@ -170,7 +171,7 @@ class PinocchioKinematics:
         """Joints ``(n_arm,)`` for the tool pose, continuous with the last solution where that is possible."""
         pose = se3(tool)
         last = self._goal[: self._n]
-        pull = _PULL * self.robot.posture * (self._rest - last)
+        pull = self._pull * (self._rest - last)
         largest = _largest(pull)
         if largest > _PULL_LIMIT:
             pull *= _PULL_LIMIT / largest
@@ -261,27 +262,29 @@ class PinocchioKinematics:
         """
         model, data, frame = self._model, self._data, self._frame
         lower, upper, column = self._limits[0], self._limits[1], self._column
-        error, worst = np.empty(6), np.inf
+        worst = np.inf
         for k in range(iterations + 1):
-            pin.computeJointJacobians(model, data, q)
+            pin.forwardKinematics(model, data, q)
             miss = pin.updateFramePlacement(model, data, frame).actInv(pose)
-            error[:3], error[3:] = miss.translation, pin.log3(miss.rotation)
-            e = error[self._rows] if self._masked else error
+            e = np.concatenate((miss.translation, pin.log3(miss.rotation)))
+            if self._masked:
+                e = e[self._rows]
             worst = _largest(e)
             if (worst <= _TOLERANCE and pull is None) or k == iterations:
                 break
+            pin.computeJointJacobians(model, data)
             J = pin.getFrameJacobian(model, data, frame, _LOCAL)
             if self._masked:
                 J = J[self._rows]
             J *= column
-            e = e * self._weights
+            e *= self._weights
             damping = 0.5 * float(e @ e) + _DAMPING
             step = self._step(J, e, damping, pull)
             largest = _largest(step)
             if largest > 0.5:
                 step *= 0.5 / largest
             kept = q + step
-            if any(not low <= x <= high for low, x, high in zip(lower, kept.tolist(), upper, strict=True)):
+            if not all(map(_within, lower, kept.tolist(), upper)):
                 kept = self._saturate(q, J, e, damping, pull)
                 if pull is None and float(np.abs(kept - q).max()) < 1e-7:
                     break  # as near as the limits allow
@@ -292,10 +295,12 @@ class PinocchioKinematics:
 
     def _step(self, J: Array, e: Array, damping: float, pull: Array | None) -> Array:
         """Damped least squares with a null-space step: ``z + J^T (J J^T + damping)^-1 (e - J z)``."""
-        A = J @ J.T + damping * self._eye
+        turned = J.T
+        A = J @ turned
+        A += damping * self._eye
         if pull is None:
-            return J.T @ eigenpy.LLT(A).solve(e)
-        return pull + J.T @ eigenpy.LLT(A).solve(e - J @ pull)
+            return turned @ eigenpy.LLT(A).solve(e)
+        return pull + turned @ eigenpy.LLT(A).solve(e - J @ pull)
 
     def _saturate(self, q: Array, J: Array, e: Array, damping: float, pull: Array | None) -> Array:
         """The step's result within the limits: joints that pass one are set on it, the worst first."""
@@ -398,3 +403,7 @@ def _unreachable(robot: str, pose: Any, distance: float, angle: float, how: str 
 def _largest(values: Array) -> float:
     """Largest magnitude of a few numbers; NumPy takes longer for so few."""
     return float(max(map(abs, values.tolist())))
+
+
+def _within(low: float, x: float, high: float) -> bool:
+    return low <= x <= high

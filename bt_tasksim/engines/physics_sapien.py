@@ -19,13 +19,19 @@ from bt_tasksim.world import Hidden, JointTarget, WorldState
 CONTACT_OFFSET = {"robot": 0.001, "object": 0.003, "fixture": 0.027}
 """Metres by body; PhysX looks for contacts of two bodies within the sum of theirs. It must exceed what a
 falling object covers in one step (2.2 m/s after 25 cm: 22 mm), or the object is stopped only inside."""
+SKIN = 5e-4
+"""Metres at which what touches the hand comes to rest before it. PhysX knows the exact distance of bodies
+that are apart; of bodies that overlap, where edge meets edge, its estimate is now and then wrong by
+millimetres for one step, and kicks what is light."""
 FALLING = (0.1, 1.5)
 """Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are `FINE` times
 shorter: a tilted object that lands spins so fast that it would be millimetres deep within one step."""
 FINE = 8
 WATCHED = 4
-"""Control periods after the hand was moved or a contact came or went, in which overlaps are looked for at
+"""Control periods after the hand closed fast or a contact came or went, in which overlaps are looked for at
 every step; at other times at the period's end."""
+FAST = 0.6
+"""Share of the hand's own speed from which it closes fast."""
 TOUCH_DISTANCE = 0.002
 """Metres of separation beyond which a contact of PhysX carries no force and counts for nothing."""
 SUPPORT_DISTANCE = 5e-4
@@ -155,13 +161,33 @@ class SapienPhysics:
         self._keep.append(entity)
 
     def _articulation_builder(self) -> Any:
-        """The robot's builder; reading the URDF takes milliseconds, so it is read once an engine."""
+        """The robot's builder; reading the URDF takes milliseconds, so it is read once an engine.
+
+        Frames at a robot's ends, fixed links that nothing can touch, are left out: PhysX would move them.
+        """
         if self._builder is None:
+            robot = self.robot
             loader = self._scene.create_urdf_loader()
             loader.fix_root_link = True
-            self._builder = loader.parse(str(self.robot.urdf))[0][0]
-            for link in self._builder.link_builders:
+            self._builder = loader.parse(str(robot.urdf))[0][0]
+            links = self._builder.link_builders
+            for link in links:
                 link.visual_records.clear()
+            needed = {robot.base_link, robot.wrist_link, *robot.pad_links}
+            needed |= {tip.links[0] for tip in robot.tips}
+            self._tool_frame = (robot.tool_link, robot.tool_pose)
+            while ends := [link for link in links if link.name not in needed and _is_end(link, links)]:
+                for link in ends:
+                    if link.name == self._tool_frame[0]:
+                        joint = link.joint_record
+                        frame = poses.multiply(
+                            _array(joint.pose_in_parent), poses.inverse(_array(joint.pose_in_child))
+                        )
+                        self._tool_frame = (link.parent.name, poses.multiply(frame, self._tool_frame[1]))
+                links = [link for link in links if link not in ends]
+            for index, link in enumerate(links):
+                link.index = index
+            self._builder.link_builders = links
         return self._builder
 
     def _build_robot(self, configuration: ActorConfiguration) -> None:
@@ -180,7 +206,9 @@ class SapienPhysics:
             for shape in link.get_collision_shapes():
                 bits = 0 if name in tip_of else _ARM_BIT
                 shape.set_collision_groups([1, 1, bits, 0])
-                shape.set_contact_offset(CONTACT_OFFSET["robot"])
+                skin = SKIN if in_hand else 0.0
+                shape.set_contact_offset(CONTACT_OFFSET["robot"] + skin)
+                shape.set_rest_offset(skin)
                 if name in robot.pad_links:
                     shape.set_physical_material(pads)
                     shape.set_patch_radius(robot.pads.patch_radius)
@@ -192,53 +220,49 @@ class SapienPhysics:
         self._joints = [joints[name] for name in robot.joints]
         self._index = np.array([order.index(name) for name in robot.joints])
         n_arm = len(robot.arm_joints)
-        self._stiffness = robot.drive_array("stiffness")
-        self._damping = robot.drive_array("damping")
-        self._limit = robot.drive_array("force_limit")
+        gains = [robot.drive_array(what).tolist() for what in ("stiffness", "damping", "force_limit")]
+        self._gains = gains
         for i, joint in enumerate(self._joints):
             drive = robot.arm_drive if i < n_arm else robot.hand_drive
             joint.set_friction(0.1 if i < n_arm else 0.0)
             joint.set_armature([drive.armature])
-            joint.set_drive_properties(
-                self._stiffness[i], self._damping[i], force_limit=self._limit[i], mode="force"
-            )
+            joint.set_drive_properties(gains[0][i], gains[1][i], force_limit=gains[2][i], mode="force")
         start = np.array(configuration.joint_position or np.concatenate([robot.rest, robot.hand_open]))
         q = np.zeros(len(order), np.float32)
         q[self._index] = start
         articulation.set_qpos(q)
-        self._target = start.copy()
-        self._velocity_target = np.zeros_like(start)
+        self._asked = [(value, 0.0) for value in start.tolist()]
+        span = np.abs(robot.hand_closed - robot.hand_open)
+        self._n_arm = n_arm
+        self._fast = np.where(span > 0.0, FAST * robot.hand_speed * span, np.inf).tolist()
         for joint, value in zip(self._joints, start, strict=True):
             joint.set_drive_target(float(value))
             joint.set_drive_velocity_target(0.0)
-        self._tool_link = links[robot.tool_link]
+        self._tool_link, self._tool_pose = links[self._tool_frame[0]], self._tool_frame[1].tolist()
         self._wrist = [link.name for link in articulation.get_links()].index(robot.wrist_link)
         wrist = links[robot.wrist_link]
         joint = next(j for j in articulation.get_joints() if j.child_link == wrist)
-        self._tool_identity = bool(np.array_equal(robot.tool_pose, [0, 0, 0, 1, 0, 0, 0]))
+        self._tool_identity = bool(np.array_equal(self._tool_pose, [0, 0, 0, 1, 0, 0, 0]))
         frame = poses.multiply(_array(wrist.entity_pose), _array(joint.pose_in_child))
         in_joint = poses.multiply(poses.inverse(frame), self._tool())
         self._lever = in_joint[:3].tolist()
         self._to_tool = [0.0, 0.0, 0.0, *(in_joint[3:] * _CONJUGATE).tolist()]
-        self._tip_links = [links[tip.links[0]] for tip in robot.tips]
-        self._tip_points = [list(tip.point) for tip in robot.tips]
+        self._tips = [(links[tip.links[0]], list(tip.point)) for tip in robot.tips]
 
     # ---- running ----------------------------------------------------------------------------------------
 
     def step(self, target: JointTarget) -> WorldState:
         """See `PhysicsEngine.step`."""
         self._last_dt = self._dt
-        position, velocity = target.position, target.velocity
-        changed = (position != self._target) | (velocity != self._velocity_target)
-        if changed.any():
-            p, v = position.tolist(), velocity.tolist()
-            for i in changed.nonzero()[0].tolist():
-                joint = self._joints[i]
-                joint.set_drive_target(p[i])
-                joint.set_drive_velocity_target(v[i])
-            if changed[len(self.robot.arm_joints) :].any():
+        asked = list(zip(target.position.tolist(), target.velocity.tolist(), strict=True))
+        if asked != self._asked:
+            for joint, now, before in zip(self._joints, asked, self._asked, strict=True):
+                if now != before:
+                    joint.set_drive_target(now[0])
+                    joint.set_drive_velocity_target(now[1])
+            if any(abs(v) > fast for (_, v), fast in zip(asked[self._n_arm :], self._fast, strict=True)):
                 self._watch = WATCHED
-            self._target, self._velocity_target = position, velocity
+            self._asked = asked
         if self._disturbed != _DISTURBANCE_OVER:
             for _ in range(self._substeps):
                 self._disturbed_step()
@@ -246,9 +270,10 @@ class SapienPhysics:
             self._fine_steps(self._substeps)
         elif self._watch > 0:
             self._watch -= 1
-            for _ in range(self._substeps):
+            for k in range(self._substeps):
+                if k > 0:
+                    self._read_depth()
                 self._system.step()
-                self._read_depth()
         else:
             step = self._system.step
             for _ in range(self._substeps):
@@ -278,19 +303,14 @@ class SapienPhysics:
 
     def _state(self) -> WorldState:
         articulation = self._articulation
-        q = articulation.get_qpos()[self._index].astype(np.float64)
-        v = articulation.get_qvel()[self._index].astype(np.float64)
+        q, v = articulation.get_qpos()[self._index].tolist(), articulation.get_qvel()[self._index].tolist()
         # The drives' own law; SAPIEN reports no effort of drives.
-        effort = self._stiffness * (self._target - q) + self._damping * (self._velocity_target - v)
-        np.minimum(effort, self._limit, out=effort)
-        np.maximum(effort, -self._limit, out=effort)
+        effort = [
+            max(min(k * (to - x) + d * (speed - u), limit), -limit)
+            for k, d, limit, x, u, (to, speed) in zip(*self._gains, q, v, self._asked, strict=True)
+        ]
         tool = self._tool()
-        tips = np.array(
-            [
-                poses.point(_list(link.entity_pose), point)
-                for link, point in zip(self._tip_links, self._tip_points, strict=True)
-            ]
-        )
+        tips = np.array([poses.point(_list(link.entity_pose), point) for link, point in self._tips])
         objects = np.array([_list(body.entity_pose) for body in self._objects]).reshape(-1, 7)
         moving = [[*b.linear_velocity.tolist(), *b.angular_velocity.tolist()] for b in self._objects]
         velocities = np.array(moving).reshape(-1, 6)
@@ -301,9 +321,9 @@ class SapienPhysics:
         )
         return WorldState(
             time=np.float64(self._time),
-            joint_position=q,
-            joint_velocity=v,
-            joint_effort=effort,
+            joint_position=np.array(q),
+            joint_velocity=np.array(v),
+            joint_effort=np.array(effort),
             tip_force=self._tip_force,
             wrench=self._wrench(),
             tool_pose=tool,
@@ -326,8 +346,8 @@ class SapienPhysics:
         return np.array([*poses.point(frame, [-x, -y, -z]), *poses.point(frame, moment)])
 
     def _tool(self) -> Array:
-        tool = _array(self._tool_link.entity_pose)
-        return tool if self._tool_identity else poses.multiply(tool, self.robot.tool_pose)
+        tool = _list(self._tool_link.entity_pose)
+        return np.array(tool if self._tool_identity else poses.composed(tool, self._tool_pose))
 
     def _read_contacts(self) -> None:
         n = len(self._objects)
@@ -372,7 +392,7 @@ class SapienPhysics:
                 tip_force[j] -= (x, y, z)
             if kind_b == "object":
                 hand_force[j] += math.sqrt(x * x + y * y + z * z)
-                distance[j] = min(distance[j], max(separation, 0.0))
+                distance[j] = min(distance[j], max(separation - SKIN, 0.0))
         self._tip_force = tip_force
         touched = [force > 0.0 for force in hand_force]
         if touched != self._touched or support != self._support:
@@ -444,6 +464,12 @@ def _list(pose: Any) -> list[float]:
 
 def _array(pose: Any) -> Array:
     return np.array(_list(pose))
+
+
+def _is_end(link: Any, links: list[Any]) -> bool:
+    """A fixed link without shapes that carries no other."""
+    carries = any(other.parent is link for other in links)
+    return link.joint_record.joint_type == "fixed" and not link.collision_records and not carries
 
 
 def _links_below(articulation: Any, root: Any) -> set[str]:

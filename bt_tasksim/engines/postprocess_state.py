@@ -37,7 +37,7 @@ class StatePostProcess:
         noise = noise_model(configuration.noise) if configuration.noise else self.noise
         self._error = noise.draw(configuration.generator("estimate"), n)
         self._error[:, :3] = _along_approach(self._error[:, :3], configuration)
-        self._local: Array | None = None
+        self._local: list[list[float]] | None = None
         self._builder = ObservationBuilder(self.robot, configuration)
 
     def cameras(self, needed: bool) -> tuple[str, ...]:
@@ -49,10 +49,9 @@ class StatePostProcess:
         if state.objects is None:
             raise MachineError("no estimate from the state: this physics engine knows no objects")
         if self._local is None:  # the error is fixed to each object as it first was seen
-            self._local = _error_in_object(state.objects, self._error)
-        estimate = np.empty_like(state.objects)
-        for i in range(estimate.shape[0]):
-            estimate[i] = poses.multiply(state.objects[i], self._local[i])
+            self._local = _error_in_object(state.objects, self._error).tolist()
+        pairs = zip(state.objects.tolist(), self._local, strict=True)
+        estimate = np.array([poses.composed(truth, error) for truth, error in pairs]).reshape(-1, 7)
         return self._builder.build(state, estimate)
 
 

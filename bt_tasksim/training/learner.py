@@ -116,17 +116,9 @@ class Learner:
 
     @property
     def decisive(self) -> Network:
-        """The present policy as it decides for good.
-
-        With exploration it says "done" sooner or later where the signal's mean is a little below the
-        threshold; without, it never would. So the signal is raised by one standard deviation: it is done
-        where exploring it would be within some six decisions.
-        """
+        """The present policy as it decides for good, see `bt_tasksim.policy.done_share`."""
         network = self.network
-        *hidden, (w, b) = network.layers
-        bias = b.copy()
-        bias[-1] += self.deviation[-1]
-        return Network(network.mean, network.deviation, [*hidden, (w, bias)])
+        return Network(network.mean, network.deviation, network.layers, float(self.deviation[-1]))
 
     @property
     def deviation(self) -> Array:

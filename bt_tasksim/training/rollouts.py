@@ -20,6 +20,7 @@ import numpy as np
 from bt_tasksim.errors import BtTasksimError, InputError, MachineError
 from bt_tasksim.interrupts import held_back
 from bt_tasksim.network import Network
+from bt_tasksim.policy import split_action
 from bt_tasksim.poses import Array
 
 EnvMaker = Callable[[], Any]
@@ -80,7 +81,7 @@ def collect(env: Any, task: Task) -> Lane:
         action = network(features) + noise[k]
         rows.append(features)
         actions.append(action)
-        features, reward, terminated, truncated, info = env.step(np.clip(action, -1.0, 1.0))
+        features, reward, terminated, truncated, info = env.step(np.minimum(np.maximum(action, -1.0), 1.0))
         rewards.append(reward)
         total, length = total + reward, length + 1
         over = terminated or truncated
@@ -112,8 +113,12 @@ def judge_draw(env: Any, task: Task) -> tuple[int, bool, str]:
     stream, env.stream = env.stream, "validation"
     try:
         features, info = env.reset(seed=task.draw, options={"draw": task.draw})
+        nearer = 0.0
         while True:
-            features, _, terminated, truncated, info = env.step(np.clip(network(features), -1.0, 1.0))
+            motion, done = split_action(network(features), network.signal_deviation)
+            nearer += float(done)
+            action = np.append(motion, 1.0 if nearer >= 1.0 else -1.0)
+            features, _, terminated, truncated, info = env.step(action)
             if terminated or truncated:
                 return task.draw, bool(info["is_success"]), _kind(info)
     except InputError as error:

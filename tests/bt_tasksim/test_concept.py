@@ -7,6 +7,7 @@ from py_trees.common import Status
 from bt_tasksim.concept import LOST_TICKS, ConceptModel, Condition
 from bt_tasksim.errors import InputError
 from bt_tasksim.parameters import Metres, ObjectName
+from bt_tasksim.policy import Action
 from bt_tasksim.world import Command
 from concept_nodes import Grasp, TimePassed, catalogue
 from trees import reactive_fallback, repeat, retry, sequence
@@ -45,6 +46,26 @@ def test_each_activation_counts_from_its_own_begin(toy, act):
     stage = toy(repeat(3, leaf))
     assert stage.tick(100) == Status.SUCCESS
     assert leaf.activations == 3 and stage.context.now > 0.5
+
+
+class BitByBit:
+    """Each decision brings the task a third nearer to done."""
+
+    name = "bit by bit"
+
+    def act(self, model, seen, memory):
+        return Action(model.programmed_motion(seen, memory), np.float64(1.0 / 3.0 + 1e-12))
+
+
+def test_shares_of_done_add_up_within_an_activation_and_no_further(toy, act):
+    leaf = act("nearer", ticks=1000)
+    stage = toy(repeat(2, leaf))
+    leaf.use(BitByBit())
+    stage.tick(2)
+    assert leaf.activations == 1 and leaf.status == Status.RUNNING
+    stage.tick(2)
+    assert leaf.activations == 2 and leaf.status == Status.RUNNING, "done at the third, and begun anew"
+    assert stage.tick(2) == Status.SUCCESS
 
 
 class Careful(ConceptModel):

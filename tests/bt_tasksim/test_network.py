@@ -77,6 +77,13 @@ def test_its_arrays_make_it_again(net):
     assert (again.inputs, again.outputs) == (net.inputs, net.outputs)
 
 
+def test_the_noise_of_its_signal_is_kept():
+    net = network()
+    noisy = Network(net.mean, net.deviation, net.layers, 0.25)
+    assert Network.from_arrays(noisy.arrays()).signal_deviation == 0.25
+    assert net.signal_deviation == 0.0 and "signal_deviation" not in net.arrays()
+
+
 def without(name):
     return lambda arrays: arrays.pop(name)
 
@@ -100,6 +107,9 @@ def put(name, value):
         (put("layer0.weight", np.ones(8)), r"layer 0 has weights \(8,\)"),
         (put("layer2.bias", np.array([0, np.nan, 0])), "not finite"),
         (put("mean", np.array([0, 0, np.inf, 0, 0])), "not finite"),
+        (put("signal_deviation", np.ones(2)), "should be one number"),
+        (put("signal_deviation", np.array([-0.1])), "negative"),
+        (put("signal_deviation", np.array([np.nan])), "not finite"),
     ],
 )
 def test_wrong_arrays_are_refused(change, sentence):

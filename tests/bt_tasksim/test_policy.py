@@ -2,14 +2,26 @@
 
 import subprocess
 import sys
+from statistics import NormalDist
 
 import numpy as np
 import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
 from py_trees.common import Status
 
 from bt_tasksim.errors import InputError
 from bt_tasksim.network import Network
-from bt_tasksim.policy import Action, LearnedPolicy, ProgrammedPolicy, resolve_policy, split_action
+from bt_tasksim.policy import (
+    TERMINATE,
+    Action,
+    LearnedPolicy,
+    ProgrammedPolicy,
+    done_share,
+    resolve_policy,
+    split_action,
+)
 from bt_tasksim.report.write import write_run
 from bt_tasksim.robot import load_robot
 from bt_tasksim.runner import Runner
@@ -51,6 +63,24 @@ def test_the_programmed_policy_is_the_concepts_own():
 def test_a_learned_policy_clips_its_motion_and_its_last_output_says_done():
     motion, done = split_action(np.array([[3.0, -0.2, 0.6], [0.0, -9.0, 0.4]]))
     assert motion.tolist() == [[1.0, -0.2], [0.0, -1.0]] and done.tolist() == [True, False]
+
+
+@given(st.lists(st.floats(-0.5, 1.5), min_size=1, max_size=40), st.floats(0.02, 0.5))
+def test_decisions_come_to_done_where_noise_would_have_ended_half_of_all_episodes(signals, deviation):
+    goes_on = np.cumprod([NormalDist(s, deviation).cdf(TERMINATE) for s in signals])
+    shares = np.cumsum([float(done_share(np.float64(s), deviation)) for s in signals])
+    assert np.all((shares >= 1.0) | (goes_on > 0.499)), "it is not done later"
+    assert np.all((shares < 1.0) | (goes_on < 0.501)), "nor earlier"
+    batch = done_share(np.array(signals), deviation)
+    assert np.allclose(np.cumsum(batch), shares) and np.all((batch >= 0.0) & (batch <= 1.0 + 1e-12))
+
+
+def test_a_signal_over_its_threshold_is_done_at_once_and_without_noise_nothing_else_is():
+    for kind in (np.float32, np.float64):
+        assert float(done_share(kind(TERMINATE), 0.1)) >= 1.0 <= float(done_share(kind(3.0), 0.1))
+    assert bool(done_share(np.float64(0.51), 0.0)) and not bool(done_share(np.float64(0.5), 0.0))
+    as_torch = done_share(torch.tensor([0.2, 0.45, 0.6]), 0.1)
+    assert np.allclose(as_torch.numpy(), done_share(np.array([0.2, 0.45, 0.6]), 0.1), atol=1e-6)
 
 
 def test_a_learned_policy_decides_only_where_the_concept_asks():

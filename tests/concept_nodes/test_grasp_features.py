@@ -218,14 +218,17 @@ def test_fingers_come_as_slowly_as_the_pace_until_opposing_ones_touch(near):
     memory = memory._replace(closing=np.float64(0.1), closed=np.float64(0.2))
     step = near.robot.hand_speed * near.world.control_period
 
-    def closed(pace, asked=1.0, seen=seen):
-        return float(grasp_features.closed(np.float64(pace), np.float64(asked), seen, memory))
+    def closed(pace, asked=1.0, seen=seen, tightening=1.0):
+        found = grasp_features.closed(np.float64(pace), np.float64(asked), tightening, seen, memory)
+        return float(found)
 
     assert closed(0.25) == pytest.approx(0.2 + 0.25 * step)
     assert closed(0.25, asked=0.21) == 0.21 and closed(0.25, asked=0.1) == 0.1
     assert closed(1.0) == 1.0 and closed(0.0) == pytest.approx(0.2)
     both, _ = approaching(near, contact=len(near.robot.tips))
-    assert closed(0.25, seen=both) == 1.0
+    assert closed(0.25, seen=both) == 1.0 and closed(0.0, seen=both) == 1.0
+    assert closed(0.25, seen=both, tightening=0.1) == pytest.approx(0.2 + 0.1 * step)
+    assert closed(1.0, seen=both, tightening=0.1) == 1.0
 
 
 def test_displacements_are_in_the_tools_frame():

@@ -13,7 +13,7 @@ from bt_tasksim.scene import Goal, Scene
 from bt_tasksim.training.decorator import Train
 from concept_nodes import Grasp, Pick
 from trees.authoring import sequence
-from trees.scenarios.grasp_gentle_lift import GRIP
+from trees.scenarios.grasp_gentle_lift import TIGHTENING, TIMEOUT
 from trees.scenarios.grasp_then_pick import UNSEEN, lessons
 
 MASS, FRICTION = (0.4, 0.9), (0.1, 0.3)
@@ -36,6 +36,6 @@ def build() -> Behaviour:
     """The tree."""
     return sequence(
         "grasp, fast heavy lift",
-        Train(Grasp("target", grip=GRIP, timeout=10.0)),
+        Train(Grasp("target", tightening=TIGHTENING, timeout=TIMEOUT)),
         Pick("target", distance=LIFT, speed=SPEED),
     )

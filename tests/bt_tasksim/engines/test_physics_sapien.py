@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
-from physics_cases import assert_identical, episode, holding, runner_of
+from physics_cases import assert_identical, episode, holding, runner_of, scene
 
+from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.engines.physics_sapien import SapienPhysics
+from bt_tasksim.robot import load_robot
 from bt_tasksim.runner import Runner
 from bt_tasksim.world import Command
 from trees.load import load_source
@@ -15,6 +18,29 @@ def test_forces_on_fingertips_are_without_friction():
         runner.pipeline.step(Command())
     left, right = runner.pipeline.state.tip_force
     assert np.abs(left + right).max() < 0.1 * np.linalg.norm(left), "PhysX reports no friction here"
+
+
+@pytest.mark.parametrize(
+    ("robot", "kind"), [("panda", "box"), ("panda", "diamond"), ("xarm7_ability", "box")]
+)
+def test_the_hands_skin_keeps_what_it_presses_from_overlapping(robot, kind):
+    runner = holding(kind, 0.2, robot=robot)
+    hidden = runner.pipeline.hidden()
+    assert hidden.hand_force[0] > 10.0 and hidden.hand_distance[0] == 0.0, "what rests on the skin touches"
+    assert hidden.penetration < 2e-4, runner.pipeline.physics.deepest_pair
+
+
+@pytest.mark.parametrize("robot", ["panda", "xarm7_ability"])
+def test_frames_that_physx_need_not_move_are_where_kinematics_says(robot):
+    configuration = scene(robot=robot).sample(0)
+    physics = SapienPhysics(load_robot(robot))
+    state = physics.reset(configuration)
+    kinematics, q = PinocchioKinematics(load_robot(robot)), state.joint_position
+    tool = kinematics.forward(q)
+    assert np.allclose(state.tool_pose[:3], tool[:3], atol=1e-5)
+    assert abs(state.tool_pose[3:] @ tool[3:]) == pytest.approx(1.0, abs=1e-6)
+    assert np.allclose(state.tips, kinematics.tips(q), atol=1e-5)
+    assert not any("tcp" in name or name.endswith("_tip") for name in physics._links)
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf", "pick_and_throw"])
