@@ -277,6 +277,8 @@ class Runner:
                 self.context.advance(pipeline.step(Command()))
             except UnreachableError:
                 break
+            except SafetyStop:  # the guard brakes from the next step on
+                continue
             if record is not None:
                 record(Step(self.context.observation, Command(), self.tree.status, pipeline))
             hidden = pipeline.hidden()

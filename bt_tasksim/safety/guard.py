@@ -7,7 +7,6 @@ limit's policy says clip; after a stop it is a hold and nothing else, until a ne
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -83,7 +82,7 @@ class Guard:
     # ---- commands ---------------------------------------------------------------------------------------
 
     def command(self, target: JointTarget) -> JointTarget:
-        """The target to send.
+        """The target to send, with the velocity that was checked: the mean one of its period.
 
         Raises:
             SafetyStop: A limit would be exceeded, or the guard has stopped already.
@@ -101,12 +100,8 @@ class Guard:
         ):
             motion, tool, twist = self._gentler(motion)
         self._stop_at(self._exceeded(motion, tool, twist))
-        if np.array_equal(motion.position, position):
-            sent = replace(target, validity=self.limits.validity)
-        else:
-            sent = JointTarget(motion.position, motion.velocity, self.limits.validity)
         self._reference, self.motion, self._tool, self._twist = wanted, motion, tool, twist
-        return sent
+        return JointTarget(motion.position, motion.velocity, self.limits.validity)
 
     def _refused(self, wanted: Motion) -> Breach | None:
         """Limits that stop, and that the command itself exceeds, whatever clipping would make of it."""
@@ -203,8 +198,8 @@ class Guard:
     def _frozen(self, reading: JointReading, now: float) -> Breach | None:
         """Joint states arrive and do not change, while commands do."""
         commanded, n = self.motion.position, self._n
-        before = self._reading
-        if self._changed is None or before is None or not np.array_equal(before.position, reading.position):
+        before, arm = self._reading, reading.position[:n]
+        if self._changed is None or before is None or not np.array_equal(before.position[:n], arm):
             self._changed = (now, commanded)
             return None
         since, then = self._changed

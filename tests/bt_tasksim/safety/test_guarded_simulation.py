@@ -54,3 +54,15 @@ def test_a_limit_ends_the_tree_in_order_and_the_arm_holds(limits, reason, senten
     assert sentence in (files.folder / "result.json").read_text()
     runner.begin(7)
     assert guard.stopped is None, "a new run begins anew"
+
+
+def test_a_stop_while_things_come_to_rest_does_not_escape_the_run():
+    runner, guard = runner_of()
+
+    def narrow(step):
+        if step.tree_status.name != "RUNNING":
+            guard.limits = dataclasses.replace(guard.limits, force=1e-6)
+
+    result = runner.run(7, record=narrow)
+    assert guard.stopped.limit == "wrench", "it was stopped after its end"
+    assert result.success, "what the tree had done is judged all the same"
