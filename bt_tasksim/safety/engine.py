@@ -27,12 +27,14 @@ class JointReading:
         position: ``(n,)`` rad or m.
         velocity: ``(n,)`` rad/s or m/s.
         stamp: When they were measured, seconds of this machine's `time.monotonic`; `RobotClock` converts.
+        effort: ``(n,)`` Nm or N, NaN where the robot does not say; None where it never does.
     """
 
     names: tuple[str, ...]
     position: Array
     velocity: Array
     stamp: float
+    effort: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ class RealEngine(Protocol):
 
     emergency: EmergencyStop
 
-    def reset(self, configuration: ActorConfiguration) -> WorldState:
+    def reset(self, configuration: ActorConfiguration) -> None:
         """Begin a run: connect, end a hold, bring the arm to where an episode starts, wait until it is still.
 
         The guard does not see this motion: `bt_tasksim.safety.motion.approach` makes one within limits.
@@ -144,8 +146,12 @@ class RealEngine(Protocol):
             MachineError: There are none, or the connection is lost.
         """
 
-    def state(self) -> WorldState:
-        """The state of this instant, made of the newest messages of every kind."""
+    def state(self, reading: JointReading) -> WorldState:
+        """The state of this instant: these joint states, which were checked, and the newest of all else.
+
+        Raises:
+            MachineError: Something has not been heard of for too long, or the connection is lost.
+        """
 
     def hold(self, ramp: Sequence[JointTarget], why: str) -> None:
         """Stop, and carry out nothing more until `reset`; on any thread, and more than once.

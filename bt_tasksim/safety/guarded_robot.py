@@ -64,14 +64,11 @@ class GuardedRobot:
             raise
 
     def _begin(self, configuration: ActorConfiguration) -> WorldState:
-        state = self.engine.reset(configuration)
-        reading = self.engine.latest()
-        self.guard.begin(reading.position, 1.0 / configuration.control_frequency)
+        self.engine.reset(configuration)
+        self.guard.begin(self.engine.latest().position, 1.0 / configuration.control_frequency)
         if why := self.engine.emergency.why:  # meanwhile, and `begin` has forgotten the stop
             raise self.guard.stop("emergency_stop", f"emergency stop: {why}")
-        self.guard.reading(reading, time.monotonic())
-        self.guard.wrench(state.wrench)
-        self._stamp = reading.stamp
+        state = self._read()
         self._sent = 0.0
         self.clock.start(1.0 / configuration.control_frequency)
         return state
@@ -175,7 +172,7 @@ class GuardedRobot:
         reading = self.engine.latest()
         self.guard.reading(reading, time.monotonic())
         self._stamp = reading.stamp
-        state = self.engine.state()
+        state = self.engine.state(reading)
         self.guard.wrench(state.wrench)
         return state
 

@@ -24,6 +24,7 @@ from bt_tasksim.engines.ros.setting import RosSetting
 from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
+from bt_tasksim.safety import checks
 from bt_tasksim.safety.engine import ChannelSpec, EmergencyStop, JointReading, RobotClock
 from bt_tasksim.safety.motion import approach
 from bt_tasksim.world import JointTarget, WorldState
@@ -53,14 +54,6 @@ class Newest:
 
     value: Array
     stamp: float
-
-
-@dataclass(frozen=True, slots=True)
-class Joints:
-    """The newest joint states, and the effort ``(n,)`` in their own order."""
-
-    reading: JointReading
-    effort: Array
 
 
 class RosRobot:
@@ -103,13 +96,12 @@ class RosRobot:
 
     def _forget(self) -> None:
         """Only what arrives from now on counts."""
-        self._joints: Joints | None = None
-        self._before: JointReading | None = None
+        self._joints: JointReading | None = None
         self._newest: dict[str, Newest] = {}
 
     # ---- a run begins -----------------------------------------------------------------------------------
 
-    def reset(self, configuration: ActorConfiguration) -> WorldState:
+    def reset(self, configuration: ActorConfiguration) -> None:
         """See `RealEngine.reset`: connect where need be, end a hold, bring the arm to its start.
 
         Raises:
@@ -122,6 +114,8 @@ class RosRobot:
         self._expect_messages()
         if self._pressed:
             raise MachineError(f"the emergency stop is pressed ({self.setting.emergency_stop}); release it")
+        if self.emergency.why:  # tapped while it was connected, and what told of it was forgotten since
+            raise MachineError(f"the emergency stop was pressed: {self.emergency.why}")
         self._announced = time.monotonic() + ANNOUNCED
         self._announce(link)
         time.sleep(0.05)
@@ -130,7 +124,6 @@ class RosRobot:
         )
         self._approach(goal)
         self._began = time.monotonic()
-        return self.state()
 
     def _connected(self, configuration: ActorConfiguration) -> Link:
         """The connection, with the topics of this world's objects."""
@@ -206,6 +199,7 @@ class RosRobot:
         period, n = 0.05, len(self.robot.arm_joints)
         following = time.monotonic()
         for motion in approach(start, goal, speed, acceleration, period):
+            following = max(following, time.monotonic())  # what was late is not made up for
             self._send(JointTarget(motion.position, motion.velocity, self.limits.validity), period)
             following += period
             time.sleep(max(following - time.monotonic(), 0.0))
@@ -235,7 +229,11 @@ class RosRobot:
         return share * speed, share * acceleration
 
     def _checked(self) -> JointReading:
-        """The newest joint states, of the names and the age that a motion needs."""
+        """The newest joint states, of the names and the age that a motion needs, while nothing pushes.
+
+        Raises:
+            MachineError: The arm was stopped, its states are no good, or the wrench is too large.
+        """
         if self._held:
             raise MachineError(self.emergency.why or "the robot was told to hold")
         reading = self.latest()
@@ -246,6 +244,8 @@ class RosRobot:
         age = time.monotonic() - reading.stamp
         if age > STALE:
             raise MachineError(f"{self.setting.joint_states} is silent for {1000 * age:.0f} ms")
+        if breach := checks.wrench(self._wrench(), self.limits.force, self.limits.torque):
+            raise MachineError(breach.sentence)
         return reading
 
     def _astray(self, joint: int, off: float, what: str) -> MachineError:
@@ -297,8 +297,8 @@ class RosRobot:
                 Point(t.position[:n], t.velocity[:n], (i + 1) * self._period) for i, t in enumerate(ramp)
             ]
             joints = self._joints
-            if not points and joints is not None and joints.reading.names == self.robot.joints:
-                here = joints.reading.position[:n]
+            if not points and joints is not None and joints.names == self.robot.joints:
+                here = joints.position[:n]
                 if np.all(np.isfinite(here)):
                     points = [Point(here, np.zeros(n), self._period)]
             if points:
@@ -328,42 +328,45 @@ class RosRobot:
         self._alive()
         if self._joints is None:
             raise MachineError(f"no joint states have come on {self.setting.joint_states}")
-        return self._joints.reading
+        return self._joints
 
-    def state(self) -> WorldState:
+    def state(self, reading: JointReading) -> WorldState:
         """See `RealEngine.state`.
 
         Raises:
             MachineError: Forces or objects have not been heard of for too long.
         """
         self._alive()
-        setting, joints = self.setting, self._joints
-        if joints is None:
-            raise MachineError(f"no joint states have come on {setting.joint_states}")
-        now = time.monotonic()
-        position = np.array(joints.reading.position)
-        wrench = self._fresh(setting.wrench.topic, now, STALE)
+        setting, now, wrench = self.setting, time.monotonic(), self._wrench()
+        position, effort = np.array(reading.position), np.zeros_like(reading.position)
+        if reading.effort is not None:
+            effort = np.nan_to_num(reading.effort)
         objects = [self._fresh(setting.object_topic(name), now, UNSEEN) for name in self._objects]
         return WorldState(
             time=np.float64(now - self._began),
             joint_position=position,
-            joint_velocity=np.array(joints.reading.velocity),
-            joint_effort=np.nan_to_num(joints.effort),
-            tip_force=self._tip_force(joints, now),
-            wrench=messages.in_tool_frame(wrench, setting.wrench.pose),
+            joint_velocity=np.array(reading.velocity),
+            joint_effort=effort,
+            wrench=wrench,
+            tip_force=self._tip_force(effort, now),
             tool_pose=self.kinematics.forward(position),
             tips=self.kinematics.tips(position),
             objects=np.array(objects).reshape(len(objects), 7) if self.tracked else None,
         )
 
-    def _tip_force(self, joints: Joints, now: float) -> Array:
+    def _wrench(self) -> Array:
+        """The external wrench ``(6,)`` at the tool, tool frame."""
+        sensor = self.setting.wrench
+        return messages.in_tool_frame(self._fresh(sensor.topic, time.monotonic(), STALE), sensor.pose)
+
+    def _tip_force(self, effort: Array, now: float) -> Array:
         """Forces ``(n_tips, 3)``: as felt, or of the drives' size where there are no sensors."""
         tips = self.setting.tips
         if tips.topics:
             return np.array([self._fresh(topic, now, STALE)[:3] for topic in tips.topics])
         n = len(self.robot.tips)
-        effort = np.abs(np.nan_to_num(joints.effort[len(self.robot.arm_joints) :]))
-        felt = effort if len(effort) == n else np.full(n, effort.max())
+        felt = np.abs(effort[len(self.robot.arm_joints) :])
+        felt = felt if len(felt) == n else np.full(n, felt.max())
         out = np.zeros((n, 3))
         out[:, 2] = np.where(felt >= tips.effort, felt, 0.0)
         return out
@@ -394,15 +397,13 @@ class RosRobot:
             order = np.arange(len(came.names))
             names = tuple(self._names.get(name, name) for name in came.names)
         position, velocity = came.position[order], came.velocity[order]
-        before = self._before
+        before = self._joints
         if before is not None and before.names == names and np.all(np.isnan(velocity)):
             elapsed = stamp - before.stamp
             velocity = (position - before.position) / elapsed if elapsed > 1e-4 else before.velocity
         elif np.all(np.isnan(velocity)):
             velocity = np.zeros_like(position)
-        reading = JointReading(names, position, velocity, stamp)
-        self._before = reading
-        self._joints = Joints(reading, came.effort[order])
+        self._joints = JointReading(names, position, velocity, stamp, came.effort[order])
 
     def _on_emergency(self, message: Any, arrived: float) -> None:
         pressed = messages.flag(message)

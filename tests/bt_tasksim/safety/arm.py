@@ -89,7 +89,7 @@ class ArmEngine:
         self._lost = ""
         self._run = ""
 
-    def reset(self, configuration: Any) -> WorldState:
+    def reset(self, configuration: Any) -> None:
         self.close()
         self._lost, self._reading, self._run = "", None, uuid.uuid4().hex
         self._period = 1.0 / configuration.control_frequency
@@ -106,7 +106,6 @@ class ArmEngine:
         while self._reading is None and time.monotonic() < end:
             time.sleep(0.005)
         self.latest()
-        return self.state()
 
     def send(self, target: Any) -> None:
         self._write({"run": self._run, "to": target.position.tolist(), "valid": target.validity})
@@ -116,8 +115,7 @@ class ArmEngine:
             raise MachineError(self._lost or "no joint states have come")
         return self._reading
 
-    def state(self) -> WorldState:
-        reading = self.latest()
+    def state(self, reading: JointReading) -> WorldState:
         joints = np.array(reading.position)
         return WorldState(
             time=np.float64(time.monotonic() - self._began),

@@ -97,9 +97,8 @@ def test_an_emergency_stop_while_a_run_begins_counts(arm):
     reset = engine.reset
 
     def pressed(configuration):
-        state = reset(configuration)
+        reset(configuration)
         engine.emergency.press("too early")
-        return state
 
     engine.reset = pressed
     with pytest.raises(SafetyStop, match="emergency stop: too early"):
@@ -116,8 +115,8 @@ def test_an_arm_that_pushes_against_something_stops_where_it_is(arm, wrench, ram
     engine = runner.pipeline.physics.engine
     state = engine.state
 
-    def pushed():
-        now = state()
+    def pushed(reading):
+        now = state(reading)
         return replace(now, wrench=np.full(6, wrench)) if now.time > 0.3 else now
 
     engine.state = pushed
@@ -136,4 +135,22 @@ def test_a_run_that_ends_well_holds_and_says_how_well_it_kept_time(arm):
     assert told["latched"] == "the run is over" and told["refused"] == 0
     assert result.timing.ticks == result.control_steps == told["commands"]
     assert result.timing.latency_median is not None and result.timing.latency_median < 0.1
+    runner.pipeline.close()
+
+
+def test_a_tree_gets_the_joint_states_that_were_checked(arm):
+    runner, leaf = runner_of(arm.port)
+    physics = runner.pipeline.physics
+    leaf.lasts, checked, given = 0.5, [], []
+    look = physics.guard.reading
+
+    def check(reading, now):
+        look(reading, now)
+        checked.append(reading.position[:7].tolist())
+        physics.engine._reading = replace(reading, position=reading.position + 1e-3)  # the next one is here
+
+    physics.guard.reading = check
+    result = runner.run(0, record=lambda step: given.append(step.observation.arm_position.tolist()))
+    assert result.success, result.why
+    assert len(given) > 5 and all(position in checked for position in given)
     runner.pipeline.close()

@@ -262,7 +262,8 @@ def test_pictures_of_a_camera_in_the_cell(bench: Bench, caplog: Any) -> None:
     pipeline = build_pipeline(robot, options)
     try:
         engine, cameras = pipeline.physics.engine, pipeline.rendering
-        state = engine.reset(bench.configuration)
+        engine.reset(bench.configuration)
+        state = engine.state(engine.latest())
         assert state.objects is None  # nothing is tracked where there are pictures
         cameras.reset(bench.configuration)
         image = cameras.render(state, "scene", depth=True)

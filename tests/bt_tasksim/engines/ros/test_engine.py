@@ -19,6 +19,7 @@ from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.resources import asset
 from bt_tasksim.robot import load_robot
 from bt_tasksim.safety.engine import RealEngine
+from bt_tasksim.scene import Scene
 from bt_tasksim.world import JointTarget
 
 ROBOT = load_robot("panda")
@@ -147,26 +148,99 @@ def test_a_lost_connection_is_said_by_everything() -> None:
     robot = engine()
     feel(robot)
     robot._held = False
+    reading, target = robot.latest(), JointTarget(START, np.zeros(9))
     robot.link.lost = "the connection is lost"
-    target = JointTarget(START, np.zeros(9))
-    for act in (robot.latest, robot.state, lambda: robot.send(target), lambda: robot.hold((), "")):
+    for act in (
+        robot.latest,
+        lambda: robot.state(reading),
+        lambda: robot.send(target),
+        lambda: robot.hold((), ""),
+    ):
         with pytest.raises(MachineError, match="the connection is lost"):
             act()
+
+
+class Echo(Link):
+    """A link behind which the arm is at once where it is told to be."""
+
+    def __init__(self, robot: Any) -> None:
+        super().__init__()
+        self.robot, self.times = robot, []
+
+    def publish(self, topic: str, message: dict[str, Any]) -> None:
+        super().publish(topic, message)
+        if topic == self.robot.setting.arm.command:
+            self.times.append(time.monotonic())
+            now = time.monotonic()
+            position = [*message["points"][0]["positions"], *START[7:]]
+            self.robot._on_joints(states(self.robot.setting.wire, position, now), now)
+
+
+def approaching(monkeypatch: Any) -> RosRobot:
+    """A robot on its way to where a run begins; what it feels is always fresh."""
+    robot = engine()
+    robot.link, robot._held = Echo(robot), False
+    feel(robot)
+    monkeypatch.setattr(robot, "_fresh", lambda topic, now, oldest: robot._newest[topic].value)
+    return robot
+
+
+def test_the_way_to_the_start_does_not_make_up_for_lost_time(monkeypatch: Any) -> None:
+    robot = approaching(monkeypatch)
+    checked, calls = robot._checked, []
+
+    def stalls() -> Any:
+        calls.append(True)
+        if len(calls) == 4:
+            time.sleep(0.2)
+        return checked()
+
+    monkeypatch.setattr(robot, "_checked", stalls)
+    goal = START.copy()
+    goal[0] += 0.05
+    robot._approach(goal)
+    assert len(robot.link.times) > 6
+    assert np.min(np.diff(robot.link.times)) > 0.03  # of a period of 0.05 s
+
+
+def test_the_way_to_the_start_ends_where_something_pushes(monkeypatch: Any) -> None:
+    robot = approaching(monkeypatch)
+    goal = START.copy()
+    goal[0] += 0.05
+    robot._newest[robot.setting.wrench.topic].value[:3] = (0.0, 0.0, 1000.0)
+    with pytest.raises(MachineError, match="force on the tool 1e.03 N"):
+        robot._approach(goal)
+    assert not robot.link.times
+
+
+def test_an_emergency_stop_tapped_while_a_run_begins(monkeypatch: Any) -> None:
+    robot = engine()
+
+    def connected(configuration: Any) -> Any:
+        robot._on_emergency({"data": True}, 0.0)
+        robot._on_emergency({"data": False}, 0.0)
+        return robot.link
+
+    monkeypatch.setattr(robot, "_connected", connected)
+    monkeypatch.setattr(robot, "_expect_messages", lambda: None)
+    with pytest.raises(MachineError, match="the emergency stop was pressed: /emergency_stop"):
+        robot.reset(Scene("panda", objects={"cup": "on table"}).sample(0))
+    assert not robot.link.sent
 
 
 def test_old_forces_and_unseen_objects_are_errors() -> None:
     robot = engine()
     feel(robot)
-    state = robot.state()
+    state = robot.state(robot.latest())
     assert state.wrench.tolist() == [0, 1, 2, 3, 4, 5] and state.tip_force.tolist() == [[0, 1, 2]] * 2
     assert np.allclose(state.tool_pose, KINEMATICS.forward(START)) and state.objects.shape == (0, 7)
     robot._objects = ("cup",)
     with pytest.raises(MachineError, match="nothing has come on /objects/cup/pose"):
-        robot.state()
+        robot.state(robot.latest())
     robot._objects = ()
     time.sleep(STALE + 0.02)
     with pytest.raises(MachineError, match="stale: nothing usable on /wrist/wrench"):
-        robot.state()
+        robot.state(robot.latest())
 
 
 def test_contact_from_the_drives_effort(tmp_path: Path) -> None:
@@ -175,7 +249,7 @@ def test_contact_from_the_drives_effort(tmp_path: Path) -> None:
     now = time.monotonic()
     effort = [0.0] * 7 + [-8.0, 3.0]
     robot._on_joints(states(robot.setting.wire, START, now, effort=effort), now)
-    assert robot.state().tip_force.tolist() == [[0, 0, 8], [0, 0, 0]]
+    assert robot.state(robot.latest()).tip_force.tolist() == [[0, 0, 8], [0, 0, 0]]
 
 
 def test_the_emergency_stop_is_pressed_once_and_held_down() -> None:
