@@ -5,6 +5,7 @@ Time is the cell's own: seconds of its steps. Commands and readings take their s
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -49,22 +50,34 @@ class Cell:
         refused: Count of refused commands.
         accepted: Count of the others.
 
+        left_out: Seconds of real time by which physics has lagged and not caught up.
+
     Args:
         robot: The robot.
         gap: By how much the cell differs.
         configuration: The world.
         seed: Of factors and noise.
+        announced: Runs are announced, by name, and the cell takes nothing else; else it takes whatever comes.
+        now: Real time in seconds, of which notes of faults are taken.
     """
 
     def __init__(
-        self, robot: RobotDescription, gap: Gap, configuration: ActorConfiguration, seed: int = 0
+        self,
+        robot: RobotDescription,
+        gap: Gap,
+        configuration: ActorConfiguration,
+        seed: int = 0,
+        *,
+        announced: bool = True,
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
         self.robot, self.gap = robot, gap
+        self.announced, self._now = announced, now
         self.period = 1.0 / gap.rates["control_rate"]
         self.load(configuration, seed)
 
     def load(self, configuration: ActorConfiguration, seed: int = 0) -> None:
-        """Make the world anew: the arm stands at its start, and no run has begun."""
+        """Make the world anew: the arm stands at its start, and no announced run has begun."""
         self._rng = np.random.default_rng([seed, configuration.seed, 20_26])
         self.configuration = configuration
         robot, world = self.gap.world(self.robot, configuration, self._rng)
@@ -82,9 +95,11 @@ class Cell:
         self._arm, self._hand = self._controllers(start)
         self._pending: deque[tuple[float, Callable[[], None]]] = deque()
         self._leaving: deque[tuple[float, Readings]] = deque()
-        self._run, self.stopped, self.pressed = "", NEVER, False
+        self._run, self.pressed = "", False
+        self.stopped = NEVER if self.announced else ""
         self._ended: set[str] = set()
         self.refused = self.accepted = 0
+        self.left_out = 0.0
         self.note: Note | None = None
 
     def _controllers(self, start: Array) -> tuple[Controller, Controller]:
@@ -110,7 +125,7 @@ class Cell:
         try:
             if self.stopped:
                 raise RefusedError(f"it holds: {self.stopped}")
-            if trajectory.run != self._run:
+            if self.announced and trajectory.run != self._run:
                 raise RefusedError("it belongs to another run")
             controller = self._arm if group == "arm" else self._hand
             controller.check(trajectory, self.time)
@@ -128,9 +143,11 @@ class Cell:
             self.refused += 1
 
     def begin(self, run: str) -> None:
-        """A new run begins, and ends a hold; never one that was ended before."""
+        """A new run begins, and ends a hold and the run before it; never one that was ended before."""
         if self.pressed or not run or run == self._run or run in self._ended:
             return
+        if self._run:
+            self._ended.add(self._run)
         self._run, self.stopped = run, ""
 
     def hold(self, why: str) -> None:
@@ -139,14 +156,20 @@ class Cell:
             self._ended.add(self._run)
             self.stopped = why or "told to hold"
             if self.note is not None and self.note.held is None:
-                self.note.held, self.note.why = self.time, self.stopped
+                self.note.held, self.note.why = self._now(), self.stopped
 
     def press(self, pressed: bool) -> None:
-        """The emergency stop: the arm stops within its limits, and holds."""
+        """The emergency stop: the arm stops within its limits, and holds.
+
+        Where runs are not announced, nothing but its release ends that.
+        """
         before, self.pressed = self.pressed, pressed
         if pressed and not before:
             self.hold("emergency stop")
+            self._pending.clear()  # a command under way would take the brake's place
             self._arm.stop(self.time, self.robot.arm_acceleration)
+        elif before and not pressed and not self.announced:
+            self.stopped = ""
 
     # ---- running ----------------------------------------------------------------------------------------
 
@@ -204,9 +227,9 @@ class Cell:
 
     def watch(self, name: str) -> None:
         """A fault begins: note what becomes of the arm from now on."""
-        self.note = Note(name, self.time, np.array(self._arm_position()))
+        self.note = Note(name, self._now(), np.array(self._arm_position()))
         if self.stopped:
-            self.note.held, self.note.why = self.time, self.stopped
+            self.note.held, self.note.why = self.note.began, self.stopped
 
     def _arm_position(self) -> Array:
         return self._state.joint_position[: self._n]
@@ -215,12 +238,12 @@ class Cell:
         position = self._arm_position()
         note.far = max(note.far, float(np.max(np.abs(position - note.position))))
         if note.held is None and self.time > self._arm.ends():
-            note.held, note.why = self.time, "the command has expired"
+            note.held, note.why = self._now(), "the command has expired"
         elif note.why == "the command has expired" and self.time <= self._arm.ends():
             note.held, note.why = None, ""  # it came late, and went on
         if note.held is not None:
             if float(np.max(np.abs(self._state.joint_velocity[: self._n]))) < STILL:
-                note.still = self.time if note.still is None else note.still
+                note.still = self._now() if note.still is None else note.still
             else:
                 note.still = None
 
@@ -232,6 +255,7 @@ class Cell:
             "stopped": self.stopped,
             "accepted": self.accepted,
             "refused": self.refused,
+            "left_out": self.left_out,
             "position": self._arm_position().tolist(),
             "speed": float(np.max(np.abs(self._state.joint_velocity[: self._n]))),
             "fault": None if note is None else note.to_json(),
@@ -244,7 +268,7 @@ class Note:
 
     Attributes:
         name: The fault.
-        began: When, seconds of the cell.
+        began: When, seconds of real time.
         position: Where the arm was ``(n,)``.
         held: When it was told to hold, or stood by itself.
         why: By what.

@@ -2,8 +2,8 @@
 
 ``python -m bt_tasksim.twin.node --robot FILE --ros FILE --configuration FILE`` prints one line with
 ``ready PORT``, the port of the evaluation channel, and goes on until it is stopped. One thread runs physics
-in real time and takes messages between two steps; steps that are late are caught up with, up to a tenth of a
-second.
+in real time and takes messages between two steps (`loop`); steps that are late are caught up with, up to a
+tenth of a second.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from bt_tasksim.errors import BtTasksimError, InputError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import load_robot
 from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.twin import loop
 from bt_tasksim.twin.cell import Cell, Readings
 from bt_tasksim.twin.controller import MOST_POINTS, RefusedError, Trajectory
 from bt_tasksim.twin.evaluation import EvaluationServer, hidden_to_json
@@ -41,8 +42,6 @@ from bt_tasksim.twin.gap import load_gap
 SENSOR_FAULTS = ("silent", "frozen", "delayed", "nan", "order")
 DELAY = 0.3
 """Seconds, of the fault ``delayed``."""
-LATE = 0.1
-"""Seconds by which physics may lag and still catch up; more is forgotten, and said."""
 
 
 class TwinNode(Node):  # type: ignore[misc]
@@ -203,6 +202,11 @@ class TwinNode(Node):  # type: ignore[misc]
             "objects": [] if state.objects is None else state.objects.tolist(),
         }
 
+    def leave_out(self, seconds: float) -> None:
+        """Physics lags by so many seconds, and does not catch up."""
+        self.cell.left_out += seconds
+        self.say(f"{1000 * seconds:.0f} ms behind real time, which are left out", "late")
+
     def say(self, sentence: str, about: str) -> None:
         """A line on the standard error, once a second about each thing at most."""
         now = time.monotonic()
@@ -215,18 +219,12 @@ def run(node: TwinNode, server: EvaluationServer) -> None:
     """Run until ROS is shut down."""
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    period = node.cell.period
-    due = time.monotonic() + period
-    while rclpy.ok():
+
+    def going() -> bool:
         server.answer(node.answer)
-        while (left := due - time.monotonic()) > 0.0:
-            executor.spin_once(timeout_sec=left)
-        node.step()
-        due += period
-        behind = time.monotonic() - due
-        if behind > LATE:
-            node.say(f"{1000 * behind:.0f} ms behind real time, which are left out", "late")
-            due = time.monotonic()
+        return bool(rclpy.ok())
+
+    loop.run(node.cell.period, going, executor.spin_once, node.step, node.leave_out)
 
 
 def _seconds(duration: Any) -> float:
@@ -269,7 +267,8 @@ def main() -> int:
         robot = load_robot(options.robot)
         setting = load_setting(robot, options.ros)
         configuration = ActorConfiguration.from_json(options.configuration.read_text())
-        cell = Cell(robot, load_gap(options.gap), configuration, options.seed)
+        gap = load_gap(options.gap)
+        cell = Cell(robot, gap, configuration, options.seed, announced=bool(setting.begin))
         server = EvaluationServer(options.evaluation_port)
     except (BtTasksimError, OSError) as error:
         print(f"twin: {error}", file=sys.stderr)

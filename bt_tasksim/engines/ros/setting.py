@@ -200,6 +200,8 @@ def _setting(data: Mapping[str, Any], robot: RobotDescription, path: Path) -> Ro
         cameras={str(k): _camera(v, f"cameras.{k}") for k, v in (data.get("cameras") or {}).items()},
         source=path,
     )
+    if setting.hold and not setting.begin:
+        raise InputError("'hold' needs 'begin' beside it: without a new run nothing would end a hold")
     _no_topic_twice(setting)
     return setting
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,9 +20,15 @@ ROBOT = load_robot("panda")
 WORLD = Scene("panda", objects={"cup": "on table"}).sample(3)
 
 
+def made(**options: Any) -> Cell:
+    """A cell whose notes are taken in its own time, since the tests do not wait."""
+    cell = Cell(ROBOT, load_gap(), WORLD, seed=1, now=lambda: cell.time, **options)
+    return cell
+
+
 @pytest.fixture
 def cell() -> Cell:
-    return Cell(ROBOT, load_gap(), WORLD, seed=1)
+    return made()
 
 
 def run(cell: Cell, seconds: float) -> None:
@@ -115,6 +122,61 @@ def test_the_emergency_stop(cell: Cell) -> None:
     cell.command("arm", forward(cell, run="two"))
     run(cell, 0.3)
     assert first_joint(cell) > still + 0.01
+
+
+def test_the_emergency_stop_brakes_whatever_is_under_way(cell: Cell) -> None:
+    cell.begin("one")
+    for _ in range(4):
+        cell.command("arm", forward(cell))
+        run(cell, 0.05)
+    cell.command("arm", forward(cell, step=0.04))  # it takes its latency
+    before = first_joint(cell)
+    cell.press(True)
+    run(cell, 0.4)
+    assert abs(first_joint(cell) - before) < 0.015
+    assert cell.accepted == 4
+
+
+def test_a_run_that_another_one_has_replaced_does_not_come_back(cell: Cell) -> None:
+    for name in ("one", "two", "one"):
+        cell.begin(name)
+    cell.command("arm", forward(cell, run="two"))
+    with pytest.raises(RefusedError, match="another run"):
+        cell.command("arm", forward(cell, run="one"))
+
+
+def test_a_cell_whose_runs_are_not_announced() -> None:
+    """As ros2_control alone is: whoever commands moves it, and the emergency stop lasts until its release."""
+    cell = made(announced=False)
+    for name in ("", "one"):
+        cell.command("arm", forward(cell, run=name))
+        run(cell, 0.05)
+    assert first_joint(cell) > 0.01 and not cell.stopped
+    cell.press(True)
+    with pytest.raises(RefusedError, match="emergency stop"):
+        cell.command("arm", forward(cell))
+    run(cell, 0.3)
+    still = first_joint(cell)
+    cell.press(False)
+    cell.command("arm", forward(cell))
+    run(cell, 0.3)
+    assert first_joint(cell) > still + 0.01
+    cell.press(True)
+    cell.load(WORLD)
+    assert not cell.stopped
+
+
+def test_notes_are_taken_in_real_time() -> None:
+    """A cell whose time stands still for a while does not make a hold look early."""
+    clock = [100.0]
+    cell = Cell(ROBOT, load_gap(), WORLD, now=lambda: clock[0])
+    cell.begin("one")
+    cell.watch("late")
+    clock[0] += 0.4
+    cell.left_out += 0.4
+    cell.hold("told to")
+    told = cell.tell()
+    assert told["fault"]["held"] == pytest.approx(0.4) and told["left_out"] == 0.4
 
 
 def test_readings_are_late_and_noisy_as_stated(cell: Cell) -> None:

@@ -54,6 +54,7 @@ def test_the_order_on_the_wire_is_of_its_own(tmp_path: Path) -> None:
     [
         ({"robot": "so100"}, "for robot 'so100', and the robot is 'panda'"),
         ({"wrench": None}, "'wrench' is missing"),
+        ({"begin": None}, "'hold' needs 'begin' beside it"),
         ({"wrenhc": 1}, "unknown key 'wrenhc'; did you mean 'wrench'"),
         ({"arm__joints": ["panda_joint1"]}, "7 joints of the robot's arm"),
         ({"joint_states__joints": ["panda_joint1"] * 2}, "names a joint twice"),
