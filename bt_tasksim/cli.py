@@ -138,7 +138,6 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("role", metavar="ROLE", help="kinematics, physics, rendering or postprocess")
     serve.add_argument("name", metavar="NAME", help="pinocchio; sapien or mujoco; sapien; state or camera")
     serve.add_argument("--robot", default="panda", metavar="R", help="default panda")
-    serve.add_argument("--noise", default="fine", metavar="N", help="of post-process state, default fine")
     serve.add_argument("--port", type=_port, default=DEFAULT_PORT, metavar="P", help="0: a free one")
     serve.add_argument("--address", default=LOOPBACK, metavar="A", help="any but this machine's own: --key")
     serve.add_argument(
@@ -464,7 +463,6 @@ def _serve_engine(options: argparse.Namespace) -> int:
         options.robot,
         options.address,
         options.port,
-        noise=options.noise,
         key=options.key,
         objects=options.objects,
         say=lambda line: print(line, flush=True),

@@ -22,6 +22,10 @@ class MachineError(BtTasksimError, RuntimeError):
     """The machine failed: a full disk, a lost connection, an engine that stopped."""
 
 
+class LostEngine(MachineError):  # noqa: N818  # as `SafetyStop`: it says what happened
+    """An engine in another process is not there any more, or another client has it."""
+
+
 class SafetyStop(MachineError):  # noqa: N818  # a robot that stops in time has made no error
     """The robot was stopped, and stays so until a new run.
 

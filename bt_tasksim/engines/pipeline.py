@@ -113,6 +113,9 @@ class EnginePipeline:
         postprocess: See `PostProcessEngine`.
         rendering: See `RenderingEngine`; None where nothing is ever drawn.
         clock: The clock that the physics role waits for; by default none, as fast as possible.
+
+    Attributes:
+        served: Names of those engines that are in other processes, as their servers say them, by role.
     """
 
     def __init__(
@@ -130,6 +133,7 @@ class EnginePipeline:
         self.clock = clock or FreeClock()
         self.state: WorldState | None = None
         self.last: Command = Command()
+        self.served: dict[str, str] = {}
 
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> Observation:
         """Begin an episode; returns its first observation."""

@@ -96,7 +96,21 @@ class EngineOptions:
         """How results name the perception."""
         if is_ros(self.engines) and self.perception == "state":
             return "tracked"
-        return f"state, noise {self.noise}" if self.perception == "state" else self.perception
+        return _told(self.perception, self.noise)
+
+
+def _told(perception: str, noise: str) -> str:
+    return f"state, noise {noise}" if perception == "state" else perception
+
+
+def result_names(options: EngineOptions, pipeline: EnginePipeline) -> tuple[str, str]:
+    """How results name physics and perception: an address says nothing of the engine behind it."""
+    engines, perception = options.engines, options.label
+    if "physics" in pipeline.served:
+        engines = f"{engines} ({pipeline.served['physics']})"
+    if "postprocess" in pipeline.served:
+        perception = f"{perception} ({_told(pipeline.served['postprocess'], options.noise)})"
+    return engines, perception
 
 
 def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePipeline:
@@ -108,11 +122,13 @@ def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePip
     """
     if is_ros(options.engines):
         return ros_pipeline(robot, options)
+    served: dict[str, str] = {}
     with ExitStack() as built:
 
         def engine(role: str, name: str) -> Any:
             if is_remote(name):
                 made = connect(role, name, robot, options)
+                served[role] = made.connection.engine
             else:
                 made = build_engine(role, name, robot, options.noise)
             if hasattr(made, "close"):
@@ -132,7 +148,9 @@ def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePip
             clock = RealTimeClock()
             physics = PacedPhysics(physics, clock)
         built.pop_all()  # all of them are there: they stay
-    return EnginePipeline(kinematics, physics, postprocess, rendering, clock)
+    pipeline = EnginePipeline(kinematics, physics, postprocess, rendering, clock)
+    pipeline.served = served
+    return pipeline
 
 
 def robot_pipeline(
@@ -235,6 +253,7 @@ def connect(role: str, name: str, robot: RobotDescription, options: EngineOption
     try:
         from bt_tasksim.engines.remote.client import Connection, Limits
         from bt_tasksim.engines.remote.engines import ENGINES as REMOTE
+        from bt_tasksim.engines.remote.engines import RemotePostProcess
         from bt_tasksim.engines.remote.keys import CLIENT, load_key
     except ImportError as error:
         raise MachineError(
@@ -242,4 +261,5 @@ def connect(role: str, name: str, robot: RobotDescription, options: EngineOption
         ) from error
     key = load_key(options.key, CLIENT) if options.key else None
     limits = Limits(connect=options.connect_timeout, step=options.timeout)
-    return REMOTE[role](Connection(parse_remote(name), role, robot, key, limits))
+    connection = Connection(parse_remote(name), role, robot, key, limits)
+    return RemotePostProcess(connection, options.noise) if role == "postprocess" else REMOTE[role](connection)

@@ -31,6 +31,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.concept import ConceptNode
+from bt_tasksim.engines.registry import result_names
 from bt_tasksim.errors import InputError
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.runner import Result, Runner, Step
@@ -155,6 +156,7 @@ class RunRecorder:
             said.sort(key=lambda message: message[0])
         true = "state/objects" in extra
         poses = extra["state/objects" if true else "observations/objects"]
+        told = about(result, runner, self.scenario)
         extra |= {
             "tree/status": np.array(self._status, np.int8).reshape(len(self), len(self.nodes)),
             "tree/necessary_cost": np.array(self._costs, np.float64).reshape(len(self), len(self.nodes)),
@@ -164,7 +166,7 @@ class RunRecorder:
             "run/nodes": _text(json.dumps(describe_nodes(self.nodes))),
             "run/configuration": _text(configuration.to_json()),
             "run/tree": _text(self._tree),
-            "run/about": _text(json.dumps(about(result, runner, self.scenario))),
+            "run/about": _text(json.dumps(told)),
             "run/policies": _text(json.dumps(policies_of(self.nodes))),
         }
         return Demonstration(
@@ -183,8 +185,8 @@ class RunRecorder:
             extra=extra,
             notes={
                 "robot": configuration.robot,
-                "engines": runner.options.engines,
-                "perception": runner.options.label,
+                "engines": told["engines"],
+                "perception": told["perception"],
                 "status": result.status.name,
                 "success": "yes" if result.success else "no",
                 "why": result.why,
@@ -263,6 +265,8 @@ def tree_text(tree: Behaviour) -> str:
 def about(result: Result, runner: Runner, scenario: str) -> dict[str, Any]:
     """A run in plain data: what was run with what, and what became of it; this is ``result.json``."""
     options, verdict = runner.options, result.verdict
+    assert runner.pipeline is not None
+    engines, perception = result_names(options, runner.pipeline)
     numbers = dataclasses.asdict(verdict) if verdict is not None else None
     if numbers is not None:
         numbers = {
@@ -277,8 +281,8 @@ def about(result: Result, runner: Runner, scenario: str) -> dict[str, Any]:
         "seed": result.seed,
         "stream": result.configuration.stream,
         "robot": result.configuration.robot,
-        "engines": options.engines,
-        "perception": options.label,
+        "engines": engines,
+        "perception": perception,
         "options": dataclasses.asdict(options),
         "longest": runner.longest,
         "policies": result.policies,

@@ -17,8 +17,9 @@ from typing import Any
 
 from py_trees.common import Status
 
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import BtTasksimError, InputError, MachineError
+from bt_tasksim.engines.registry import EngineOptions, result_names
+from bt_tasksim.engines.ros.address import is_ros
+from bt_tasksim.errors import BtTasksimError, InputError, LostEngine, MachineError
 from bt_tasksim.interrupts import held_back
 
 CONFIDENCE = 0.95
@@ -146,7 +147,8 @@ def evaluate(
 
     Raises:
         InputError: The tree, scene, robot or engines are no good, or there are no seeds.
-        MachineError: An engine in another process has gone away.
+        LostEngine: An engine in another process has gone away.
+        MachineError: A robot has failed.
     """
     if not seeds:
         raise InputError("an evaluation needs at least one episode")
@@ -172,11 +174,12 @@ def evaluate(
                 found[outcome.seed] = outcome
                 if progress is not None:
                     progress(outcome)
+    engines, perception = result_names(job.options, runner.pipeline)
     return Evaluation(
         scenario=_name(job),
         robot=runner.robot.name,
-        engines=job.options.engines,
-        perception=job.options.label,
+        engines=engines,
+        perception=perception,
         policies=_policies(runner),
         outcomes=tuple(found[s] for s in seeds),
         seconds=time.perf_counter() - started,
@@ -188,7 +191,8 @@ def episode(runner: Any, seed: int, stream: str = "evaluation") -> Outcome:
 
     Raises:
         InputError: Tree or scene are no good.
-        MachineError: An engine in another process has gone away.
+        LostEngine: An engine in another process has gone away.
+        MachineError: A robot has failed.
     """
     started = time.perf_counter()
     nan = float("nan")
@@ -197,8 +201,10 @@ def episode(runner: Any, seed: int, stream: str = "evaluation") -> Outcome:
     except InputError:
         raise
     except BtTasksimError as error:
-        if isinstance(error, MachineError) and runner.options.remote:
-            raise  # an engine that is not there any more says nothing about the tree
+        if isinstance(error, MachineError) and (
+            isinstance(error, LostEngine) or is_ros(runner.options.engines)
+        ):
+            raise  # an engine that is not there any more, or a robot, says nothing about the tree
         return Outcome(
             seed, False, Status.INVALID.name, type(error).__name__, str(error), 0, nan, nan, nan,
             time.perf_counter() - started,

@@ -17,10 +17,10 @@ from bt_tasksim.engines.pipeline import Image
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.remote.handshake import Identity, identity, mismatch
 from bt_tasksim.engines.remote.keys import Key
-from bt_tasksim.engines.remote.messages import Message, decode, encode, sizes_of
+from bt_tasksim.engines.remote.messages import Message, OtherProtocolError, decode, encode, sizes_of
 from bt_tasksim.engines.remote.session import error_of
 from bt_tasksim.engines.remote.sockets import end, prepare, receive, send
-from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.errors import InputError, LostEngine, MachineError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.scene import ActorConfiguration
@@ -69,7 +69,7 @@ class Connection:
 
     Raises:
         InputError: There is no key and one is needed, or the server is not one for this client.
-        MachineError: The server is not there, has another key, or is in use.
+        LostEngine: The server is not there, has another key, or is in use.
     """
 
     def __init__(
@@ -161,14 +161,20 @@ class Connection:
             The answer.
 
         Raises:
-            InputError: The engine raised it, or the request cannot be sent as it is.
-            MachineError: The engine raised it; or the server has gone, is too slow, or answers nonsense.
+            InputError: The engine raised it, the world cannot be sent as it is, or the two sides differ.
+            MachineError: The engine raised it, or it would be asked for nonsense, such as NaN.
+            LostEngine: The server has gone, is too slow, answers nonsense, or serves another client.
         """
         if self.broken:
-            raise MachineError(self._why or f"the connection to {self.server} is closed")
+            raise LostEngine(self._why or f"the connection to {self.server} is closed")
         self._number += 1
         message = Message(self._number, kind, fields or {}, arrays or {}, tuple(images))
-        frames = encode(message, self._sizes)
+        try:
+            frames = encode(message, self._sizes)
+        except InputError as error:
+            if kind == "reset":
+                raise
+            raise MachineError(f"{self.server} cannot be asked to '{kind}': {error}") from error
         expected = (replies,) if isinstance(replies, str) else tuple(replies)
         try:
             reply = self._exchange(frames, kind, (*expected, "error", "notice"), limit)
@@ -197,10 +203,14 @@ class Connection:
                 try:
                     reply = decode(receive(self._socket, self._pictures), replies, self._sizes)
                 except InputError as error:
+                    if kind == "hello" and isinstance(error, OtherProtocolError):
+                        raise InputError(f"{self.server}: {error}") from None
                     raise self._fail(f"{self.server} answers nonsense: {error}") from None
                 if reply.number == self._number:
                     return reply
                 if reply.kind == "error" and reply.number == 0:
+                    if kind == "hello":  # the same protocol by number only
+                        raise InputError(f"{self.server}: {reply.fields['sentence']}")
                     raise self._fail(f"{self.server} did not understand: {reply.fields['sentence']}")
             elif self._monitor in ready:
                 self._look_at_connection()
@@ -209,7 +219,7 @@ class Connection:
         """Read what became of the connection.
 
         Raises:
-            MachineError: It broke off.
+            LostEngine: It broke off.
         """
         while self._monitor.poll(0):
             event = recv_monitor_message(self._monitor)["event"]
@@ -240,6 +250,6 @@ class Connection:
         wants = "has another key, or none" if self.key else "wants a key (--key FILE)"
         return f"{self.server} broke off: it {wants}, or is no such server"
 
-    def _fail(self, why: str) -> MachineError:
+    def _fail(self, why: str) -> LostEngine:
         self._why = why
-        return MachineError(why)
+        return LostEngine(why)

@@ -18,7 +18,6 @@ def serve(
     host: str,
     port: int,
     *,
-    noise: str = "fine",
     key: Path | None = None,
     objects: Path | None = None,
     say: Callable[[str], None],
@@ -32,7 +31,6 @@ def serve(
         robot: Name or file of the robot.
         host: IP address to listen at.
         port: Port; 0 for a free one.
-        noise: Name of the noise model, for post-process ``state``.
         key: The server's key file.
         objects: Folder with mesh files, besides the bundled ones.
         say: Takes one line: what is served where.
@@ -58,7 +56,7 @@ def serve(
         raise InputError(f"no folder '{objects}' with mesh files")
     description = load_robot(robot)
     refused = RefusalLog(complain)
-    engine = build_engine(role, name, description, noise)
+    engine = build_engine(role, name, description)
     session = Session(engine, role, name, description, objects, refused)
     server = EngineServer(session, address, own, refused)
     try:

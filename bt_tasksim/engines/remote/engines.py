@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from bt_tasksim.engines.pipeline import Image
@@ -52,7 +53,8 @@ class RemotePhysics(_RemoteEngine):
         """See `PhysicsEngine.step`.
 
         Raises:
-            MachineError: The server has gone, is too slow or answers nonsense.
+            MachineError: The engine raised it.
+            LostEngine: The server has gone, is too slow or answers nonsense.
         """
         return bundle_of(WorldState, self._ask("step", "state", arrays=arrays_of(target)).arrays)
 
@@ -74,7 +76,8 @@ class RemoteKinematics(_RemoteEngine):
 
         Raises:
             UnreachableError: The arm cannot be there; nothing has moved.
-            MachineError: The server has gone, is too slow or answers nonsense.
+            MachineError: The engine raised it.
+            LostEngine: The server has gone, is too slow or answers nonsense.
         """
         arrays = {**arrays_of(state), **arrays_of(command)}
         return bundle_of(JointTarget, self._ask("solve", "target", arrays=arrays).arrays)
@@ -97,7 +100,8 @@ class RemoteRendering(_RemoteEngine):
 
         Raises:
             InputError: There is no such camera.
-            MachineError: The server has gone, is too slow or answers nonsense.
+            MachineError: The engine raised it.
+            LostEngine: The server has gone, is too slow or answers nonsense.
         """
         fields = {"camera": camera, "depth": depth}
         reply = self._ask("render", "image", slow=True, fields=fields, arrays=arrays_of(state))
@@ -106,10 +110,17 @@ class RemoteRendering(_RemoteEngine):
 
 
 class RemotePostProcess(_RemoteEngine):
-    """A `PostProcessEngine` in another process."""
+    """A `PostProcessEngine` in another process.
 
-    def __init__(self, connection: Connection) -> None:
+    Args:
+        connection: To a server of this role.
+        noise: Name of the noise model of `StatePostProcess`, where the world as drawn names none;
+            empty for the server's own.
+    """
+
+    def __init__(self, connection: Connection, noise: str = "") -> None:
         super().__init__(connection)
+        self.noise = noise
         self._unseen: dict[str, str] = {}
 
     @property
@@ -128,7 +139,7 @@ class RemotePostProcess(_RemoteEngine):
         if (own.objects, own.tips, own.control_period) != (model.objects, model.tips, model.control_period):
             raise InputError("a served post-process engine takes the world's own model, and no other one")
         self._unseen = {}
-        self._begin(configuration, "done")
+        self._begin(replace(configuration, noise=configuration.noise or self.noise), "done")
 
     def cameras(self, needed: bool) -> tuple[str, ...]:
         """See `PostProcessEngine.cameras`."""
@@ -141,7 +152,8 @@ class RemotePostProcess(_RemoteEngine):
         """See `PostProcessEngine.observe`.
 
         Raises:
-            MachineError: The server has gone, is too slow or answers nonsense.
+            MachineError: The engine raised it.
+            LostEngine: The server has gone, is too slow or answers nonsense.
         """
         reply = self._ask(
             "observe",

@@ -9,6 +9,7 @@ anything is done with a message, so what it returns is well formed, finite and o
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +19,7 @@ import msgpack
 import numpy as np
 
 from bt_tasksim.engines.pipeline import CameraModel, Image
-from bt_tasksim.engines.remote.plain import LARGEST, from_plain, shown, to_plain
+from bt_tasksim.engines.remote.plain import LARGEST, from_plain, shown, spelled, to_plain
 from bt_tasksim.errors import InputError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
@@ -151,6 +152,10 @@ class BadMessageError(InputError):
         self.number = number
 
 
+class OtherProtocolError(BadMessageError):
+    """The other side speaks another protocol."""
+
+
 @dataclass(frozen=True)
 class Message:
     """One message: its number, kind, typed fields, arrays and images (in the order of their cameras)."""
@@ -178,8 +183,21 @@ def sizes_of(robot: RobotDescription, configuration: ActorConfiguration | None =
 
 
 def layout_digest() -> str:
-    """A hash of the whole schema: two sides that have the same one lay their messages out alike."""
-    return hashlib.sha256(f"{PROTOCOL} {SCHEMA}".encode()).hexdigest()
+    """A hash of the whole schema: two sides that have the same one lay their messages out alike.
+
+    Every dataclass in it counts with all its fields, down to a drawn world's boxes.
+    """
+    whole = {"protocol": PROTOCOL, "kinds": {kind: _spelled(kind, spec) for kind, spec in SCHEMA.items()}}
+    return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()
+
+
+def _spelled(kind: str, spec: MessageSpec) -> dict[str, Any]:
+    """A kind of message as plain data, one image standing for all that it may have."""
+    return {
+        "fields": {name: spelled(t) for name, t in spec.fields.items()},
+        "arrays": to_plain(_array_specs(kind, 1 if spec.images else 0)),
+        "images": spelled(CameraModel) if spec.images else None,
+    }
 
 
 def encode(message: Message, sizes: Mapping[str, int]) -> list[Any]:
@@ -258,7 +276,7 @@ def _header(frames: Sequence[Any]) -> tuple[int, str, Any, list[Any]]:
     if not isinstance(header, list) or not header:
         raise BadMessageError("a message's first frame is not a list")
     if header[0] != PROTOCOL or isinstance(header[0], bool):
-        raise BadMessageError(
+        raise OtherProtocolError(
             f"the other side speaks protocol {shown(header[0])}, and this one {PROTOCOL}: "
             "use the same version of bt-tasksim on both"
         )

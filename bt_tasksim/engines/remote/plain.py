@@ -85,6 +85,25 @@ def from_plain(kind: Any, data: Any, where: str = "it") -> Any:
     raise TypeError(f"{kind} is no type of a message")
 
 
+def spelled(kind: Any) -> Any:
+    """A declared type as plain data: the same where `from_plain` takes the same.
+
+    Args:
+        kind: A type that `from_plain` knows.
+    """
+    if isinstance(kind, type) and dataclasses.is_dataclass(kind):
+        return {
+            name: ["array", *SHAPES[name]] if hint is Any else spelled(hint)
+            for name, hint in _hints(kind).items()
+        }
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (Union, types.UnionType):
+        return ["optional", *(spelled(t) for t in inner if t is not type(None))]
+    if origin is not None:
+        return [origin.__name__, *("..." if t is Ellipsis else spelled(t) for t in inner)]
+    return kind.__name__
+
+
 def shown(value: Any) -> str:
     """A value in a sentence: short, and without characters that a terminal would obey."""
     if isinstance(value, str | bytes):

@@ -24,7 +24,7 @@ from bt_tasksim.engines.remote.messages import (
     sizes_of,
 )
 from bt_tasksim.engines.remote.plain import LARGEST, LONGEST_TEXT
-from bt_tasksim.errors import BtTasksimError, InputError, MachineError, UnreachableError
+from bt_tasksim.errors import BtTasksimError, InputError, LostEngine, MachineError, UnreachableError
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.world import Command, JointTarget, WorldState
 
@@ -35,7 +35,7 @@ ROLES = {
     "postprocess": ("cameras", "observe"),
 }
 """Roles, and the requests that each answers besides ``hello`` and ``reset``."""
-ERRORS: tuple[type[BtTasksimError], ...] = (UnreachableError, InputError, MachineError)
+ERRORS: tuple[type[BtTasksimError], ...] = (UnreachableError, InputError, LostEngine, MachineError)
 """Errors that travel by name, those of a narrower kind first."""
 
 
@@ -112,7 +112,7 @@ class Session:
         if request.kind == "hello":
             return self._hello(client, request, there)
         if client != self.owner:
-            raise MachineError(
+            raise LostEngine(
                 f"this client does not own the {self.role} engine: it has to say 'hello' first, or another "
                 "client has taken its place"
             )
@@ -128,7 +128,7 @@ class Session:
         if why := mismatch(self.identity, wanted):
             raise InputError(why)
         if self.owner is not None and self.owner != client and there(self.owner):
-            raise MachineError(
+            raise LostEngine(
                 f"the {self.role} engine is in use by another client; it is free again when that one ends"
             )
         self.owner = client
@@ -193,7 +193,7 @@ def error_of(reply: Message) -> BtTasksimError:
     name, sentence = reply.fields["error"], reply.fields["sentence"]
     if name == UnreachableError.__name__:
         return UnreachableError(sentence, reply.fields["distance"], reply.fields["angle"])
-    return InputError(sentence) if name == InputError.__name__ else MachineError(sentence)
+    return {kind.__name__: kind for kind in ERRORS}.get(name, MachineError)(sentence)
 
 
 def _bounded(value: float) -> float:

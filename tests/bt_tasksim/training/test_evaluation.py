@@ -7,7 +7,7 @@ import math
 import pytest
 
 from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import InputError, LeafError, NoWayError
+from bt_tasksim.errors import InputError, LeafError, LostEngine, MachineError, NoWayError
 from bt_tasksim.training.evaluation import Evaluation, Job, Outcome, episode, evaluate, wilson
 
 FIELDS = {
@@ -104,6 +104,32 @@ def test_an_error_in_an_episode_is_one_failure_and_not_the_end():
         (False, "LeafError", "leaf 'x' raised KeyError: 'y'"),
         (False, "NoWayError", "no way"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("error", "engines", "ends"),
+    [
+        (MachineError("the joint target is not finite"), "remote:127.0.0.1:5599", False),
+        (LostEngine("has gone away"), "remote:127.0.0.1:5599", True),
+        (MachineError("no bridge"), "ros:127.0.0.1:9090", True),
+        (MachineError("the joint target is not finite"), "mujoco", False),
+    ],
+)
+def test_only_an_engine_that_is_lost_ends_an_evaluation(error, engines, ends):
+    """What a living server says of its engine is counted as if the engine were here."""
+
+    class Broken:
+        options = EngineOptions(engines=engines)
+
+        def run(self, seed, stream):
+            raise error
+
+    if ends:
+        with pytest.raises(MachineError, match=str(error)):
+            episode(Broken(), 1)
+    else:
+        outcome = episode(Broken(), 1)
+        assert (outcome.success, outcome.reason, outcome.why) == (False, "MachineError", str(error))
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from bt_tasksim.engines.remote.keys import CLIENT, Key, load_key, make_keys
 from bt_tasksim.engines.remote.messages import REPLIES, Message, decode, encode
 from bt_tasksim.engines.remote.server import EngineServer
 from bt_tasksim.engines.remote.session import Session
-from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.errors import InputError, LostEngine, MachineError
 from bt_tasksim.training.evaluation import Job, evaluate
 from bt_tasksim.world import Command, JointTarget
 
@@ -136,7 +136,7 @@ def test_something_else_at_this_port(robot, answer):
             accepted.shutdown(socket.SHUT_WR)
         said = client.communicate(timeout=60)[1].decode()
         accepted.close()
-    assert "MachineError: " in said
+    assert "LostEngine: " in said
     assert ("is no such server" if answer else "no physics server answers") in said
 
 
@@ -212,6 +212,43 @@ def test_a_server_of_another_version_that_did_not_look(fake, robot):
         Connection(Address("127.0.0.1", port), "physics", robot, limits=QUICK)
 
 
+@pytest.mark.parametrize(
+    ("answer", "sentence"),
+    [
+        (
+            lambda n: [msgpack.packb([2, n, "welcome", "of a new kind"])],
+            r"the physics server at 127\.0\.0\.1:\d+: the other side speaks protocol 2, and this one 1: "
+            "use the same version of bt-tasksim on both",
+        ),
+        (
+            lambda n: encode(Message(0, "error", {**NO_MISS, "sentence": "a sentence"}), {}),
+            r"the physics server at 127\.0\.0\.1:\d+: a sentence",
+        ),
+    ],
+)
+def test_a_server_that_speaks_otherwise_is_the_users_affair(fake, robot, answer, sentence):
+    port, replies = fake
+    replies.append(answer)
+    with pytest.raises(InputError, match=f"^{sentence}$"):
+        Connection(Address("127.0.0.1", port), "physics", robot, limits=QUICK)
+
+
+NO_MISS = {"error": "InputError", "distance": 0.0, "angle": 0.0}
+
+
+def test_a_client_that_speaks_another_protocol_is_told(raw, robot):
+    header = msgpack.unpackb(hello(robot, "kinematics")[0])
+    reply = exchanged(raw, [msgpack.packb([2, *header[1:]])])
+    assert reply.kind == "error" and "speaks protocol 2, and this one 1" in reply.fields["sentence"]
+
+
+def test_a_joint_target_that_is_no_number_is_an_error_as_it_is_here(fake, robot):
+    engine = RemotePhysics(Connection(Address("127.0.0.1", fake[0]), "physics", robot, limits=QUICK))
+    with pytest.raises(MachineError, match="cannot be asked to 'step': array 'position' has a number") as e:
+        engine.step(JointTarget(np.full(9, np.nan), np.zeros(9)))
+    assert type(e.value) is MachineError and not engine.connection.broken, "the server is still there"
+
+
 def test_episodes_without_their_server_are_not_counted_as_failures(folder):
     with served(folder, "physics", "sapien") as server:
         options = EngineOptions(engines=server.name, connect_timeout=0.5)
@@ -223,7 +260,7 @@ def test_episodes_without_their_server_are_not_counted_as_failures(folder):
                 server.process.kill()
                 server.process.wait()
 
-        with pytest.raises(MachineError, match=r"the physics server at .* has gone away"):
+        with pytest.raises(LostEngine, match=r"the physics server at .* has gone away"):
             evaluate(Job("pick_and_place", options=options), range(4, 9), progress=kill_after_the_second)
     assert done == [True, True]
 

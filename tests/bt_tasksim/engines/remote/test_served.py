@@ -15,12 +15,13 @@ from bt_tasksim.engines.pipeline import (
     RenderingEngine,
 )
 from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
-from bt_tasksim.engines.registry import EngineOptions, build_engine, build_pipeline, connect
+from bt_tasksim.engines.registry import EngineOptions, build_engine, build_pipeline, connect, result_names
 from bt_tasksim.engines.remote.engines import ENGINES
 from bt_tasksim.errors import InputError, MachineError, UnreachableError
 from bt_tasksim.resources import asset
 from bt_tasksim.robot import load_robot
 from bt_tasksim.runner import Runner
+from bt_tasksim.training.evaluation import Job, evaluate
 from bt_tasksim.world import Command, JointTarget
 from trees.load import load_source
 
@@ -89,7 +90,7 @@ def test_an_episode_through_served_kinematics_is_the_same_bit_for_bit(kinematics
 
 
 def test_an_episode_with_all_but_pictures_served_is_the_same_bit_for_bit(physics, kinematics, here, folder):
-    with served(folder, "postprocess", "state", "--noise", "fine") as perception:
+    with served(folder, "postprocess", "state") as perception:
         options = {
             "engines": physics.name,
             "kinematics": kinematics.name,
@@ -97,6 +98,31 @@ def test_an_episode_with_all_but_pictures_served_is_the_same_bit_for_bit(physics
         }
         assert_identical(here[5], episode(5, **options))
     assert (physics.said(), kinematics.said(), perception.said()) == ([], [], [])
+
+
+@pytest.mark.parametrize("drawn", ["", "original"])
+def test_the_client_says_how_noisy_a_served_estimate_is(folder, robot, world, state, drawn):
+    model = world.world_model([tip.name for tip in robot.tips], robot.opening)
+    world = dataclasses.replace(world, noise=drawn)
+    seen = {}
+    with served(folder, "postprocess", "state") as server:
+        for noise in ("none", "fine", "hard"):
+            options = EngineOptions(perception=server.name, noise=noise)
+            line = build_pipeline(robot, options)
+            own = build_engine("postprocess", "state", robot, noise)
+            for engine in (line.postprocess, own):
+                engine.reset(world, model)
+            a, b = line.postprocess.observe(state, {}), own.observe(state, {})
+            assert same(a.objects, b.objects)
+            seen[noise] = a.objects.tobytes()
+            assert result_names(options, line) == ("sapien", f"{server.name} (state, noise {noise})")
+            line.close()
+    assert len(set(seen.values())) == (1 if drawn else 3), "the world as drawn goes first"
+
+
+def test_results_say_which_engine_was_behind_an_address(physics):
+    job = Job("pick_and_place", options=EngineOptions(engines=physics.name))
+    assert evaluate(job, [5]).to_json()["engines"] == f"{physics.name} (sapien)"
 
 
 def test_an_episode_that_begins_with_the_hand_above_the_object(kinematics, physics):

@@ -9,7 +9,7 @@ from bt_tasksim.engines.remote.configurations import for_sending
 from bt_tasksim.engines.remote.handshake import identity, mismatch
 from bt_tasksim.engines.remote.messages import REPLIES, Message, decode, encode, sizes_of
 from bt_tasksim.engines.remote.session import Session, error_of, plain_sentence
-from bt_tasksim.errors import InputError, MachineError, NoWayError, UnreachableError
+from bt_tasksim.errors import InputError, LostEngine, MachineError, NoWayError, UnreachableError
 from bt_tasksim.robot import load_robot
 
 from .conftest import hello
@@ -95,13 +95,15 @@ def test_nothing_without_hello_and_nothing_before_reset(stage):
 
 def test_one_client_at_a_time(stage):
     stage.hello(), stage.reset()
-    assert "in use by another client" in sentence(stage.hello(YOU))
+    taken = stage.hello(YOU)
+    assert "in use by another client" in sentence(taken) and type(error_of(taken)) is LostEngine
     assert "does not own" in sentence(stage.step(YOU)) and "does not own" in sentence(stage.reset(YOU))
     assert stage.arm.resets == 1 and stage.step().kind == "state", "the owner goes on undisturbed"
     stage.there = False
     assert stage.hello(YOU).kind == "welcome"
     assert "it has to be reset first" in sentence(stage.step(YOU)), "the next client begins fresh"
-    assert "another client has taken its place" in sentence(stage.step(ME))
+    taken = stage.step(ME)
+    assert "another client has taken its place" in sentence(taken) and type(error_of(taken)) is LostEngine
 
 
 def test_hello_again_begins_anew(stage):
@@ -116,6 +118,7 @@ def test_hello_again_begins_anew(stage):
         (InputError("a sentence"), InputError, "a sentence"),
         (MachineError("a sentence"), MachineError, "a sentence"),
         (NoWayError("no way"), MachineError, "no way"),
+        (LostEngine("a sentence"), LostEngine, "a sentence"),
         (UnreachableError("misses", 0.12, 0.5), UnreachableError, "misses"),
         (UnreachableError("misses", np.inf, 0.5), UnreachableError, "misses"),
         (UnreachableError("misses", np.nan, 0.5), UnreachableError, "misses"),
