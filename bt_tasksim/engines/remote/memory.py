@@ -6,25 +6,38 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+OWN = 1 << 30
+"""Bytes by which an engine may make its process grow."""
+
 
 class MemoryWatch:
-    """Tells growth of this process in calls of the engine from growth beside them.
+    """Tells what the engine needs from what comes beside it.
 
-    ZeroMQ keeps the frames of a message until its last one has come, and has no limit on their number. Where
-    the system does not say how large a process is, nothing ever grows.
+    ZeroMQ keeps the frames of a message until its last one has come, and has no limit on their number, nor
+    does it wait for the engine. So only what a new world takes is the engine's own, and only up to a bound.
+    Where the system does not say how large a process is, nothing ever grows.
+
+    Args:
+        own: Bytes by which the engine may make the process grow.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, own: int = OWN) -> None:
+        self._own = own
+        self.renew()
+
+    def renew(self) -> None:
+        """What the process has now is its own."""
         self._usual = resident()
+        self._most = self._usual + self._own
 
     @contextmanager
     def own(self) -> Iterator[None]:
-        """What the process grows by in the block is its own."""
-        before = resident()
+        """What the process has after the block is its own, as far as the bound allows."""
+        self._usual = self._most  # how much of it is needed shows at the end
         try:
             yield
         finally:
-            self._usual += resident() - before
+            self._usual = min(resident(), self._most)
 
     def strange(self) -> int:
         """Bytes that came from elsewhere."""

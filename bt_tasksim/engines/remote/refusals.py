@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 
 
 class RefusalLog:
-    """Says one sentence for each refusal, at most so many at a time.
+    """Says one sentence for each refusal, at most so many at a time; several threads may share it.
 
     Args:
         say: Where sentences go.
@@ -25,16 +26,18 @@ class RefusalLog:
     ) -> None:
         self._say, self._burst, self._rate, self._clock = say, float(burst), rate, clock
         self._left, self._then, self._unsaid = self._burst, clock(), 0
+        self._lock = threading.Lock()
 
     def __call__(self, sentence: str) -> None:
         """A refusal, in one sentence."""
-        now = self._clock()
-        self._left = min(self._burst, self._left + self._rate * (now - self._then))
-        self._then = now
-        if self._left < 1.0:
-            self._unsaid += 1
-            return
-        self._left -= 1.0
-        more = f" (before it {self._unsaid} more, not shown)" if self._unsaid else ""
-        self._unsaid = 0
-        self._say(f"refused: {sentence}{more}")
+        with self._lock:
+            now = self._clock()
+            self._left = min(self._burst, self._left + self._rate * (now - self._then))
+            self._then = now
+            if self._left < 1.0:
+                self._unsaid += 1
+                return
+            self._left -= 1.0
+            more = f" (before it {self._unsaid} more, not shown)" if self._unsaid else ""
+            self._unsaid = 0
+            self._say(f"refused: {sentence}{more}")

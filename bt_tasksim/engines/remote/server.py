@@ -1,28 +1,32 @@
-"""The process that serves an engine: one socket, one loop, one message after the other."""
+"""The process that serves an engine: one socket, one loop, one message after the other.
+
+Two small threads work while the engine does: one answers who may connect (`bt_tasksim.engines.remote.gate`),
+one looks after the memory that unfinished messages take up.
+"""
 
 from __future__ import annotations
 
+import threading
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import zmq
-from zmq.utils import z85
 from zmq.utils.monitor import recv_monitor_message
 
 from bt_tasksim.engines.remote.address import Address
+from bt_tasksim.engines.remote.gate import Gate
 from bt_tasksim.engines.remote.keys import Key
-from bt_tasksim.engines.remote.memory import MemoryWatch
 from bt_tasksim.engines.remote.session import Session
 from bt_tasksim.engines.remote.sockets import end, prepare, receive, send
 from bt_tasksim.errors import InputError, MachineError
 
 _WAKE = 200
-"""Milliseconds after which the loop looks whether it should stop."""
+"""Milliseconds after which the loop looks whether it should stop, and after which the memory is looked at."""
 _PROBES = (0.0, 0.02, 0.1)
 """Seconds before each look at whether an owner is still there: a closed connection takes a moment to show."""
-_ZAP = "inproc://zeromq.zap.01"
 _FAILED = {
     zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL,
     zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL,
@@ -58,6 +62,7 @@ class EngineServer:
         self.address = address
         self._pictures = session.role == "postprocess"
         self._look = self._probed = 0.0
+        self._using = threading.Lock()  # whoever has it may use the sockets
         self._open()
 
     def _open(self) -> None:
@@ -65,12 +70,11 @@ class EngineServer:
         context = zmq.Context()
         self._socket = context.socket(zmq.ROUTER)
         self._monitor = self._socket.get_monitor_socket(sum(_FAILED))
-        self._gate = context.socket(zmq.REP)
-        self._end = weakref.finalize(self, end, context, self._socket, self._monitor, self._gate)
+        self._end = weakref.finalize(self, end, context, self._socket, self._monitor)
         address = self.address
         try:
-            if self.key is not None:  # first of all: where nobody answers there, CURVE lets every key in
-                self._gate.bind(_ZAP)
+            if self.key is not None:
+                Gate(context, self.key, self._refused)
             prepare(self._socket, self.key, pictures=self._pictures, server=True)
             self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
             self._socket.bind(address.url)
@@ -82,9 +86,9 @@ class EngineServer:
                 f"cannot listen at {address}: {error.strerror}; choose another --port or --address"
             ) from None
         self._poller = zmq.Poller()
-        for socket in (self._socket, self._monitor, self._gate):
+        for socket in (self._socket, self._monitor):
             self._poller.register(socket, zmq.POLLIN)
-        self._watch = MemoryWatch()
+        self.session.watch.renew()
 
     @property
     def sentence(self) -> str:
@@ -99,31 +103,35 @@ class EngineServer:
 
     def serve(self, stopped: Callable[[], bool] = lambda: False) -> None:
         """Answer messages until `stopped` says so, or an interrupt ends it."""
-        while not stopped():
-            ready = dict(self._poller.poll(_WAKE))
-            if self._gate in ready:
-                self._answer_gate()
-            if self._monitor in ready:
-                self._read_monitor()
-            if self._socket in ready:
-                self._answer()
-            self._watch_memory()
+        with self._watched():
+            while not stopped():
+                with self._using:
+                    client, frames = self._next()
+                if frames:
+                    self._send(client, self.session.answer(client, frames, self._there))
 
     def close(self) -> None:
         """Let go of the port and of every client."""
         self._end()
 
-    def _answer(self) -> None:
+    def _next(self) -> tuple[bytes, list[Any]]:
+        """A message and who sent it; no frames where none has come for a while."""
+        if not self._end.alive:
+            self._open()
+        self._watch_memory()
+        ready = dict(self._poller.poll(_WAKE))
+        if self._monitor in ready:
+            self._read_monitor()
+        if self._socket not in ready:
+            return b"", []
         client, *frames = receive(self._socket, self._pictures)
-        name = bytes(client)
-        with self._watch.own():
-            reply = self.session.answer(name, frames, self._there)
-        self._send(name, reply)
+        return bytes(client), frames
 
     def _send(self, client: bytes, frames: list[Any]) -> bool:
         """Send to a client that is still there and listens; says whether it could be."""
         try:
-            send(self._socket, [client, *frames], zmq.NOBLOCK)
+            with self._using:
+                send(self._socket, [client, *frames], zmq.NOBLOCK)
         except zmq.ZMQError:  # it has gone, or does not read what it is sent
             return False
         return True
@@ -137,16 +145,33 @@ class EngineServer:
                 return False
         return True
 
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Have the memory looked at while the engine works, too."""
+        over = threading.Event()
+
+        def watch() -> None:
+            while not over.wait(_WAKE / 1000.0):
+                with self._using:
+                    self._watch_memory()
+
+        thread = threading.Thread(target=watch, name="memory watch", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
     def _watch_memory(self) -> None:
-        """Cut every connection where unfinished messages fill the memory."""
+        """Cut every connection where unfinished messages fill the memory; the loop listens anew."""
         now = time.monotonic()
         if now < self._look:
             return
         self._look = now + _WAKE / 1000.0
-        if self._watch.strange() > self.memory:
+        if self._end.alive and self.session.watch.strange() > self.memory:
             self._refused(f"messages without end, {self.memory >> 20} MiB of them: all connections were cut")
             self.close()
-            self._open()
 
     def _read_monitor(self) -> None:
         recv_monitor_message(self._monitor)
@@ -154,18 +179,6 @@ class EngineServer:
             "a connection whose other side does not speak the protocol"
             + (" or has not the right key" if self.key else ", or wants encryption where there is none")
         )
-
-    # ---- who may come in: ZeroMQ's authentication protocol, rfc.zeromq.org/spec/27 ----------------------
-
-    def _answer_gate(self) -> None:
-        assert self.key is not None
-        asked = self._gate.recv_multipart()
-        version, request, credentials = asked[0], asked[1], asked[6:]
-        allowed = asked[5] == b"CURVE" and credentials == [z85.decode(self.key.peer)]
-        status, text = (b"200", b"OK") if allowed else (b"400", b"this key is not known here")
-        self._gate.send_multipart([version, request, status, text, b"", b""])
-        if not allowed:
-            self._refused("a client with an unknown key")
 
 
 def check_address(address: Address, key: Key | None) -> None:

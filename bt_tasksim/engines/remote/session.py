@@ -15,6 +15,7 @@ from typing import Any
 from bt_tasksim.engines.remote.bundles import arrays_of, bundle_of
 from bt_tasksim.engines.remote.configurations import as_received
 from bt_tasksim.engines.remote.handshake import Identity, identity, mismatch
+from bt_tasksim.engines.remote.memory import MemoryWatch
 from bt_tasksim.engines.remote.messages import (
     REQUESTS,
     BadMessageError,
@@ -49,6 +50,7 @@ class Session:
         robot: The robot it is for.
         objects: Folder of mesh files, besides the bundled ones.
         refused: Called with one sentence for each message that was refused.
+        watch: Learns what memory the engine needs for its worlds.
     """
 
     def __init__(
@@ -59,7 +61,9 @@ class Session:
         robot: RobotDescription,
         objects: Path | None = None,
         refused: Callable[[str], None] = lambda sentence: None,
+        watch: MemoryWatch | None = None,
     ) -> None:
+        self.watch = watch or MemoryWatch()
         self.engine, self.role, self.name, self.robot, self.objects = engine, role, name, robot, objects
         self.owner: bytes | None = None
         self.identity = identity(role, robot)
@@ -140,11 +144,12 @@ class Session:
     def _reset(self, request: Message) -> Message:
         self._leave()
         configuration = as_received(request.fields["configuration"], self.robot, self.objects)
-        if self.role == "postprocess":
-            tips = [tip.name for tip in self.robot.tips]
-            state = self.engine.reset(configuration, configuration.world_model(tips, self.robot.opening))
-        else:
-            state = self.engine.reset(configuration)
+        with self.watch.own():
+            if self.role == "postprocess":
+                tips = [tip.name for tip in self.robot.tips]
+                state = self.engine.reset(configuration, configuration.world_model(tips, self.robot.opening))
+            else:
+                state = self.engine.reset(configuration)
         self._sizes = sizes_of(self.robot, configuration)
         self._in_episode = True
         return Message(0, "state", arrays=arrays_of(state)) if self.role == "physics" else Message(0, "done")

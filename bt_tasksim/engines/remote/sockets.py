@@ -43,7 +43,7 @@ def prepare(socket: Any, key: Key | None, pictures: bool, server: bool) -> None:
 
 
 def end(context: Any, socket: Any, *others: Any) -> None:
-    """Close sockets and their context, without waiting for anybody.
+    """Close sockets and their context, without waiting for any peer.
 
     Called through `weakref.finalize`, which keeps them together until then: a context that is collected
     before its sockets waits for them for ever.
@@ -53,7 +53,7 @@ def end(context: Any, socket: Any, *others: Any) -> None:
     socket.disable_monitor()
     for each in (socket, *others):
         each.close(0)
-    context.destroy(linger=0)
+    context.term()  # which a socket in another thread sees, and closes
 
 
 def send(socket: Any, frames: list[Any], flags: int = 0) -> None:

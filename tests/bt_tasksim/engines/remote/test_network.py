@@ -6,6 +6,8 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
 import msgpack
 import numpy as np
@@ -14,10 +16,12 @@ import zmq
 
 from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
 from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.engines.remote import memory
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.remote.client import Connection, Limits
 from bt_tasksim.engines.remote.engines import RemoteKinematics, RemotePhysics
-from bt_tasksim.engines.remote.keys import CLIENT, Key, load_key, make_keys
+from bt_tasksim.engines.remote.keys import CLIENT, SERVER, Key, load_key, make_keys
+from bt_tasksim.engines.remote.memory import MemoryWatch
 from bt_tasksim.engines.remote.messages import REPLIES, Message, decode, encode
 from bt_tasksim.engines.remote.server import EngineServer
 from bt_tasksim.engines.remote.session import Session
@@ -143,6 +147,7 @@ def test_something_else_at_this_port(robot, answer):
 CONNECT = """
 import sys
 from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.engines.remote import memory
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.remote.client import Connection, Limits
 from bt_tasksim.robot import load_robot
@@ -376,40 +381,123 @@ def test_half_a_message_holds_nobody_up(server, robot, world, state, raw):
     engine.close()
 
 
-def test_a_message_without_end_is_cut_off(robot, world, state):
-    """Frames that never end fill no more than the memory that they may have."""
-    said = []
-    session = Session(PinocchioKinematics(robot), "kinematics", "pinocchio", robot)
-    server = EngineServer(session, Address("127.0.0.1", 0), refused=said.append, memory=64 << 20)
-    stop = threading.Event()
+class Slow:
+    """Kinematics that takes its time: `busy` says in what, and it goes on when `go` is set."""
+
+    def __init__(self, robot, busy=""):
+        self.engine, self.busy, self.go, self.began = PinocchioKinematics(robot), busy, threading.Event(), 0
+
+    def reset(self, configuration):
+        self.wait("reset")
+        self.engine.reset(configuration)
+
+    def solve(self, command, state):
+        self.wait("solve")
+        return self.engine.solve(command, state)
+
+    def wait(self, what):
+        if what == self.busy:
+            self.began += 1
+            self.go.wait(30.0)
+
+
+@contextmanager
+def serving(engine, robot, key=None, **limits):
+    """A server of kinematics in a thread, and the sentences of what it refuses."""
+    said, stop = [], threading.Event()
+    session = Session(engine, "kinematics", "slow", robot, watch=MemoryWatch(own=limits.pop("own", 1 << 30)))
+    server = EngineServer(session, Address("127.0.0.1", 0), key, said.append, **limits)
     thread = threading.Thread(target=server.serve, args=(stop.is_set,))
     thread.start()
     try:
-        script = f"PORT, GREETING, READY = {server.address.port}, {GREETING}, {READY}\n{FLOOD}"
-        flood = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.DEVNULL)
-        deadline = time.monotonic() + 30
-        while not said and time.monotonic() < deadline:
-            time.sleep(0.05)
-        flood.kill()
-        flood.wait()
-        assert said[0] == "messages without end, 64 MiB of them: all connections were cut"
-        engine = RemoteKinematics(Connection(server.address, "kinematics", robot, limits=QUICK))
-        assert solves(engine, world, state)
-        engine.close()
+        yield server.address, said
     finally:
         stop.set()
         thread.join()
         server.close()
 
 
+def until(true, seconds=30.0):
+    deadline = time.monotonic() + seconds
+    while not true() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return true()
+
+
+@contextmanager
+def flooding(port):
+    """A program that sends 300 MiB of frames without a last one."""
+    script = f"PORT, GREETING, READY = {port}, {GREETING}, {READY}\n{FLOOD}"
+    flood = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.DEVNULL)
+    try:
+        yield
+    finally:
+        flood.kill()
+        flood.wait()
+
+
 FLOOD = """
-import socket
+import socket, time
 frame = b"\\x03" + (1 << 19).to_bytes(8, "big") + bytes(1 << 19)  # another one follows, it says
 with socket.create_connection(("127.0.0.1", PORT)) as wild:
     wild.sendall(GREETING + READY)
-    while True:
+    for _ in range(600):
         wild.sendall(frame)
+    time.sleep(60)
 """
+CUT = "messages without end, 64 MiB of them: all connections were cut"
+
+
+def test_a_message_without_end_is_cut_off(robot, world, state):
+    """Frames that never end fill no more than the memory that they may have."""
+    with serving(PinocchioKinematics(robot), robot, memory=64 << 20) as (address, said):
+        with flooding(address.port):
+            assert until(lambda: said)
+        assert said[0] == CUT
+        engine = RemoteKinematics(Connection(address, "kinematics", robot, limits=QUICK))
+        assert solves(engine, world, state)
+        engine.close()
+
+
+@pytest.mark.parametrize("busy", ["reset", "solve"])
+def test_a_message_without_end_is_cut_off_while_the_engine_works(robot, world, state, busy):
+    """However long that takes: what comes meanwhile is not the engine's."""
+    slow = Slow(robot)
+    limits = Limits(connect=20.0, step=60.0, slow=60.0)
+    with serving(slow, robot, memory=64 << 20, own=64 << 20) as (address, said):
+        engine = RemoteKinematics(Connection(address, "kinematics", robot, limits=limits))
+        assert solves(engine, world, state)
+        slow.busy = busy
+        with ThreadPoolExecutor() as pool, flooding(address.port):
+            asked = pool.submit(solves, engine, world, state)
+            cut = until(lambda: said, 20.0)
+            slow.go.set()
+            assert cut and said[0] == CUT
+            with pytest.raises(LostEngine, match="has gone away"):
+                asked.result()
+        slow.busy = ""
+        assert solves(engine, world, state), "and it listens again"
+        engine.close()
+
+
+def test_what_worlds_take_is_the_engines_own_up_to_a_bound(monkeypatch):
+    size = [100]
+    monkeypatch.setattr(memory, "resident", lambda: size[0])
+    watch = MemoryWatch(own=50)
+    size[0] = 130
+    assert watch.strange() == 30
+    with watch.own():
+        size[0] = 145
+        assert watch.strange() < 0
+        size[0] = 160
+        assert watch.strange() == 10, "while a world is built, more than any engine may take"
+    assert watch.strange() == 10
+    with watch.own():
+        size[0] = 120
+    assert watch.strange() == 0, "what it needs now, not what it has needed once"
+    size[0] = 140
+    watch.renew()
+    assert watch.strange() == 0
 
 
 def test_a_client_that_never_reads_holds_nobody_up(server, robot, world, state):
@@ -467,6 +555,23 @@ def test_without_the_key_nothing_opens(locked, keys, folder, robot, world, state
     engine.close()
     said = "\n".join(locked.said())
     assert "refused: a client with an unknown key" in said and "has not the right key" in said
+
+
+def test_a_key_opens_while_the_engine_works(keys, robot, world):
+    right, slow = load_key(keys[1], CLIENT), Slow(robot, busy="reset")
+    with serving(slow, robot, load_key(keys[0], SERVER)) as (address, said), ThreadPoolExecutor() as pool:
+        first = RemoteKinematics(Connection(address, "kinematics", robot, right, Limits()))
+        asked = pool.submit(first.reset, world)
+        assert until(lambda: slow.began)
+        with pytest.raises(LostEngine, match="did not answer 'hello' within 2 s: it hangs, or is too slow"):
+            Connection(address, "kinematics", robot, right, Limits(connect=2.0))
+        stranger = Key(*zmq.curve_keypair(), right.peer)
+        with pytest.raises(LostEngine, match="broke off: it has another key"):
+            Connection(address, "kinematics", robot, stranger, Limits(connect=5.0))
+        slow.go.set()
+        asked.result()
+        first.close()
+        assert "a client with an unknown key" in said
 
 
 def test_a_key_where_none_is_wanted(server, keys, robot):
