@@ -15,6 +15,7 @@ import numpy as np
 
 from bt_tasksim import poses
 from bt_tasksim.engines.physics_mujoco import MujocoPhysics
+from bt_tasksim.engines.ros.messages import in_tool_frame
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.scene import ActorConfiguration
@@ -25,11 +26,12 @@ from bt_tasksim.world import Hidden, JointTarget, WorldState
 STILL = 0.03
 """rad/s below which the arm stands."""
 NEVER = "no run has begun"
+AT_THE_TOOL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What the sensors say, with noise; in the robot's order, base frame but for the wrench."""
+    """What the sensors say, with noise; in the robot's order, base frame; the wrench in its sensor's own."""
 
     time: float
     position: Array
@@ -59,6 +61,7 @@ class Cell:
         seed: Of factors and noise.
         announced: Runs are announced, by name, and the cell takes nothing else; else it takes whatever comes.
         now: Real time in seconds, of which notes of faults are taken.
+        sensor: Pose ``(7,)`` of the wrist's sensor in the tool frame; its wrench is that of its own frame.
     """
 
     def __init__(
@@ -70,9 +73,11 @@ class Cell:
         *,
         announced: bool = True,
         now: Callable[[], float] = time.monotonic,
+        sensor: Array = AT_THE_TOOL,
     ) -> None:
         self.robot, self.gap = robot, gap
         self.announced, self._now = announced, now
+        self._tool_at_sensor = poses.inverse(sensor)
         self.period = 1.0 / gap.rates["control_rate"]
         self.load(configuration, seed)
 
@@ -202,7 +207,7 @@ class Cell:
             position=state.joint_position + sizes["joint_position"] * normal(n),
             velocity=state.joint_velocity + sizes["joint_velocity"] * normal(n),
             effort=state.joint_effort + sizes["joint_effort"] * normal(n),
-            wrench=state.wrench + self._wrench_bias + noise,
+            wrench=in_tool_frame(state.wrench, self._tool_at_sensor) + self._wrench_bias + noise,
             tips=state.tip_force + sizes["tip_force"] * normal(state.tip_force.shape),
             objects=displaced(seen, tremble * normal((len(objects), 6))),
         )

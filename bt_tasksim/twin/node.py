@@ -34,6 +34,7 @@ from bt_tasksim.poses import Array
 from bt_tasksim.robot import load_robot
 from bt_tasksim.scene import ActorConfiguration
 from bt_tasksim.twin import loop
+from bt_tasksim.twin.button import Button
 from bt_tasksim.twin.cell import Cell, Readings
 from bt_tasksim.twin.controller import MOST_POINTS, RefusedError, Trajectory
 from bt_tasksim.twin.evaluation import EvaluationServer, hidden_to_json
@@ -67,7 +68,9 @@ class TwinNode(Node):  # type: ignore[misc]
             subscribe(String, setting.begin, lambda m: self.cell.begin(m.data[:64]), 10)
         if setting.hold:
             subscribe(String, setting.hold, lambda m: self.cell.hold(m.data[:400]), 10)
-        subscribe(Bool, setting.emergency_stop, lambda m: self.cell.press(bool(m.data)), 10)
+        self._button = Button(setting.emergency_every)
+        subscribe(Bool, setting.emergency_stop, self._press, 10)
+        self._stop = publish(Bool, setting.emergency_stop, 10)
         self._joints = publish(JointState, setting.joint_states, 10)
         self._wrench = publish(WrenchStamped, setting.wrench.topic, 10)
         self._tips = [publish(WrenchStamped, topic, 10) for topic in setting.tips.topics]
@@ -103,6 +106,11 @@ class TwinNode(Node):  # type: ignore[misc]
 
         return take
 
+    def _press(self, message: Bool) -> None:
+        pressed = bool(message.data)
+        if not self._button.is_own(pressed, time.monotonic()):
+            self.cell.press(pressed)
+
     # ---- running ----------------------------------------------------------------------------------------
 
     def step(self) -> None:
@@ -111,6 +119,8 @@ class TwinNode(Node):  # type: ignore[misc]
         self._tick += 1
         for reading in self.cell.readings():
             self._publish(reading)
+        if self._button.speaks(self.cell.pressed, time.monotonic()):
+            self._stop.publish(Bool(data=False))
 
     def _publish(self, reading: Readings) -> None:
         now = time.time()
@@ -268,7 +278,8 @@ def main() -> int:
         setting = load_setting(robot, options.ros)
         configuration = ActorConfiguration.from_json(options.configuration.read_text())
         gap = load_gap(options.gap)
-        cell = Cell(robot, gap, configuration, options.seed, announced=bool(setting.begin))
+        announced, sensor = bool(setting.begin), setting.wrench.pose
+        cell = Cell(robot, gap, configuration, options.seed, announced=announced, sensor=sensor)
         server = EvaluationServer(options.evaluation_port)
     except (BtTasksimError, OSError) as error:
         print(f"twin: {error}", file=sys.stderr)

@@ -89,20 +89,21 @@ class RosCameras:
         def info(message: Any, arrived: float) -> None:
             pictures.calibration = messages.camera_info(message)
 
-        def keep(into: deque[tuple[float, Any]], what: str) -> Any:
+        def keep(into: deque[tuple[float, Any]], what: str, encodings: tuple[str, ...] = ()) -> Any:
             def handle(message: Any, arrived: float) -> None:
                 if pictures.calibration is None:
                     return
                 size = (pictures.calibration.width, pictures.calibration.height)
-                content, stamp = messages.image_content(message, what, size)
-                into.append((self._robot.clock.convert(stamp, arrived), content))
+                content, stamp = messages.image_content(message, what, size, encodings)
+                into.append((self._robot.joints.convert(stamp, arrived), content))
 
             return handle
 
         topics, kind = pictures.topics, "sensor_msgs/CompressedImage"
         link.subscribe(topics.info, "sensor_msgs/CameraInfo", info, EVERY)
         link.subscribe(topics.colour, kind, keep(pictures.colour, "colour image"), EVERY)
-        link.subscribe(topics.depth, kind, keep(pictures.depth, "depth image"), EVERY)
+        depth = keep(pictures.depth, "depth image", messages.MILLIMETRES)
+        link.subscribe(topics.depth, kind, depth, EVERY)
 
     def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
         """See `RenderingEngine.render`: the newest pair of pictures.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 import time
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,14 +18,16 @@ import numpy as np
 
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.ros import messages
-from bt_tasksim.engines.ros.link import LOG, PATIENCE, Link
+from bt_tasksim.engines.ros.button import Button
+from bt_tasksim.engines.ros.joints import JointFeed
+from bt_tasksim.engines.ros.link import PATIENCE, Link
 from bt_tasksim.engines.ros.messages import Point
 from bt_tasksim.engines.ros.setting import RosSetting
 from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.safety import checks
-from bt_tasksim.safety.engine import ChannelSpec, EmergencyStop, JointReading, RobotClock
+from bt_tasksim.safety.engine import ChannelSpec, EmergencyStop, JointReading
 from bt_tasksim.safety.motion import approach
 from bt_tasksim.world import JointTarget, WorldState
 
@@ -85,18 +87,19 @@ class RosRobot:
         self.tracked = tracked
         self.limits = robot.safety
         self.emergency = EmergencyStop()
-        self.emergency.held_down = lambda: self._pressed
+        self.button = Button(setting.emergency_stop, setting.emergency_every, self.emergency)
+        self.emergency.held_down = lambda: self.button.pressed
         self.link: Link | None = None
         self._lock = threading.RLock()
-        self._names = dict(zip(setting.arm.joints + setting.hand.joints, robot.joints, strict=True))
         self._objects: tuple[str, ...] = ()
-        self._held, self._pressed, self._run = True, False, ""
-        self._period, self.clock, self._announced = 0.05, RobotClock(), 0.0
+        self._held, self._run, self._period, self._announced = True, "", 0.05, 0.0
+        self.began = 0.0
+        self.joints = JointFeed(robot, setting)
         self._forget()
 
     def _forget(self) -> None:
         """Only what arrives from now on counts."""
-        self._joints: JointReading | None = None
+        self.joints.forget()
         self._newest: dict[str, Newest] = {}
 
     # ---- a run begins -----------------------------------------------------------------------------------
@@ -112,10 +115,11 @@ class RosRobot:
         self._run, self._held = uuid.uuid4().hex[:12], False
         self._forget()
         self._expect_messages()
-        if self._pressed:
+        if self.button.pressed:
             raise MachineError(f"the emergency stop is pressed ({self.setting.emergency_stop}); release it")
         if self.emergency.why:  # tapped while it was connected, and what told of it was forgotten since
             raise MachineError(f"the emergency stop was pressed: {self.emergency.why}")
+        self.button.warn()
         self._announced = time.monotonic() + ANNOUNCED
         self._announce(link)
         time.sleep(0.05)
@@ -123,7 +127,7 @@ class RosRobot:
             configuration.joint_position or np.concatenate([self.robot.rest, self.robot.hand_open])
         )
         self._approach(goal)
-        self._began = time.monotonic()
+        self.began = time.monotonic()
 
     def _connected(self, configuration: ActorConfiguration) -> Link:
         """The connection, with the topics of this world's objects."""
@@ -131,15 +135,16 @@ class RosRobot:
         if self.link is not None and not self.link.lost and objects == self._objects:
             return self.link
         self.close()
-        self._pressed, self.clock = False, RobotClock()
+        self.button.anew()
+        self.joints.anew()
         link, setting = Link(self.address), self.setting
         self.link, self._objects = link, objects
         for topic in (setting.arm.command, setting.hand.command):
             link.advertise(topic, TRAJECTORY)
         for topic in filter(None, (setting.begin, setting.hold)):
             link.advertise(topic, TEXT)
-        link.subscribe(setting.emergency_stop, "std_msgs/Bool", self._on_emergency)
-        link.subscribe(setting.joint_states, "sensor_msgs/JointState", self._on_joints)
+        link.subscribe(setting.emergency_stop, "std_msgs/Bool", self.button.take)
+        link.subscribe(setting.joint_states, "sensor_msgs/JointState", self.joints.take)
         self._listen(
             link, setting.wrench.topic, "geometry_msgs/WrenchStamped", messages.wrench, setting.wrench.frame
         )
@@ -157,7 +162,7 @@ class RosRobot:
     ) -> None:
         def handle(message: Any, arrived: float) -> None:
             value, stamp = read(message, frame)
-            self._newest[topic] = Newest(value, self.clock.convert(stamp, arrived))
+            self._newest[topic] = Newest(value, self.joints.convert(stamp, arrived))
 
         link.subscribe(topic, kind, handle)
 
@@ -181,7 +186,9 @@ class RosRobot:
         setting = self.setting
         wanted = [setting.wrench.topic, *setting.tips.topics, *map(setting.object_topic, self._objects)]
         now = time.monotonic()
-        silent = [] if self._joints is not None else [setting.joint_states]
+        silent = [] if self.joints.newest is not None else [setting.joint_states]
+        if self.button.silent():
+            silent.append(setting.emergency_stop)
         for topic in wanted:
             newest = self._newest.get(topic)
             if newest is None or now - newest.stamp > STALE:
@@ -287,28 +294,34 @@ class RosRobot:
         if self.setting.begin and time.monotonic() < self._announced:
             link.publish(self.setting.begin, {"data": self._run})
 
-    def hold(self, ramp: Sequence[JointTarget], why: str) -> None:
-        """See `RealEngine.hold`: the ramp as a trajectory, or one point where the arm is; then the word."""
-        setting, n = self.setting, len(self.robot.arm_joints)
+    def hold(self, why: str, here: bool) -> None:
+        """See `RealEngine.hold`: the word; the last command ends at rest, unless the arm is to stop here."""
+        setting = self.setting
         with self._lock:
             self._held = True
             link = self._alive()
-            points = [
-                Point(t.position[:n], t.velocity[:n], (i + 1) * self._period) for i, t in enumerate(ramp)
-            ]
-            joints = self._joints
-            if not points and joints is not None and joints.names == self.robot.joints:
-                here = joints.position[:n]
-                if np.all(np.isfinite(here)):
-                    points = [Point(here, np.zeros(n), self._period)]
-            if points:
+            if here and (points := self._standing()):
                 link.publish(setting.arm.command, messages.trajectory(setting.arm.joints, points, self._run))
             if setting.hold:
                 link.publish(setting.hold, {"data": why[:400]})
 
+    def _standing(self) -> list[Point]:
+        """The point where the arm can come to stand; none where nothing is known of it."""
+        limits, joints, n = self.limits, self.joints.newest, len(self.robot.arm_joints)
+        if (
+            joints is None
+            or joints.names != self.robot.joints
+            or not np.all(np.isfinite(joints.position[:n]))
+        ):
+            return []
+        velocity = np.clip(np.nan_to_num(joints.velocity[:n]), -limits.velocity, limits.velocity)
+        return [
+            messages.standing(joints.position[:n], velocity, limits.acceleration, limits.lower, limits.upper)
+        ]
+
     def hold_channel(self) -> ChannelSpec | None:
         """See `RealEngine.hold_channel`: a connection of its own to the same bridge."""
-        setting = self.setting
+        setting, limits = self.setting, self.limits
         return ChannelSpec(
             "bt_tasksim.engines.ros.hold:RosHold",
             {
@@ -318,17 +331,23 @@ class RosRobot:
                 "command": setting.arm.command,
                 "joints": list(setting.arm.joints),
                 "word": setting.hold,
+                "speed": limits.velocity.tolist(),
+                "acceleration": limits.acceleration.tolist(),
+                "lower": limits.lower.tolist(),
+                "upper": limits.upper.tolist(),
             },
         )
 
     # ---- states -----------------------------------------------------------------------------------------
 
     def latest(self) -> JointReading:
-        """See `RealEngine.latest`."""
+        """See `RealEngine.latest`; they do not count while an emergency stop that should speak is mute."""
         self._alive()
-        if self._joints is None:
+        if silent := self.button.silent():
+            raise MachineError(silent)
+        if self.joints.newest is None:
             raise MachineError(f"no joint states have come on {self.setting.joint_states}")
-        return self._joints
+        return self.joints.newest
 
     def state(self, reading: JointReading) -> WorldState:
         """See `RealEngine.state`.
@@ -343,7 +362,7 @@ class RosRobot:
             effort = np.nan_to_num(reading.effort)
         objects = [self._fresh(setting.object_topic(name), now, UNSEEN) for name in self._objects]
         return WorldState(
-            time=np.float64(now - self._began),
+            time=np.float64(now - self.began),
             joint_position=position,
             joint_velocity=np.array(reading.velocity),
             joint_effort=effort,
@@ -385,32 +404,6 @@ class RosRobot:
         if self.link.lost:
             raise MachineError(self.link.lost)
         return self.link
-
-    def _on_joints(self, message: Any, arrived: float) -> None:
-        """Joint states, in the robot's order and names where the wire's are as its file says."""
-        came, setting = messages.joint_states(message), self.setting
-        stamp = self.clock.convert(came.stamp, arrived)
-        if came.names == setting.wire:
-            order = setting.order
-            names = self.robot.joints
-        else:  # the guard says what is wrong with them
-            order = np.arange(len(came.names))
-            names = tuple(self._names.get(name, name) for name in came.names)
-        position, velocity = came.position[order], came.velocity[order]
-        before = self._joints
-        if before is not None and before.names == names and np.all(np.isnan(velocity)):
-            elapsed = stamp - before.stamp
-            velocity = (position - before.position) / elapsed if elapsed > 1e-4 else before.velocity
-        elif np.all(np.isnan(velocity)):
-            velocity = np.zeros_like(position)
-        self._joints = JointReading(names, position, velocity, stamp, came.effort[order])
-
-    def _on_emergency(self, message: Any, arrived: float) -> None:
-        pressed = messages.flag(message)
-        before, self._pressed = self._pressed, pressed
-        if pressed and not before:
-            LOG.warning("emergency stop on %s", self.setting.emergency_stop)
-            self.emergency.press(self.setting.emergency_stop)
 
     def close(self) -> None:
         """Disconnect."""

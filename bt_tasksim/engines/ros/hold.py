@@ -7,22 +7,30 @@ import json
 import math
 import threading
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 from bt_tasksim.engines.ros.websocket import WebSocket
 
 FRESH = 0.5
 """Seconds for which a position counts as the robot's present one."""
 STOP = 0.1
-"""Seconds in which the arm is told to come to stand."""
+"""Least seconds in which the arm is told to come to stand."""
 AGAIN = 0.5
 """Seconds between two attempts to connect again."""
 EVERY = 20
 """Milliseconds between two joint states that are looked at."""
 
 
+class Motion(NamedTuple):
+    """Joints at a time, seconds of `time.monotonic`: position in rad, velocity in rad/s."""
+
+    time: float
+    position: list[float]
+    velocity: list[float]
+
+
 class RosHold:
-    """A `HoldChannel`: one point where the arm is, as a trajectory, and the word to hold where there is one.
+    """A `HoldChannel`: one point where the arm can stand, as a trajectory, and the word to hold.
 
     Args:
         host: Where rosbridge is.
@@ -31,14 +39,31 @@ class RosHold:
         command: Topic of the arm's trajectories.
         joints: The arm's joints, as they are named there.
         word: Topic that says hold; empty where there is none.
+        speed: What the joints can do, rad/s; a report of more is not believed.
+        acceleration: With which the joints may brake, rad/s^2.
+        lower: Their position limits, rad.
+        upper: Likewise.
     """
 
-    def __init__(self, host: str, port: int, states: str, command: str, joints: list[str], word: str) -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        states: str,
+        command: str,
+        joints: list[str],
+        word: str,
+        speed: list[float],
+        acceleration: list[float],
+        lower: list[float],
+        upper: list[float],
+    ) -> None:
+        self._limits = list(zip(speed, acceleration, lower, upper, strict=True))
         self._host, self._port = host, port
         self._states, self._command, self._joints, self._word = states, command, joints, word
         self._lock = threading.Lock()
         self._socket: WebSocket | None = None
-        self._position: tuple[float, list[float]] | None = None
+        self._known: Motion | None = None
 
     def open(self) -> None:
         """See `HoldChannel.open`."""
@@ -74,14 +99,12 @@ class RosHold:
     def _hold(self, why: str) -> None:
         if self._word:
             self._say({"op": "publish", "topic": self._word, "msg": {"data": f"watchdog: {why}"[:400]}})
-        known = self._position
-        if known is None or time.monotonic() - known[0] > FRESH:
+        known = self._known
+        if known is None or time.monotonic() - known.time > FRESH:
             if not self._word:
                 raise OSError("where the arm is is not known, and the robot takes no word to hold")
         else:
-            point = {"positions": known[1], "velocities": [0.0] * len(self._joints)}
-            point["time_from_start"] = {"sec": 0, "nanosec": round(STOP * 1e9)}  # type: ignore[assignment]
-            message = {"joint_names": self._joints, "points": [point]}
+            message = {"joint_names": self._joints, "points": [_standing(known, self._limits)]}
             self._say({"op": "publish", "topic": self._command, "msg": message})
 
     def _say(self, message: dict[str, Any]) -> None:
@@ -97,9 +120,7 @@ class RosHold:
             except OSError:
                 self._connect_again(socket)
                 return
-            position = _position(text, self._joints)
-            if position is not None:
-                self._position = (time.monotonic(), position)
+            self._known = _motion(text, self._joints, time.monotonic(), self._known) or self._known
 
     def _connect_again(self, lost: WebSocket) -> None:
         """A bridge that was started anew is connected to, so that a hold need not wait for that."""
@@ -110,12 +131,47 @@ class RosHold:
                     self.open()
 
 
-def _position(text: str | None, joints: list[str]) -> list[float] | None:
-    """Positions of joints in a message of rosbridge; None where it does not say them."""
+def _motion(text: str | None, joints: list[str], now: float, before: Motion | None) -> Motion | None:
+    """Joints as a message of rosbridge says them; None where it does not.
+
+    Where it says no speeds they follow from the way since the last message.
+
+    Args:
+        text: The message.
+        joints: Names.
+        now: When it came, seconds of `time.monotonic`.
+        before: The last one.
+    """
     try:
         message = json.loads(text or "")["msg"]
         found = dict(zip(message["name"], message["position"], strict=True))
         position = [float(found[name]) for name in joints]
     except (ValueError, TypeError, KeyError):
         return None
-    return position if all(map(math.isfinite, position)) else None
+    try:
+        found = dict(zip(message["name"], message["velocity"], strict=True))
+        velocity = [float(found[name]) for name in joints]
+    except (ValueError, TypeError, KeyError):
+        velocity = [0.0] * len(joints)
+        if before is not None and EVERY / 2000 < now - before.time < FRESH:
+            way = zip(position, before.position, strict=True)
+            velocity = [(a - b) / (now - before.time) for a, b in way]
+    return Motion(now, position, velocity) if all(map(math.isfinite, position + velocity)) else None
+
+
+def _standing(motion: Motion, limits: list[tuple[float, float, float, float]]) -> dict[str, Any]:
+    """The point of a trajectory where joints that brake evenly come to stand; see `messages.standing`.
+
+    Args:
+        motion: Where they are, and how fast.
+        limits: Speed, acceleration, lower and upper limit of each.
+    """
+    believed = zip(motion.velocity, limits, strict=True)
+    speeds = [min(max(speed, -most), most) for speed, (most, _, _, _) in believed]
+    braking = max([STOP, *(abs(speed) / limit[1] for speed, limit in zip(speeds, limits, strict=True))])
+    rest = []
+    for here, speed, (_, _, lower, upper) in zip(motion.position, speeds, limits, strict=True):
+        rest.append(min(max(here + speed * braking / 2.0, min(lower, here)), max(upper, here)))
+    nanoseconds = round(braking * 1e9)
+    after = {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}
+    return {"positions": rest, "velocities": [0.0] * len(rest), "time_from_start": after}

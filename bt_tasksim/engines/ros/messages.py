@@ -18,12 +18,17 @@ import numpy as np
 
 from bt_tasksim import poses
 from bt_tasksim.poses import Array
+from bt_tasksim.safety.motion import Motion, resting
 
 MOST_JOINTS = 256
 MOST_BYTES = 8_000_000
 """Of one compressed image."""
 MOST_PIXELS = 4096
 """Along one side of an image."""
+MILLIMETRES = ("16UC1", "mono16")
+"""Encodings of a depth image of 16 bits in millimetres."""
+SHORTEST = 0.1
+"""Least seconds in which a moving arm is told to come to stand."""
 _LARGEST = 1e9
 
 
@@ -130,7 +135,9 @@ def camera_info(message: Any) -> Calibration:
 _PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff"
 
 
-def image_content(message: Any, what: str, size: tuple[int, int]) -> tuple[bytes, float]:
+def image_content(
+    message: Any, what: str, size: tuple[int, int], encodings: Sequence[str] = ()
+) -> tuple[bytes, float]:
     """A sensor_msgs/CompressedImage: the file in it, and its stamp; not yet unpacked.
 
     What image_transport writes before a depth image (12 bytes) is left out.
@@ -139,8 +146,16 @@ def image_content(message: Any, what: str, size: tuple[int, int]) -> tuple[bytes
         message: PNG or JPEG.
         what: Its name in sentences.
         size: Width and height that it must have.
+        encodings: Of the pixels, those that may be; where the format names one, as image_transport does
+            (``32FC1; compressedDepth png`` holds inverse depth as whole numbers, and looks like millimetres).
     """
     data = _mapping(message, what)
+    kind = data.get("format", "")
+    if not isinstance(kind, str):
+        raise RefusedError(f"{what}: 'format' should be a text, found {_shown(kind)}")
+    encoding, separator, _ = kind.partition(";")
+    if encodings and separator and encoding.strip() not in encodings:
+        raise RefusedError(f"{what}: in format {_shown(kind)}; publish {encodings[0]}")
     raw = _get(data, "data", what)
     if not isinstance(raw, str) or len(raw) > MOST_BYTES * 4 // 3 + 4:
         raise RefusedError(f"{what}: 'data' holds no bytes, or too many")
@@ -266,14 +281,27 @@ def ending_at_rest(
         upper: Position limits ``(n,)``.
         validity: Seconds after which the arm stands, if its speed allows that.
     """
-    speed = np.abs(velocity)
     still = np.zeros_like(position)
-    if not np.any(speed > 1e-9):
+    if not np.any(np.abs(velocity) > 1e-9):
         return (Point(position, still, period),)
-    braking = max(float(np.max(speed / acceleration)), validity - period, 0.01)
-    rest = position + velocity * braking / 2.0
+    rest, braking = resting(Motion(position, velocity), acceleration, max(validity - period, 0.01))
     rest = np.minimum(np.maximum(rest, np.minimum(lower, position)), np.maximum(upper, position))
     return Point(position, velocity, period), Point(rest, still, period + braking)
+
+
+def standing(position: Array, velocity: Array, acceleration: Array, lower: Array, upper: Array) -> Point:
+    """The point where joints that brake evenly come to stand, in `SHORTEST` or as soon as they may.
+
+    Args:
+        position: Where they are ``(n,)``.
+        velocity: How fast ``(n,)``.
+        acceleration: With which they may brake ``(n,)``.
+        lower: Position limits ``(n,)``.
+        upper: Position limits ``(n,)``.
+    """
+    rest, braking = resting(Motion(position, velocity), acceleration, SHORTEST)
+    rest = np.minimum(np.maximum(rest, np.minimum(lower, position)), np.maximum(upper, position))
+    return Point(rest, np.zeros_like(rest), braking)
 
 
 # ---- reading plain data -----------------------------------------------------------------------------------

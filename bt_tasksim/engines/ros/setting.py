@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -89,6 +90,8 @@ class RosSetting:
         tips: The fingertips.
         objects: Topic of an object's pose with ``{name}`` in it, and its frame; None where none is tracked.
         emergency_stop: Topic.
+        emergency_every: Longest time in seconds between two of its messages; infinite where it speaks on a
+            change alone, so that nobody can tell a topic that is mute from one that has nothing to say.
         begin: Topic that says that a run begins; empty where the cell has none.
         hold: Topic that says hold; empty where the cell has none.
         approach: Share of the robot's speeds with which it goes to where a run starts.
@@ -106,6 +109,7 @@ class RosSetting:
     tips: Tips
     objects: Stamped | None
     emergency_stop: str
+    emergency_every: float
     begin: str
     hold: str
     approach: float
@@ -183,6 +187,7 @@ def _setting(data: Mapping[str, Any], robot: RobotDescription, path: Path) -> Ro
     if approach > 1.0:
         raise InputError(f"approach should be a share of at most 1, found {approach:g}")
     objects = data.get("objects")
+    stop, every = _emergency_stop(data["emergency_stop"])
     setting = RosSetting(
         robot=robot.name,
         joint_states=_topic(data["joint_states"]["topic"], "joint_states.topic"),
@@ -193,7 +198,8 @@ def _setting(data: Mapping[str, Any], robot: RobotDescription, path: Path) -> Ro
         wrench=_sensor(data["wrench"], "wrench"),
         tips=_tips(data["tips"], robot),
         objects=None if objects is None else _objects(objects),
-        emergency_stop=_topic(data["emergency_stop"], "emergency_stop"),
+        emergency_stop=stop,
+        emergency_every=every,
         begin=_topic(data["begin"], "begin") if data.get("begin") else "",
         hold=_topic(data["hold"], "hold") if data.get("hold") else "",
         approach=approach,
@@ -227,6 +233,15 @@ def _tips(data: Any, robot: RobotDescription) -> Tips:
     check_keys(data, "tips.", {"frame": None, "topics": dict.fromkeys(tip.name for tip in robot.tips)})
     topics = tuple(_topic(data["topics"][tip.name], f"tips.topics.{tip.name}") for tip in robot.tips)
     return Tips(topics, _frame(data["frame"], "tips.frame"), 0.0)
+
+
+def _emergency_stop(data: Any) -> tuple[str, float]:
+    """Its topic, and how often it speaks (`RosSetting.emergency_every`)."""
+    if not isinstance(data, dict):
+        return _topic(data, "emergency_stop"), math.inf
+    check_keys(data, "emergency_stop.", {"topic": None, "every": None})
+    every = positive(data["every"], "emergency_stop.every")
+    return _topic(data["topic"], "emergency_stop.topic"), every
 
 
 def _objects(data: Any) -> Stamped:

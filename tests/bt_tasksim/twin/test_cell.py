@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bt_tasksim.engines.ros.messages import in_tool_frame
 from bt_tasksim.errors import InputError
 from bt_tasksim.robot import load_robot
 from bt_tasksim.scene import ActorConfiguration, Scene
@@ -196,6 +197,19 @@ def test_readings_are_late_and_noisy_as_stated(cell: Cell) -> None:
     assert 1e-5 < np.linalg.norm(seen - truth[:3]) < 5 * 0.002
     force = np.array([r.wrench[:3] for r in got])
     assert 0.15 < np.mean(np.std(force, axis=0)) < 0.6
+
+
+def test_the_wrench_is_that_of_the_sensor_where_it_sits() -> None:
+    """What the engine makes of it, with the sensor's pose, is the wrench at the tool."""
+    pose = np.array([0.02, 0.0, -0.1, 0.0, 1.0, 0.0, 0.0])
+    here, there = made(), made(sensor=pose)
+    for cell in (here, there):
+        push = dataclasses.replace(cell.state, wrench=np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3]))
+        cell._state, cell._wrench_bias = push, np.zeros(6)
+        cell.gap = dataclasses.replace(cell.gap, wrench=dict.fromkeys(cell.gap.wrench, 0.0))
+    at_tool, at_sensor = here._read().wrench, there._read().wrench
+    assert not np.allclose(at_sensor, at_tool, atol=0.1)
+    assert np.allclose(in_tool_frame(at_sensor, pose), at_tool)
 
 
 def test_the_same_seed_is_the_same_world() -> None:

@@ -48,7 +48,7 @@ def engine(tmp_path: Path | None = None, **changes: Any) -> RosRobot:
         Path(file).write_text(yaml.safe_dump({**data, **changes}))
     made = RosRobot(ROBOT, load_setting(ROBOT, file), Address("127.0.0.1", 1), KINEMATICS)
     made.link = Link()
-    made._began = time.monotonic()
+    made.began = time.monotonic()
     return made
 
 
@@ -60,7 +60,7 @@ def states(names: Any, position: Any, stamp: float, **more: Any) -> dict[str, An
 def feel(robot: RosRobot) -> None:
     """Everything has spoken just now."""
     now = time.monotonic()
-    robot._on_joints(states(robot.setting.wire, START[np.argsort(robot.setting.order)], now), now)
+    robot.joints.take(states(robot.setting.wire, START[np.argsort(robot.setting.order)], now), now)
     from bt_tasksim.engines.ros.engine import Newest
 
     for topic in (robot.setting.wrench.topic, *robot.setting.tips.topics):
@@ -74,18 +74,18 @@ def test_it_is_an_engine_of_a_real_robot() -> None:
 def test_joint_states_come_in_the_robots_order(tmp_path: Path) -> None:
     wire = [*reversed(ROBOT.joints), "lift"]
     robot = engine(tmp_path, joint_states={"topic": "/js", "joints": wire})
-    robot._on_joints(states(wire, [*reversed(START.tolist()), 9.0], 5.0), 100.0)
+    robot.joints.take(states(wire, [*reversed(START.tolist()), 9.0], 5.0), 100.0)
     reading = robot.latest()
     assert reading.names == ROBOT.joints and np.array_equal(reading.position, START)
     assert not reading.velocity.any() and reading.stamp == pytest.approx(100.0)
-    robot._on_joints(states(wire, [*reversed((START + 0.01).tolist()), 9.0], 5.1), 100.1)
+    robot.joints.take(states(wire, [*reversed((START + 0.01).tolist()), 9.0], 5.1), 100.1)
     assert np.allclose(robot.latest().velocity, 0.1)  # none was said: from the way
 
 
 def test_another_order_is_left_to_the_guard() -> None:
     robot = engine()
     wrong = [ROBOT.joints[1], ROBOT.joints[0], *ROBOT.joints[2:]]
-    robot._on_joints(states(wrong, START, 5.0), 100.0)
+    robot.joints.take(states(wrong, START, 5.0), 100.0)
     assert robot.latest().names == tuple(wrong)
     with pytest.raises(MachineError, match="in another order"):
         robot._held = False
@@ -97,7 +97,7 @@ def test_nonsense_leaves_the_last_state() -> None:
     feel(robot)
     before = robot.latest()
     with pytest.raises(RefusedError):
-        robot._on_joints({"name": [1]}, 0.0)
+        robot.joints.take({"name": [1]}, 0.0)
     assert robot.latest() is before
 
 
@@ -132,16 +132,15 @@ def test_after_a_hold_nothing_is_sent() -> None:
     robot = engine()
     robot._held = False
     feel(robot)
-    robot.hold((), "why not")
+    robot.hold("why not", here=True)
     (topic, stop), (word_topic, word) = robot.link.sent
     assert topic == robot.setting.arm.command and word_topic == robot.setting.hold
     assert word == {"data": "why not"} and stop["points"][0]["positions"] == ROBOT.rest.tolist()
     with pytest.raises(MachineError, match="holds until a new run begins"):
         robot.send(JointTarget(START, np.zeros(9)))
     assert len(robot.link.sent) == 2
-    ramp = tuple(JointTarget(START + 0.01 * k, np.zeros(9)) for k in range(3))
-    robot.hold(ramp, "again")
-    assert len(robot.link.sent[2][1]["points"]) == 3
+    robot.hold("again", here=False)
+    assert len(robot.link.sent) == 3, "the last command ends at rest; nothing but the word is said"
 
 
 def test_a_lost_connection_is_said_by_everything() -> None:
@@ -154,7 +153,7 @@ def test_a_lost_connection_is_said_by_everything() -> None:
         robot.latest,
         lambda: robot.state(reading),
         lambda: robot.send(target),
-        lambda: robot.hold((), ""),
+        lambda: robot.hold("", here=False),
     ):
         with pytest.raises(MachineError, match="the connection is lost"):
             act()
@@ -173,7 +172,7 @@ class Echo(Link):
             self.times.append(time.monotonic())
             now = time.monotonic()
             position = [*message["points"][0]["positions"], *START[7:]]
-            self.robot._on_joints(states(self.robot.setting.wire, position, now), now)
+            self.robot.joints.take(states(self.robot.setting.wire, position, now), now)
 
 
 def approaching(monkeypatch: Any) -> RosRobot:
@@ -208,7 +207,7 @@ def test_the_way_to_the_start_ends_where_something_pushes(monkeypatch: Any) -> N
     goal = START.copy()
     goal[0] += 0.05
     robot._newest[robot.setting.wrench.topic].value[:3] = (0.0, 0.0, 1000.0)
-    with pytest.raises(MachineError, match="force on the tool 1e.03 N"):
+    with pytest.raises(MachineError, match=r"force on the tool 1e\+03 N"):
         robot._approach(goal)
     assert not robot.link.times
 
@@ -217,8 +216,8 @@ def test_an_emergency_stop_tapped_while_a_run_begins(monkeypatch: Any) -> None:
     robot = engine()
 
     def connected(configuration: Any) -> Any:
-        robot._on_emergency({"data": True}, 0.0)
-        robot._on_emergency({"data": False}, 0.0)
+        robot.button.take({"data": True}, 0.0)
+        robot.button.take({"data": False}, 0.0)
         return robot.link
 
     monkeypatch.setattr(robot, "_connected", connected)
@@ -248,7 +247,7 @@ def test_contact_from_the_drives_effort(tmp_path: Path) -> None:
     feel(robot)
     now = time.monotonic()
     effort = [0.0] * 7 + [-8.0, 3.0]
-    robot._on_joints(states(robot.setting.wire, START, now, effort=effort), now)
+    robot.joints.take(states(robot.setting.wire, START, now, effort=effort), now)
     assert robot.state(robot.latest()).tip_force.tolist() == [[0, 0, 8], [0, 0, 0]]
 
 
@@ -257,10 +256,48 @@ def test_the_emergency_stop_is_pressed_once_and_held_down() -> None:
     pressed: list[str] = []
     robot.emergency.listen(pressed.append)
     for data in (False, True, True):
-        robot._on_emergency({"data": data}, 0.0)
+        robot.button.take({"data": data}, 0.0)
     assert pressed == ["/emergency_stop"] and robot.emergency.held_down()
-    robot._on_emergency({"data": False}, 0.0)
+    robot.button.take({"data": False}, 0.0)
     assert not robot.emergency.held_down() and robot.emergency.why == "/emergency_stop"
+
+
+def test_an_emergency_stop_that_is_mute_is_noticed(tmp_path: Path, caplog: Any) -> None:
+    robot = engine(tmp_path, emergency_stop={"topic": "/stop", "every": 0.2})
+    feel(robot)
+    with pytest.raises(MachineError, match="nothing has come on /stop, which should speak every 200 ms"):
+        robot.latest()
+    assert robot._silent() == ["/stop"]
+    robot.button.take({"data": False}, time.monotonic())
+    assert robot.latest() and not robot._silent()
+    robot.button.take({"data": False}, time.monotonic() - 0.5)
+    with pytest.raises(MachineError, match="nothing for 500 ms on /stop"):
+        robot.latest()
+    robot.button.warn()
+    assert not caplog.records
+    other = engine()  # one that speaks on a change alone cannot be told from one that is mute
+    feel(other)
+    assert other.latest() and not other._silent()
+    other.button.warn()
+    assert "nothing has come on /emergency_stop so far" in caplog.text
+    caplog.clear()
+    other.button.take({"data": False}, time.monotonic())
+    other.button.warn()
+    assert not caplog.records
+
+
+def test_a_hold_where_the_arm_is_brakes() -> None:
+    robot = engine()
+    robot._held = False
+    now = time.monotonic()
+    velocity = [0.75] + [0.0] * 8
+    robot.joints.take(states(robot.setting.wire, START, now, velocity=velocity), now)
+    robot.hold("enough", here=True)
+    (point,) = robot.link.sent[0][1]["points"]
+    assert point["positions"][0] == pytest.approx(START[0] + 0.75 * 0.1 / 2) and not any(point["velocities"])
+    assert point["time_from_start"] == {"sec": 0, "nanosec": 100_000_000}
+    arguments = robot.hold_channel().arguments
+    assert arguments["acceleration"] == robot.limits.acceleration.tolist() and arguments["lower"][0] < 0.0
 
 
 def test_tracking_must_be_somewhere(tmp_path: Path) -> None:

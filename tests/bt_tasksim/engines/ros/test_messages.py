@@ -79,6 +79,27 @@ def test_a_depth_image_as_image_transport_writes_it() -> None:
     assert np.allclose(READ["depth"](message), DEPTH / 1000.0)
 
 
+@pytest.mark.parametrize(
+    ("kind", "sentence"),
+    [
+        ("32FC1; compressedDepth png", "in format '32FC1; compressedDepth png'; publish 16UC1"),
+        ("bgr8; png compressed bgr8", "publish 16UC1"),
+        (3, "'format' should be a text"),
+    ],
+)
+def test_a_depth_image_of_another_encoding(kind: Any, sentence: str) -> None:
+    """Inverse depth comes as a PNG of 16 bits, too, and would be read as millimetres."""
+
+    def read(kind: Any) -> Any:
+        message = {**GOOD["depth"], "format": kind}
+        return messages.image_content(message, "depth image", (8, 6), messages.MILLIMETRES)
+
+    with pytest.raises(RefusedError, match=sentence):
+        read(kind)
+    for good in ("16UC1; compressedDepth png", "mono16; png compressed", "png", ""):
+        assert np.allclose(messages.metres(read(good)[0]), DEPTH / 1000.0)
+
+
 def test_the_size_of_a_jpeg_is_read_before_it_is_unpacked() -> None:
     jpeg = cv2.imencode(".jpg", COLOUR)[1].tobytes()
     message = {**GOOD["colour"], "data": base64.b64encode(jpeg).decode()}

@@ -54,6 +54,8 @@ def test_the_order_on_the_wire_is_of_its_own(tmp_path: Path) -> None:
     [
         ({"robot": "so100"}, "for robot 'so100', and the robot is 'panda'"),
         ({"wrench": None}, "'wrench' is missing"),
+        ({"emergency_stop": {"topic": "/stop"}}, "'emergency_stop.every' is missing"),
+        ({"emergency_stop": {"topic": "/stop", "every": 0}}, "emergency_stop.every"),
         ({"begin": None}, "'hold' needs 'begin' beside it"),
         ({"wrenhc": 1}, "unknown key 'wrenhc'; did you mean 'wrench'"),
         ({"arm__joints": ["panda_joint1"]}, "7 joints of the robot's arm"),

@@ -19,6 +19,10 @@ from bt_tasksim.engines.ros.websocket import WebSocket
 websockets = pytest.importorskip("websockets")
 
 
+LIMITS = ([2.0, 2.0], [7.5, 2.0], [-3.0, -3.0], [3.0, 3.0])
+"""Speed, acceleration, lower and upper limits of two joints."""
+
+
 class Server:
     """Echoes texts, keeps what has come, and says what it is told to."""
 
@@ -98,7 +102,7 @@ def test_a_server_that_goes_away_or_is_none(server: Server) -> None:
 
 
 def test_the_watchdog_says_hold_and_where_the_arm_is(server: Server) -> None:
-    hold = RosHold("127.0.0.1", server.port, "/states", "/arm", ["a", "b"], "/hold")
+    hold = RosHold("127.0.0.1", server.port, "/states", "/arm", ["a", "b"], "/hold", *LIMITS)
     hold.open()
     deadline = time.monotonic() + 5.0
     while len(server.heard) < 3 and time.monotonic() < deadline:
@@ -119,11 +123,13 @@ def test_the_watchdog_says_hold_and_where_the_arm_is(server: Server) -> None:
     assert command["msg"]["points"][0]["positions"] == [1.0, 2.0]
     hold.close()
     with pytest.raises(OSError):
-        RosHold("127.0.0.1", 1, "/states", "/arm", ["a"], "").hold("nobody there")
+        RosHold("127.0.0.1", 1, "/states", "/arm", ["a"], "", [2.0], [7.5], [-3.0], [3.0]).hold(
+            "nobody there"
+        )
 
 
 def test_the_watchdog_connects_again(server: Server) -> None:
-    hold = RosHold("127.0.0.1", server.port, "/states", "/arm", ["a"], "/hold")
+    hold = RosHold("127.0.0.1", server.port, "/states", "/arm", ["a"], "/hold", [2.0], [7.5], [-3.0], [3.0])
     hold.open()
     deadline = time.monotonic() + 5.0
     while len(server.heard) < 3 and time.monotonic() < deadline:
