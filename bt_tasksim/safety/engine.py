@@ -7,7 +7,7 @@ and reads (`bt_tasksim.safety.guard`).
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -153,13 +153,12 @@ class RealEngine(Protocol):
             MachineError: Something has not been heard of for too long, or the connection is lost.
         """
 
-    def hold(self, ramp: Sequence[JointTarget], why: str) -> None:
+    def hold(self, why: str, here: bool) -> None:
         """Stop, and carry out nothing more until `reset`; on any thread, and more than once.
 
         Args:
-            ramp: Slows the commanded motion down within its limits, a target a control period, the last one
-                at rest; empty where the arm should stop where it is.
             why: The reason, for the robot's own log.
+            here: Stop where the arm is; else as the last command would end, slowing down within limits.
 
         Raises:
             MachineError: The connection is lost.

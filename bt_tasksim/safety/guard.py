@@ -6,7 +6,7 @@ limit's policy says clip; after a stop it is a hold and nothing else, until a ne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -17,13 +17,11 @@ from bt_tasksim.safety import checks
 from bt_tasksim.safety.checks import Breach
 from bt_tasksim.safety.engine import JointReading
 from bt_tasksim.safety.limits import SafetyLimits
-from bt_tasksim.safety.motion import Motion, braked, followed, moved
+from bt_tasksim.safety.motion import Motion, braked, followed, moved, resting
 from bt_tasksim.world import JointTarget
 
-_RAMP = 200
-"""Most periods of a ramp; from every speed within the limits it takes far fewer."""
 _HALVINGS = 8
-"""Steps in which the largest gentle enough change of speed is looked for."""
+"""Steps in which the fastest motion that fits is looked for."""
 _MOVED = 0.01
 """Radians that commands have moved while the reported joints have not changed by a bit: they are frozen."""
 
@@ -69,7 +67,7 @@ class Guard:
                 f"{2.0 / self.limits.validity:.1f} Hz at least, or raise safety.timing.validity in "
                 f"'{self.robot.source}'"
             )
-        self.period = period
+        self.period, self._shortest = period, self.limits.validity - period
         self.stopped = None
         still = np.zeros_like(position)
         self.motion = Motion(np.array(position, float), still)
@@ -93,15 +91,29 @@ class Guard:
         self._stop_at(checks.shape_and_numbers(position, np.asarray(target.velocity, float), self.names))
         wanted = moved(self._reference, position, self.period)
         self._stop_at(self._refused(wanted))
-        motion = self._clipped(wanted)
+        motion = self._stoppable(self._clipped(wanted))
         tool, twist = self._tool_motion(motion)
         if self.limits.clips("tool_acceleration") and checks.tool_acceleration(
             self._twist, twist, self.period, self.limits
         ):
-            motion, tool, twist = self._gentler(motion)
+            motion = self._gentler(motion)
+            tool, twist = self._tool_motion(motion)
         self._stop_at(self._exceeded(motion, tool, twist))
         self._reference, self.motion, self._tool, self._twist = wanted, motion, tool, twist
         return JointTarget(motion.position, motion.velocity, self.limits.validity)
+
+    def late(self, seconds: float) -> None:
+        """The next command follows so much more than a period after the last one, whose end has begun.
+
+        The arm has been slowing down since (`resting`), and the next motion begins where it is by now.
+        """
+        rest, braking = resting(self.motion, self.acceleration, self._shortest)
+        share = 1.0 - min(max(seconds, 0.0) / braking, 1.0)
+        velocity = self.motion.velocity * share
+        position = rest - (rest - self.motion.position) * share**2
+        self.motion, self._tool = Motion(position, velocity), self.forward(position)
+        before = self.forward(position - self.period * velocity)
+        self._twist = checks.twist(before, self._tool, self.period)
 
     def _refused(self, wanted: Motion) -> Breach | None:
         """Limits that stop, and that the command itself exceeds, whatever clipping would make of it."""
@@ -132,19 +144,40 @@ class Guard:
             self.period,
         )
 
-    def _gentler(self, motion: Motion) -> tuple[Motion, Array, Array]:
+    def _rest(self, motion: Motion) -> Array:
+        """Where joints ``(n_joints,)`` stand if no command follows."""
+        return resting(motion, self.acceleration, self._shortest)[0]
+
+    def _stoppable(self, motion: Motion) -> Motion:
+        """The fastest motion between braking and this one that ends within the position limits."""
+        clips = self.limits.clips
+        if not (clips("joint_position") or clips("joint_acceleration")) or self._ends_inside(motion):
+            return motion
+        slowest = braked(self.motion, self.acceleration, self.period)
+        return self._between(slowest.velocity, motion.velocity, self._ends_inside) or slowest
+
+    def _ends_inside(self, motion: Motion) -> bool:
+        return checks.joint_position(self._rest(motion), self.lower, self.upper, self.names) is None
+
+    def _gentler(self, motion: Motion) -> Motion:
         """The motion whose change of joint speeds is the largest share that keeps the tool's acceleration."""
-        share, step = 0.0, 0.5
-        change = motion.velocity - self.motion.velocity
-        found = None
+
+        def gentle(tried: Motion) -> bool:
+            twist = self._tool_motion(tried)[1]
+            return checks.tool_acceleration(self._twist, twist, self.period, self.limits) is None
+
+        return self._between(self.motion.velocity, motion.velocity, gentle) or motion
+
+    def _between(self, slow: Array, fast: Array, fits: Callable[[Motion], bool]) -> Motion | None:
+        """The motion nearest to the fast one, of those between two velocities ``(n_joints,)``, that fits."""
+        share, step, found = 0.0, 0.5, None
         for _ in range(_HALVINGS):
-            velocity = self.motion.velocity + (share + step) * change
+            velocity = slow + (share + step) * (fast - slow)
             tried = Motion(self.motion.position + self.period * velocity, velocity)
-            tool, twist = self._tool_motion(tried)
-            if checks.tool_acceleration(self._twist, twist, self.period, self.limits) is None:
-                share, found = share + step, (tried, tool, twist)
+            if fits(tried):
+                share, found = share + step, tried
             step /= 2.0
-        return found or (motion, *self._tool_motion(motion))
+        return found
 
     def _tool_motion(self, motion: Motion) -> tuple[Array, Array]:
         tool = self.forward(motion.position)
@@ -153,7 +186,7 @@ class Guard:
     def _exceeded(self, motion: Motion, tool: Array, twist: Array) -> Breach | None:
         """What would be sent exceeds a limit."""
         limits, names, n = self.limits, self.names, self._n
-        rest = self._ramp(motion)[-1].position
+        rest = self._rest(motion)
         could_not_stop = "could not stop before"
         return (
             checks.joint_position(motion.position, self.lower, self.upper, names)
@@ -236,23 +269,8 @@ class Guard:
         if breach is not None:
             raise self.stop(breach.limit, breach.sentence)
 
-    def ramp(self) -> tuple[JointTarget, ...]:
-        """Targets, one a period, that bring the commanded motion to rest within its limits."""
-        return tuple(
-            JointTarget(m.position, m.velocity, self.limits.validity) for m in self._ramp(self.motion)
-        )
-
-    def _ramp(self, motion: Motion) -> Sequence[Motion]:
-        out = []
-        for _ in range(_RAMP):
-            motion = braked(motion, self.acceleration, self.period)
-            out.append(motion)
-            if not np.any(motion.velocity):
-                break
-        return out
-
     def brake(self) -> JointTarget:
-        """The next target of the ramp, for an engine that takes one at a time."""
+        """The next target of an arm that slows down as fast as it may, for a simulation."""
         self.motion = braked(self.motion, self.acceleration, self.period)
         return JointTarget(self.motion.position, self.motion.velocity, self.limits.validity)
 

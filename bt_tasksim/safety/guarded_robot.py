@@ -105,9 +105,9 @@ class GuardedRobot:
         with self._lock:
             if self._held:
                 return
-            self.guard.stop("ended", why)
+            here = self.guard.stop("ended", why).limit in _WHERE_IT_IS
             try:
-                self.engine.hold(self._ramp(), why)
+                self.engine.hold(why, here)
             except Exception:  # whatever it is, there is another way
                 if self.watchdog is not None:
                     self.watchdog.hold()
@@ -144,14 +144,6 @@ class GuardedRobot:
             self.engine.send(target)
             self._sent = time.monotonic()
 
-    def _ramp(self) -> tuple[JointTarget, ...]:
-        """Slows the commanded motion down; none where the arm does not, or should not, follow it any more."""
-        stopped = self.guard.stopped
-        expired = time.monotonic() - self._sent > self.guard.limits.validity
-        if expired or (stopped is not None and stopped.limit in _WHERE_IT_IS):
-            return ()
-        return self.guard.ramp()
-
     def _before(self, now: float) -> None:
         """What must hold before a command goes out."""
         guard = self.guard
@@ -162,6 +154,8 @@ class GuardedRobot:
             said = f"late: no command for {1000 * (now - self._sent):.0f} ms, and the last one has expired"
             raise guard.stop("late", said)
         guard.reading(self.engine.latest(), now)
+        if self._sent and (late := now - self._sent - guard.period) > 0.0:
+            guard.late(late)
 
     def _reason(self, error: MachineError) -> SafetyStop:
         if isinstance(error, SafetyStop):

@@ -62,6 +62,22 @@ def stopping_speed(room: Array, acceleration: Array, period: float) -> Array:
     return np.where(endless, np.inf, speed)
 
 
+def resting(motion: Motion, acceleration: Array, shortest: float) -> tuple[Array, float]:
+    """Where joints come to stand ``(n,)`` that slow down evenly in the time of the slowest, and that time.
+
+    This is the end of every command: what an engine sends, and what the guard looks at.
+
+    Args:
+        motion: The last motion; joints without a limit of acceleration stand at its position.
+        acceleration: Limits ``(n,)``; infinite: none.
+        shortest: Least time in seconds.
+    """
+    braking = max(float(np.max(np.abs(motion.velocity) / acceleration)), shortest)
+    return motion.position + np.where(
+        np.isfinite(acceleration), motion.velocity, 0.0
+    ) * braking / 2.0, braking
+
+
 def braked(before: Motion, acceleration: Array, period: float) -> Motion:
     """The next motion of joints that slow down as fast as they may."""
     slower = np.maximum(np.abs(before.velocity) - acceleration * period, 0.0)

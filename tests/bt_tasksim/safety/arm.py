@@ -92,7 +92,6 @@ class ArmEngine:
     def reset(self, configuration: Any) -> None:
         self.close()
         self._lost, self._reading, self._run = "", None, uuid.uuid4().hex
-        self._period = 1.0 / configuration.control_frequency
         self._began = time.monotonic()
         try:
             self._socket = socket.create_connection(("127.0.0.1", self.port))
@@ -131,8 +130,8 @@ class ArmEngine:
     def hidden(self) -> None:
         return None
 
-    def hold(self, ramp: Any, why: str) -> None:
-        self._write({"ramp": [t.position.tolist() for t in ramp], "period": self._period, "why": why})
+    def hold(self, why: str, here: bool) -> None:
+        self._write({"hold": why, "here": here})
 
     def hold_channel(self) -> ChannelSpec:
         arguments = {"host": "127.0.0.1", "port": self.port}

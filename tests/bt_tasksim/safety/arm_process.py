@@ -1,8 +1,8 @@
 """An arm in a process of its own, for tests: first-order joints, a small protocol over TCP, faults on demand.
 
 Lines of JSON. To the arm: ``run`` with ``start`` begins a run and ends a hold; ``run`` with ``to`` and
-``valid`` is a command, given up after so many seconds; ``ramp`` with ``period`` and ``hold`` end the run:
-commands are refused from then on. ``states`` asks for joint states at 100 Hz; ``fault`` injects one; ``tell``
+``valid`` is a command, given up after so many seconds; ``hold`` ends the run: the joints stop, and commands
+are refused from then on. ``states`` asks for joint states at 100 Hz; ``fault`` injects one; ``tell``
 asks what has happened since. It imports the standard library alone.
 """
 
@@ -35,17 +35,16 @@ class Arm:
         self.v = [0.0] * len(names)
         self.target = list(self.q)
         self.run, self.latched, self.expires = "", "no run has begun", 0.0
-        self.ramp: deque[tuple[float, list[float]]] = deque()
         self.moving_to = False
         self.fault: dict | None = None
-        self.commands = self.refused = self.ramped = 0
+        self.commands = self.refused = 0
+        self.here: bool | None = None
         self.busy = 0.0
 
     def take(self, message: dict, now: float) -> None:
         if "start" in message:
             self.run, self.latched, self.moving_to = message["run"], "", False
             self.q, self.target, self.v = list(message["start"]), list(message["start"]), [0.0] * len(self.q)
-            self.ramp.clear()
             self.fault, self.commands, self.refused = None, 0, 0
         elif "to" in message:
             if self.latched or message["run"] != self.run:
@@ -53,17 +52,8 @@ class Arm:
                 return
             self.commands += 1
             self.target, self.expires, self.moving_to = message["to"], now + message["valid"], True
-        elif "ramp" in message and not self.latched:
-            self.latched, self.ramped = message["why"], len(message["ramp"])
-            points = enumerate(message["ramp"])
-            self.ramp = deque((now + (i + 1) * message["period"], q) for i, q in points)
-            self.stopped(now, message["why"])
-            if not self.ramp:
-                self.target = list(self.q)
-            else:
-                self.target = self.ramp[0][1]
         elif "hold" in message and not self.latched:
-            self.latched = message["hold"]
+            self.latched, self.here = message["hold"], message.get("here")
             self.target = list(self.q)
             self.stopped(now, message["hold"])
 
@@ -82,10 +72,6 @@ class Arm:
         if self.moving_to and now > self.expires:
             self.target = list(self.q)
             self.stopped(now, "the command has expired")
-        while self.ramp and now >= self.ramp[0][0]:
-            self.ramp.popleft()
-            if self.ramp:
-                self.target = self.ramp[0][1]
         share = 1.0 - math.exp(-dt / LAG)
         for i, goal in enumerate(self.target):
             way = max(-FASTEST * dt, min(FASTEST * dt, share * (goal - self.q[i])))
@@ -163,7 +149,7 @@ class Server:
             told = {
                 "fault": arm.fault, "q": arm.q, "v": arm.v, "latched": arm.latched, "now": now,
                 "commands": arm.commands, "refused": arm.refused, "busy": arm.busy,
-                "ramped": arm.ramped,
+                "here": arm.here,
             }  # fmt: skip
             arm.busy = 0.0
             sock.sendall(json.dumps(told).encode() + b"\n")

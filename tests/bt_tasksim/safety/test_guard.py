@@ -9,11 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.engines.ros.messages import ending_at_rest
 from bt_tasksim.errors import InputError, SafetyStop
 from bt_tasksim.robot import load_robot
 from bt_tasksim.safety.checks import twist
 from bt_tasksim.safety.engine import JointReading
 from bt_tasksim.safety.guard import Guard
+from bt_tasksim.twin.controller import Controller, Trajectory
 from bt_tasksim.world import JointTarget
 
 ROBOT = load_robot("panda")
@@ -157,7 +159,7 @@ def test_whatever_comes_in_what_goes_out_keeps_the_limits(positions, scale, clip
             sent.append(out.position)
         except SafetyStop:
             halted = True
-            ramp = [t.position for t in guard.ramp()]
+            ramp = [guard.brake().position for _ in range(20)]
             with pytest.raises(SafetyStop):
                 guard.command(target(START))
             sent += ramp
@@ -179,21 +181,77 @@ def test_whatever_comes_in_what_goes_out_keeps_the_limits(positions, scale, clip
     assert np.all(np.linalg.norm(changes[:, :3], axis=1) <= limits.tool_acceleration * slack)
     assert np.all((tool[:, :3] >= limits.workspace[0] - 1e-6) & (tool[:, :3] <= limits.workspace[1] + 1e-6))
     if halted:
-        np.testing.assert_array_equal(guard.ramp()[-1].velocity, 0.0)
+        np.testing.assert_array_equal(guard.brake().velocity, 0.0)
 
 
-def test_the_ramp_brakes_and_then_stands():
+def test_a_simulated_arm_brakes_and_then_stands():
     guard = guard_of()
     for k in range(1, 8):
-        guard.command(target(offset(0.5 * 0.03 * k * k * 0.05)))
-    ramp = guard.ramp()
-    speeds = [float(np.abs(t.velocity).max()) for t in ramp]
-    assert speeds == sorted(speeds, reverse=True) and speeds[-1] == 0.0
-    assert all(t.validity == guard.limits.validity for t in ramp)
+        guard.command(target(offset(0.005 * k * k)))
     guard.stop("ended", "over")
-    for t in ramp:
-        np.testing.assert_array_equal(guard.brake().position, t.position)
+    ramp = [guard.brake() for _ in range(10)]
+    speeds = [float(np.abs(t.velocity).max()) for t in ramp]
+    assert speeds[0] > 0.0 and speeds == sorted(speeds, reverse=True) and speeds[-1] == 0.0
+    assert all(t.validity == guard.limits.validity for t in ramp)
     np.testing.assert_array_equal(guard.brake().position, ramp[-1].position)
+
+
+def sent_to(controller, sent, now, period=PERIOD):
+    """A command as an engine sends it to a controller of trajectories."""
+    limits = ROBOT.safety
+    points = ending_at_rest(
+        sent.position[:N], sent.velocity[:N], period, limits.acceleration, limits.lower, limits.upper,
+        sent.validity,
+    )  # fmt: skip
+    at, speeds, times = zip(*((p.position, p.velocity, p.time) for p in points), strict=True)
+    controller.accept(Trajectory(ROBOT.arm_joints, at, speeds, times), now)
+    return at[-1]
+
+
+def a_controller():
+    return Controller(ROBOT.arm_joints, ROBOT.arm_lower, ROBOT.arm_upper, ROBOT.arm_velocity, ROBOT.rest)
+
+
+def test_where_an_arm_stands_if_no_command_follows_is_inside():
+    guard, controller = guard_of({"joint_acceleration": "clip", "tool_acceleration": "clip"}), a_controller()
+    guard.limits = dataclasses.replace(guard.limits, workspace=box(0.15))
+    guard.begin(START, PERIOD)
+    for k in range(1, 20):  # one joint is fast, and another one has far less acceleration
+        try:
+            sent = guard.command(target(offset(0.05 * k, 0.0, 0.0, 0.01 * k)))
+        except SafetyStop as stop:
+            assert "the tool could not stop before it is" in str(stop)
+            break
+        rest = sent_to(controller, sent, PERIOD * k)
+        assert KINEMATICS.forward(np.concatenate([rest, sent.position[N:]]))[1] <= 0.15
+    assert 4 < k < 19
+
+
+def test_an_arm_that_nears_a_limit_slows_down_and_is_not_stopped():
+    guard = guard_of({"joint_acceleration": "clip"}, tool_acceleration=1e3, tool_turn_acceleration=1e3)
+    room = guard.upper[0] - START[0]
+    guard.begin(START + np.array([room - 0.8] + [0] * 8), PERIOD)
+    for k in range(1, 40):
+        sent = guard.command(target(START + np.array([room - 0.8 + min(0.08 * k, 0.8)] + [0] * 8)))
+    assert sent.position[0] == pytest.approx(guard.upper[0])
+
+
+@pytest.mark.parametrize("gap", [0.03, 0.06, 0.1, 0.13])
+def test_a_command_that_comes_late_does_not_jerk_the_arm(gap):
+    guard, controller = guard_of({"joint_acceleration": "clip", "tool_acceleration": "clip"}), a_controller()
+    period, now, position, seen = 0.02, 0.0, START.copy(), []
+    guard.begin(START, period)
+    for k in range(60):
+        if k == 40:
+            guard.late(gap - period)
+        position[0] += min(1.5, 0.1 * k) * period
+        sent_to(controller, guard.command(target(position.copy())), now, period)
+        after = now + (gap if k == 39 else period)
+        seen += [controller.setpoint(t)[1][0] for t in np.arange(now, after - 1e-9, 1e-3)]
+        now = after
+    assert min(seen) >= 0.0 and max(seen) <= guard.velocity[0]
+    assert np.abs(np.diff(seen)).max() / 1e-3 <= 4.0 * guard.acceleration[0] * 1.01, "see docs/safety.md"
+    assert controller.setpoint(now)[0][0] > START[0] + 1.0
 
 
 def test_a_robot_without_limits_is_not_driven():
