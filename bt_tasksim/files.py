@@ -116,6 +116,15 @@ def whole_folder(path: str | Path, names: Collection[str] = ()) -> Iterator[Path
                 folder.rmdir()
 
 
+def file_version(path: str | Path) -> tuple[int, ...]:
+    """Numbers that change with a file's content, as far as its folder tells; none where it is gone."""
+    try:
+        about = os.stat(path)
+    except OSError:
+        return ()
+    return about.st_mtime_ns, about.st_size, about.st_ino
+
+
 def check_folder(path: str | Path, names: Collection[str] = ()) -> None:
     """Check that `whole_folder` may write here, before there is anything to write.
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.files import file_version
 from bt_tasksim.meshes import TriangleMesh, cube_sphere, mass_properties
 from bt_tasksim.poses import Array
 from bt_tasksim.shapes import ConvexPiece, Piece, Shape
@@ -30,7 +31,7 @@ def mesh_extent(path: str) -> tuple[float, float, float]:
         InputError: The file is not a closed mesh.
         MachineError: The package that reads meshes is not installed.
     """
-    x, y, z = np.ptp(_read(path)[0].vertices, axis=0).tolist()
+    x, y, z = np.ptp(_read(path, file_version(path))[0].vertices, axis=0).tolist()
     return float(x), float(y), float(z)
 
 
@@ -44,7 +45,7 @@ def mesh_shape(path: str, size: tuple[float, float, float]) -> Shape:
         MachineError: The package that reads meshes is not installed.
     """
     check_size(f"mesh '{path}'", size)
-    whole, bodies = _read(path)
+    whole, bodies = _read(path, file_version(path))
     low, high = np.min(whole.vertices, axis=0), np.max(whole.vertices, axis=0)
     scale, middle = np.array(size) / (high - low), (low + high) / 2
     visual = TriangleMesh((whole.vertices - middle) * scale, whole.faces)
@@ -88,8 +89,8 @@ def check_size(what: str, size: tuple[float, float, float]) -> None:
 
 
 @lru_cache(maxsize=256)
-def _read(path: str) -> tuple[TriangleMesh, tuple[TriangleMesh, ...]]:
-    """The mesh in a file, and its separate bodies."""
+def _read(path: str, version: tuple[int, ...]) -> tuple[TriangleMesh, tuple[TriangleMesh, ...]]:
+    """The mesh in this version of a file, and its separate bodies."""
     if not Path(path).is_file():
         raise InputError(f"no mesh file '{path}'")
     try:

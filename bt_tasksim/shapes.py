@@ -15,6 +15,7 @@ import numpy as np
 
 from bt_tasksim import meshes, poses
 from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.files import file_version
 from bt_tasksim.meshes import MassProperties, TriangleMesh
 from bt_tasksim.poses import Array
 from bt_tasksim.surfaces import Ellipse, Polygon, PrismSurface, SuperellipsoidSurface, Surface
@@ -165,13 +166,19 @@ def nearest_point(shape: Shape, point: Array) -> Array:
     return shape.surface.nearest(point)
 
 
-@lru_cache(maxsize=4096)
 def shape(kind: str, size: ShapeSize) -> Shape:
     """The geometry of an object; the same arguments give the same object, which nobody may change.
+
+    A mesh whose file has changed is another object.
 
     Raises:
         InputError: Unknown kind, a size that is not positive, exponents out of range, or a bad mesh.
     """
+    return _shape(kind, size, () if size.mesh is None else file_version(size.mesh))
+
+
+@lru_cache(maxsize=4096)
+def _shape(kind: str, size: ShapeSize, version: tuple[int, ...]) -> Shape:
     _check(kind, size)
     x, y, z = size.size
     half = np.array([x, y, z]) / 2

@@ -62,9 +62,8 @@ class MujocoPhysics:
         self._data: Any = mujoco.MjData(world.model)
         self._period = 1.0 / configuration.control_frequency
         self._steps = math.ceil(self._period / TIMESTEP - 1e-9)
-        self._sensed = max(
-            round(self._steps * configuration.control_frequency / configuration.physics_frequency), 1
-        )
+        share = configuration.control_frequency / configuration.physics_frequency
+        self._sensed = min(max(round(self._steps * share), 1), self._steps)
         self._finer = math.ceil(self._period / self._steps / FINE_STEP - 1e-9)
         self._periods = 0
         self._names = [actor.name for actor in configuration.objects]
@@ -88,6 +87,7 @@ class MujocoPhysics:
             self._names.index(configuration.disturbance.object) if configuration.disturbance else -1
         )
         self._penetration, self._falling, self._watch = 0.0, False, 0
+        self.deepest_pair: tuple[str, str, float, float] | None = None
         n = len(self._names)
         self._felt = Felt(np.zeros((len(robot.tips), 3)), np.zeros(n), np.zeros(6))
         self._near = Near(np.full(n, np.inf), np.zeros((n, n + len(configuration.fixtures)), bool))

@@ -91,6 +91,7 @@ class SapienPhysics:
         self._bodies: dict[Any, tuple[str, int]] = {}
         self._keep: list[Any] = []
         self._penetration = 0.0
+        self.deepest_pair: tuple[str, str, float, float] | None = None
         self._falling = False
         self._watch = 0
         self._touched: list[bool] = []

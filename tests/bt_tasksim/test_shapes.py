@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull
 
 from bt_tasksim import meshes, poses
 from bt_tasksim.errors import InputError
+from bt_tasksim.mesh_file import mesh_extent
 from bt_tasksim.resources import asset
 from bt_tasksim.scene import Scene
 from bt_tasksim.shapes import (
@@ -244,6 +245,18 @@ def test_same_arguments_give_the_same_object_and_nobody_can_change_it():
     assert shape("box", size) is shape("box", ShapeSize((0.06, 0.05, 0.1)))
     with pytest.raises(ValueError, match="read-only"):
         shape("box", size).visual.vertices[0] = 0
+
+
+def test_a_mesh_file_that_has_changed_is_another_object(tmp_path):
+    file, size = tmp_path / "mine.obj", ShapeSize((0.056, 0.042, 0.146), mesh=str(tmp_path / "mine.obj"))
+    with pytest.raises(InputError, match="no mesh file"):
+        shape("mesh", size)
+    text = asset("objects", "bottle.obj").read_text()
+    file.write_text(text)
+    before, extent = shape("mesh", size), mesh_extent(str(file))
+    assert shape("mesh", size) is before
+    file.write_text("# the same, longer" + chr(10) + text)
+    assert shape("mesh", size) is not before and mesh_extent(str(file)) == extent
 
 
 def test_shapes_need_no_simulator():

@@ -12,6 +12,7 @@ from typing import Any
 from bt_tasksim.engines.noise import noise_model
 from bt_tasksim.engines.remote.plain import shown
 from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.files import file_version
 from bt_tasksim.resources import asset
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.scene import STREAMS, ActorConfiguration
@@ -64,7 +65,7 @@ def mesh_name(path: str) -> str:
     file = Path(path)
     if not file.is_file():
         raise InputError(f"no mesh file '{path}'")
-    return f"{file.name}#{_digest(file, file.stat().st_mtime_ns)}"
+    return f"{file.name}#{_digest(file, file_version(file))}"
 
 
 def find_mesh(name: str, folder: Path | None) -> Path:
@@ -79,7 +80,7 @@ def find_mesh(name: str, folder: Path | None) -> Path:
     places = [asset("objects"), *([folder] if folder is not None else [])]
     found = [place / plain for place in places if (place / plain).is_file()]
     for file in found:
-        if _digest(file, file.stat().st_mtime_ns) == digest:
+        if _digest(file, file_version(file)) == digest:
             return file
     if found:
         raise InputError(f"mesh file '{plain}' is not the same on the server and the client: copy it over")
@@ -152,10 +153,11 @@ def _pose(pose: tuple[float, ...], where: str) -> None:
 
 def _within(values: tuple[float, ...], limits: tuple[float, float], what: str) -> None:
     low, high = limits
-    if not all(low <= v <= high for v in values):
-        raise InputError(f"{what} should lie between {low:g} and {high:g}, found {shown(values[0])}")
+    for value in values:
+        if not low <= value <= high:
+            raise InputError(f"{what} should lie between {low:g} and {high:g}, found {shown(value)}")
 
 
 @lru_cache(maxsize=256)
-def _digest(path: Path, changed: int) -> str:
+def _digest(path: Path, version: tuple[int, ...]) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()

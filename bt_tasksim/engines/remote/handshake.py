@@ -12,6 +12,7 @@ from pathlib import Path
 
 from bt_tasksim.engines.remote.messages import layout_digest
 from bt_tasksim.engines.remote.plain import shown, to_plain
+from bt_tasksim.files import file_version
 from bt_tasksim.robot import RobotDescription
 
 _DIGESTED = {
@@ -42,7 +43,7 @@ def identity(role: str, robot: RobotDescription) -> Identity:
     """This side's own."""
     digests = {
         "robot": _robot_digest(robot),
-        "urdf": _file_digest(robot.urdf, robot.urdf.stat().st_mtime_ns),
+        "urdf": _file_digest(robot.urdf, file_version(robot.urdf)),
         "layouts": layout_digest(),
     }
     return Identity(role, metadata.version("bt-tasksim"), robot.name, digests)
@@ -81,5 +82,5 @@ def _robot_digest(robot: RobotDescription) -> str:
 
 
 @lru_cache(maxsize=32)
-def _file_digest(path: Path, changed: int) -> str:
+def _file_digest(path: Path, version: tuple[int, ...]) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()

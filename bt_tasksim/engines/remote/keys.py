@@ -46,17 +46,23 @@ def make_keys(path: str | Path) -> tuple[Path, Path]:
         Paths of the server's and of the clients' file.
 
     Raises:
-        InputError: One of them exists, or its folder does not.
+        InputError: The path names no file, one of the two exists, or their folder does not.
         MachineError: The disk is full or not writable.
     """
     server = Path(path)
+    if not server.name:
+        raise InputError(f"'{path}' names no file for a key: choose one, such as engine.key")
     client = server.with_name(f"{server.stem}.client{server.suffix}")
     for file in (server, client):
         if file.exists():
             raise InputError(f"'{file}' exists and may be a key in use: choose another name")
     ours, theirs = zmq.curve_keypair(), zmq.curve_keypair()
     _write(server, SERVER, Key(*ours, theirs[0]))
-    _write(client, CLIENT, Key(*theirs, ours[0]))
+    try:
+        _write(client, CLIENT, Key(*theirs, ours[0]))
+    except BaseException:
+        server.unlink(missing_ok=True)  # one without the other opens nothing
+        raise
     return server, client
 
 

@@ -7,6 +7,7 @@ from physics_cases import PHYSICS, G, Still, holding, lifted, scene
 from bt_tasksim import poses
 from bt_tasksim.engines.pipeline import PhysicsEngine
 from bt_tasksim.robot import load_robot
+from bt_tasksim.scene import Scene
 from bt_tasksim.world import Command, JointTarget
 
 KINDS = ("box", "cube", "cup", "cylinder", "oval", "diamond")
@@ -71,6 +72,8 @@ def test_an_overlap_is_recorded_and_remembered(engine):
     assert still.physics.hidden().penetration >= deepest
     fresh = Still(scene().sample(1), engine)
     assert fresh.physics.hidden().penetration < 5e-4
+    still.physics.reset(Scene().sample(0))
+    assert still.physics.hidden().penetration == 0.0 and still.physics.deepest_pair is None
 
 
 # ---- holding ----------------------------------------------------------------------------------------------

@@ -97,6 +97,19 @@ def test_a_drive_at_its_limit_does_not_chatter():
     assert jaw[-1] == pytest.approx(robot.hand_closed[0], abs=0.01)
 
 
+@pytest.mark.parametrize(("control", "physics"), [(20, 100), (200, 100), (100, 100), (1000, 20), (30, 50)])
+def test_a_period_takes_its_time_whatever_the_frequencies(control, physics):
+    engine = MujocoPhysics(load_robot("panda"))
+    rates = {"physics_frequency": physics, "control_frequency": control}
+    state = engine.reset(ActorConfiguration("panda", (), (), (), 0, **rates))
+    target = JointTarget(state.joint_position + 0.01, np.zeros(9))
+    for k in range(1, 9):
+        state = engine.step(target)
+        assert engine._data.time == pytest.approx(k / control) and float(state.time) == pytest.approx(
+            k / control
+        )
+
+
 # ---- friction ---------------------------------------------------------------------------------------------
 
 

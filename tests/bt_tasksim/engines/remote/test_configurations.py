@@ -55,6 +55,24 @@ def test_meshes_are_found_by_name_and_content(tmp_path, robot):
         as_received(sent, robot, there)
 
 
+def test_a_mesh_that_was_changed_on_both_sides_is_built_anew(tmp_path, robot):
+    """However long a server has been there."""
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir(), there.mkdir()
+    filled = []
+    for text in (BOTTLE.read_text(), WEDGE):
+        for folder in (here, there):
+            (folder / "mine.obj").write_text(text)
+        arrived = as_received(for_sending(with_mesh(here / "mine.obj"), robot), robot, there)
+        filled.append(arrived.objects[0].shape().volume)
+    assert filled[1] == pytest.approx(0.056 * 0.042 * 0.146 / 6) and filled[0] > 2 * filled[1]
+
+
+WEDGE = (
+    "".join(f"v {v}\n" for v in ("0 0 0", "1 0 0", "0 1 0", "0 0 1")) + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+)
+
+
 def test_no_other_file_of_the_server_is_looked_at(tmp_path):
     secret = tmp_path / "secret.obj"
     shutil.copy(BOTTLE, secret)
@@ -92,7 +110,8 @@ def _box(world, **changes):
         (lambda w: dataclasses.replace(w, objects=w.objects * 200), "at most 128"),
         (lambda w: dataclasses.replace(w, fixtures=w.fixtures * 200), "at most 128"),
         (lambda w: _object(w, kind="ghost"), "unknown kind 'ghost'"),
-        (lambda w: _object(w, size=(0.0, 0.1, 0.1)), "size should lie between"),
+        (lambda w: _object(w, size=(0.0, 0.1, 0.1)), "size should lie between 0.0001 and 100, found 0.0"),
+        (lambda w: _object(w, size=(0.1, 0.2, 1e4)), "size should lie between 0.0001 and 100, found 10000.0"),
         (lambda w: _object(w, mass=0.0), "mass should lie between"),
         (lambda w: _object(w, friction=-1.0), "friction should lie between"),
         (lambda w: _object(w, colour=(2.0, 0.0, 0.0)), "colour should lie between"),

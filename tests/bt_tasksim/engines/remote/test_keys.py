@@ -7,8 +7,9 @@ import stat
 import pytest
 import zmq
 
+from bt_tasksim.engines.remote import keys
 from bt_tasksim.engines.remote.keys import CLIENT, SERVER, load_key, make_keys
-from bt_tasksim.errors import InputError
+from bt_tasksim.errors import InputError, MachineError
 
 
 @pytest.fixture
@@ -37,6 +38,26 @@ def test_keys_are_never_overwritten(pair):
     with pytest.raises(InputError, match=r"engine.client.key' exists"):
         make_keys(pair[0])
     assert not pair[0].exists()
+
+
+def test_there_are_two_files_or_none(tmp_path, monkeypatch):
+    def full(path, side, key, write=keys._write):
+        if side == CLIENT:
+            raise MachineError("the disk is full")
+        write(path, side, key)
+
+    monkeypatch.setattr(keys, "_write", full)
+    with pytest.raises(MachineError, match="is full"):
+        make_keys(tmp_path / "engine.key")
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.undo()
+    make_keys(tmp_path / "engine.key")
+
+
+@pytest.mark.parametrize("path", [".", "", "/"])
+def test_a_path_without_a_name_is_refused(path):
+    with pytest.raises(InputError, match="names no file for a key"):
+        make_keys(path)
 
 
 def test_the_other_sides_key_is_refused(pair):
