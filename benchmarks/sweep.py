@@ -48,9 +48,14 @@ class Sweep(ConceptModel):
         return np.bool_(seen.elapsed >= self.lasts)
 
 
-def sweeping(port: int) -> tuple[Runner, Sweep]:
-    """A runner of a sweep on the twin behind a rosbridge of this machine."""
+def sweeping(port: int, ros: str = "") -> tuple[Runner, Sweep]:
+    """A runner of a sweep on the twin behind a rosbridge of this machine.
+
+    Args:
+        port: Of rosbridge.
+        ros: File with topics and names; by default the robot's bundled one.
+    """
     leaf = Sweep(name="sweep")
-    runner = Runner(sequence("root", leaf), SCENE, EngineOptions(engines=f"ros:127.0.0.1:{port}"))
+    runner = Runner(sequence("root", leaf), SCENE, EngineOptions(engines=f"ros:127.0.0.1:{port}", ros=ros))
     runner.longest = 10_000.0
     return runner, leaf

@@ -18,8 +18,9 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import yaml
 
-from benchmarks.faults import Bench, measure
+from benchmarks.faults import Bench, bench_of, measure
 from benchmarks.sweep import sweeping
 from bt_tasksim.engines.registry import EngineOptions, build_pipeline
 from bt_tasksim.engines.ros.websocket import WebSocket
@@ -84,6 +85,20 @@ def test_a_fault_ends_in_a_hold_and_a_fresh_run_works(bench: Bench, fault: str, 
     assert seen.held < LATEST and seen.far < 0.15 and seen.drift < 5e-3
     assert re.search(said, seen.said + seen.by), seen
     assert not seen.running and seen.again
+
+
+@pytest.mark.parametrize("fault", ["SIGKILL of the runner", "emergency stop"])
+def test_a_cell_of_ros2_control_alone(bench: Bench, tmp_path: Path, fault: str) -> None:
+    """Nobody announces runs or takes a word to hold: what stops the arm is the watchdog's own trajectory."""
+    data = yaml.safe_load(bench.setting.source.read_text())
+    del data["begin"], data["hold"]
+    data["emergency_stop"] = {"topic": data["emergency_stop"], "every": 1.0}
+    (tmp_path / "cell.yaml").write_text(yaml.safe_dump(data))
+    with bench_of(bench.twin.domain - 1 or 101, str(tmp_path / "cell.yaml")) as plain:
+        seen = measure(plain, fault, seed=0)
+        assert plain.evaluation.tell()["refused"] == 0
+    assert seen.held < LATEST and seen.far < 0.15 and seen.drift < 5e-3
+    assert not seen.running and seen.again, seen
 
 
 def test_no_bridge_and_silent_topics_are_said(bench: Bench, tmp_path: Path) -> None:
@@ -262,7 +277,7 @@ def test_pictures_of_a_camera_in_the_cell(bench: Bench, caplog: Any) -> None:
     pipeline = build_pipeline(robot, options)
     try:
         engine, cameras = pipeline.physics.engine, pipeline.rendering
-        engine.reset(bench.configuration)
+        engine.reset(bench.configuration, lambda: None)
         state = engine.state(engine.latest())
         assert state.objects is None  # nothing is tracked where there are pictures
         cameras.reset(bench.configuration)
