@@ -120,13 +120,18 @@ class RealEngine(Protocol):
 
     emergency: EmergencyStop
 
-    def reset(self, configuration: ActorConfiguration) -> None:
+    def reset(self, configuration: ActorConfiguration, beat: Callable[[], None]) -> None:
         """Begin a run: connect, end a hold, bring the arm to where an episode starts, wait until it is still.
 
         The guard does not see this motion: `bt_tasksim.safety.motion.approach` makes one within limits.
 
+        Args:
+            configuration: The world.
+            beat: To be called all the time that the arm moves, as often as a command follows another:
+                the watchdog holds the arm when it is called no more.
+
         Raises:
-            MachineError: There is no robot, or it does not come to rest.
+            MachineError: There is no robot, it does not come to rest, or `beat` says to stop.
         """
 
     def send(self, target: JointTarget) -> None:

@@ -16,7 +16,7 @@ from bt_tasksim.robot import RobotDescription
 from bt_tasksim.safety import checks
 from bt_tasksim.safety.checks import Breach
 from bt_tasksim.safety.engine import JointReading
-from bt_tasksim.safety.limits import SafetyLimits
+from bt_tasksim.safety.limits import MARGIN, REACTION, SafetyLimits
 from bt_tasksim.safety.motion import Motion, braked, followed, moved, resting
 from bt_tasksim.world import JointTarget
 
@@ -58,15 +58,9 @@ class Guard:
             period: Seconds between two commands.
 
         Raises:
-            InputError: Commands would expire between two of them.
+            InputError: See `check_period`.
         """
-        if 2.0 * period > self.limits.validity:
-            raise InputError(
-                f"commands every {1000 * period:.0f} ms cannot expire after "
-                f"{1000 * self.limits.validity:.0f} ms: raise the control frequency to "
-                f"{2.0 / self.limits.validity:.1f} Hz at least, or raise safety.timing.validity in "
-                f"'{self.robot.source}'"
-            )
+        self.check_period(period)
         self.period, self._shortest = period, self.limits.validity - period
         self.stopped = None
         still = np.zeros_like(position)
@@ -76,6 +70,29 @@ class Guard:
         self._twist = np.zeros(6)
         self._reading: JointReading | None = None
         self._changed: tuple[float, Array] | None = None
+
+    def check_period(self, period: float) -> None:
+        """See that the limits' times suit the seconds between two commands; nothing else happens.
+
+        Raises:
+            InputError: Commands would expire, or beats be missed, between two of them, or old joint states
+                would be noticed too late.
+        """
+        limits = self.limits
+        for most, what, how in (
+            (limits.validity / 2.0, f"cannot expire after {1000 * limits.validity:.0f} ms", "raise validity"),
+            (limits.watchdog / 1.5, f"suit no watchdog of {1000 * limits.watchdog:.0f} ms", "raise watchdog"),
+            (
+                REACTION - MARGIN - limits.stale,
+                f"notice states of {1000 * limits.stale:.0f} ms too late to hold in {1000 * REACTION:.0f} ms",
+                "lower stale",
+            ),
+        ):
+            if period > most + 1e-9:
+                raise InputError(
+                    f"commands every {1000 * period:.0f} ms {what}: raise the control frequency, or {how} of "
+                    f"safety.timing in '{self.robot.source}'"
+                )
 
     # ---- commands ---------------------------------------------------------------------------------------
 

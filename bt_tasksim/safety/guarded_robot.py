@@ -64,13 +64,17 @@ class GuardedRobot:
             raise
 
     def _begin(self, configuration: ActorConfiguration) -> WorldState:
-        self.engine.reset(configuration)
-        self.guard.begin(self.engine.latest().position, 1.0 / configuration.control_frequency)
+        period = 1.0 / configuration.control_frequency
+        self.guard.check_period(period)
+        self.engine.reset(configuration, self._beat)
+        if self.watchdog is not None:  # the arm stands until the first command
+            self.watchdog.rest()
+        self.guard.begin(self.engine.latest().position, period)
         if why := self.engine.emergency.why:  # meanwhile, and `begin` has forgotten the stop
             raise self.guard.stop("emergency_stop", f"emergency stop: {why}")
         state = self._read()
         self._sent = 0.0
-        self.clock.start(1.0 / configuration.control_frequency)
+        self.clock.start(period)
         return state
 
     def step(self, target: JointTarget) -> WorldState:
@@ -80,8 +84,9 @@ class GuardedRobot:
             SafetyStop: Something was wrong; the arm holds, and will until `reset`.
         """
         try:
-            self._before(time.monotonic())
-            self._send(self.guard.command(target))
+            checked = time.monotonic()
+            self._before(checked)
+            self._send(self.guard.command(target), checked)
             self.clock.acted(self._sent - self._stamp)
             self.clock.wait()
             self._beat()
@@ -136,11 +141,13 @@ class GuardedRobot:
         if channel is not None:
             self.watchdog = Watchdog(channel, self.guard.limits.watchdog)
 
-    def _send(self, target: JointTarget) -> None:
-        """Send, unless another thread has stopped the robot meanwhile: nothing follows a hold."""
+    def _send(self, target: JointTarget, checked: float) -> None:
+        """Send, unless another thread has stopped the robot since the checks, or those are too old."""
         with self._lock:
             if self.guard.stopped is not None:
                 raise self.guard.stopped
+            if (late := time.monotonic() - checked) > self.guard.period:
+                raise self.guard.stop("late", f"late: checked {1000 * late:.0f} ms before it could be sent")
             self.engine.send(target)
             self._sent = time.monotonic()
 

@@ -21,7 +21,7 @@ CLIPPING = ("joint_position", "joint_velocity", "joint_acceleration", "tool_acce
 """Limits that may be clipped: the motion goes on, slower or less far. Beyond the others it makes no sense."""
 REACTION = 0.25
 """Longest time in seconds from a fault until the arm holds."""
-_MARGIN = 0.05
+MARGIN = 0.05
 """Seconds of `REACTION` that are left for a process to wake up and for the message to arrive."""
 
 
@@ -170,9 +170,9 @@ def _times(data: Any) -> dict[str, float]:
     check_keys(data, "safety.timing.", {}, dict.fromkeys(_TIMES))
     times = {key: positive(data.get(key, value), f"safety.timing.{key}") for key, value in _TIMES.items()}
     for key, value in times.items():
-        if value > REACTION - _MARGIN:
+        if value > REACTION - MARGIN:
             raise InputError(
-                f"safety.timing.{key} should be at most {REACTION - _MARGIN:g} s, found {value:g}: a robot "
+                f"safety.timing.{key} should be at most {REACTION - MARGIN:g} s, found {value:g}: a robot "
                 f"holds within {REACTION:g} s of a fault"
             )
     return times

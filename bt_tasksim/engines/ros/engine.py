@@ -104,7 +104,7 @@ class RosRobot:
 
     # ---- a run begins -----------------------------------------------------------------------------------
 
-    def reset(self, configuration: ActorConfiguration) -> None:
+    def reset(self, configuration: ActorConfiguration, beat: Callable[[], None]) -> None:
         """See `RealEngine.reset`: connect where need be, end a hold, bring the arm to its start.
 
         Raises:
@@ -126,7 +126,7 @@ class RosRobot:
         goal = np.array(
             configuration.joint_position or np.concatenate([self.robot.rest, self.robot.hand_open])
         )
-        self._approach(goal)
+        self._approach(goal, beat)
         self.began = time.monotonic()
 
     def _connected(self, configuration: ActorConfiguration) -> Link:
@@ -195,7 +195,7 @@ class RosRobot:
                 silent.append(topic)
         return silent
 
-    def _approach(self, goal: Array) -> None:
+    def _approach(self, goal: Array, beat: Callable[[], None]) -> None:
         """Go to where the run begins, slowly, and wait until the arm stands there.
 
         Raises:
@@ -207,6 +207,7 @@ class RosRobot:
         following = time.monotonic()
         for motion in approach(start, goal, speed, acceleration, period):
             following = max(following, time.monotonic())  # what was late is not made up for
+            beat()
             self._send(JointTarget(motion.position, motion.velocity, self.limits.validity), period)
             following += period
             time.sleep(max(following - time.monotonic(), 0.0))
@@ -217,6 +218,7 @@ class RosRobot:
                 )
         end = time.monotonic() + SETTLE
         while True:
+            beat()
             reading = self._checked()
             off = np.abs(reading.position - goal)[:n]
             if np.all(off < STILL[1]) and np.all(np.abs(reading.velocity[:n]) < STILL[0]):
@@ -249,7 +251,7 @@ class RosRobot:
                 f"{self.setting.joint_states}: joints in another order, or no numbers; see its file"
             )
         age = time.monotonic() - reading.stamp
-        if age > STALE:
+        if age > self.limits.stale:
             raise MachineError(f"{self.setting.joint_states} is silent for {1000 * age:.0f} ms")
         if breach := checks.wrench(self._wrench(), self.limits.force, self.limits.torque):
             raise MachineError(breach.sentence)
@@ -376,7 +378,9 @@ class RosRobot:
     def _wrench(self) -> Array:
         """The external wrench ``(6,)`` at the tool, tool frame."""
         sensor = self.setting.wrench
-        return messages.in_tool_frame(self._fresh(sensor.topic, time.monotonic(), STALE), sensor.pose)
+        return messages.in_tool_frame(
+            self._fresh(sensor.topic, time.monotonic(), self.limits.stale), sensor.pose
+        )
 
     def _tip_force(self, effort: Array, now: float) -> Array:
         """Forces ``(n_tips, 3)``: as felt, or of the drives' size where there are no sensors."""

@@ -89,7 +89,7 @@ class ArmEngine:
         self._lost = ""
         self._run = ""
 
-    def reset(self, configuration: Any) -> None:
+    def reset(self, configuration: Any, beat: Any) -> None:
         self.close()
         self._lost, self._reading, self._run = "", None, uuid.uuid4().hex
         self._began = time.monotonic()

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arm import ArmProcess, runner_of
+from arm import SCENE, ArmProcess, runner_of
 from faults import FAULTS, QUIET, measure
 
-from bt_tasksim.errors import MachineError, SafetyStop
+from bt_tasksim.errors import InputError, MachineError, SafetyStop
 from bt_tasksim.safety.limits import REACTION
 
 SAID = {
@@ -96,8 +96,8 @@ def test_an_emergency_stop_while_a_run_begins_counts(arm):
     engine = runner.pipeline.physics.engine
     reset = engine.reset
 
-    def pressed(configuration):
-        reset(configuration)
+    def pressed(configuration, beat):
+        reset(configuration, beat)
         engine.emergency.press("too early")
 
     engine.reset = pressed
@@ -106,6 +106,45 @@ def test_an_emergency_stop_while_a_run_begins_counts(arm):
     assert arm.stopped()["commands"] == 0 and leaf.ended == []
     engine.reset, leaf.lasts = reset, 0.2
     assert runner.run(0).success
+    runner.pipeline.close()
+
+
+def test_the_watchdog_watches_the_way_to_the_start_and_rests_then(arm):
+    runner, leaf = runner_of(arm.port)
+    engine = runner.pipeline.physics.engine
+    reset = engine.reset
+
+    def hangs(configuration, beat):
+        reset(configuration, beat)
+        beat()
+        time.sleep(0.4)
+        beat()
+
+    engine.reset = hangs
+    with pytest.raises(SafetyStop, match="the watchdog has stopped the robot: no sign of life"):
+        runner.run(0)
+    assert arm.stopped()["latched"].startswith("no sign of life") and leaf.ended == []
+    engine.reset = lambda configuration, beat: (reset(configuration, beat), beat())
+    leaf.lasts, leaf.begin = 0.3, lambda seen: (time.sleep(0.4), seen.tool.copy())[1]
+    assert runner.run(0).success, "a leaf may plan before its first command"
+    runner.pipeline.close()
+
+
+def test_nothing_moves_where_the_period_does_not_suit_the_limits(arm):
+    runner, _ = runner_of(arm.port)
+    with pytest.raises(InputError, match="every 100 ms cannot expire"):
+        runner.reset(replace(SCENE.sample(0), control_frequency=10))
+    assert arm.tell()["latched"] == "no run has begun"
+    runner.pipeline.close()
+
+
+def test_a_command_that_was_held_up_after_its_checks_is_not_sent(arm):
+    runner, leaf = runner_of(arm.port)
+    physics = runner.pipeline.physics
+    command = physics.guard.command
+    physics.guard.command = lambda target: (time.sleep(0.07 * (leaf.context.now > 0.3)), command(target))[1]
+    result = runner.run(0)
+    assert result.reason == "safety stop, late" and "before it could be sent" in result.why
     runner.pipeline.close()
 
 

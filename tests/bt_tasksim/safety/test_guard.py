@@ -259,9 +259,24 @@ def test_a_robot_without_limits_is_not_driven():
         Guard(dataclasses.replace(ROBOT, safety=None), KINEMATICS.forward)
 
 
-def test_commands_must_come_more_often_than_they_expire():
-    with pytest.raises(InputError, match=r"every 100 ms cannot expire after 150 ms: .* to 13.3 Hz at least"):
-        guard_of().begin(START, 0.1)
+@pytest.mark.parametrize(
+    ("times", "sentence"),
+    [
+        ({}, r"every 100 ms cannot expire after 150 ms: raise the control frequency, or raise validity of"),
+        ({"validity": 0.2, "watchdog": 0.1}, r"every 100 ms suit no watchdog of 100 ms: .* raise watchdog"),
+        (
+            {"validity": 0.2, "stale": 0.15},
+            r"notice states of 150 ms too late to hold in 250 ms: .* lower stale",
+        ),
+    ],
+)
+def test_a_period_must_suit_the_limits_times(times, sentence):
+    guard = guard_of(**times)
+    with pytest.raises(InputError, match=sentence):
+        guard.begin(START, 0.1)
+    with pytest.raises(InputError, match=sentence):
+        guard.check_period(0.1)
+    guard.check_period(0.05)
 
 
 # ---- states -----------------------------------------------------------------------------------------------

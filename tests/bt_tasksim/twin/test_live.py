@@ -27,11 +27,12 @@ from bt_tasksim.engines.ros.websocket import WebSocket
 from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.judge import at_rest, judge
 from bt_tasksim.robot import load_robot
+from bt_tasksim.safety.limits import REACTION
 from trees.load import load_source
 
 ROOT = Path(__file__).parents[3]
-LATEST = 0.35
-"""Seconds until a hold; measured on an idle machine it is at most 0.25, see docs/twin.md."""
+LATEST = REACTION
+"""Seconds until a hold."""
 
 
 def on_the_command_line(*words: str) -> subprocess.CompletedProcess[str]:

@@ -12,7 +12,7 @@ import yaml
 
 from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
 from bt_tasksim.engines.remote.address import Address
-from bt_tasksim.engines.ros.engine import STALE, RosRobot
+from bt_tasksim.engines.ros.engine import RosRobot
 from bt_tasksim.engines.ros.messages import RefusedError
 from bt_tasksim.engines.ros.setting import load_setting
 from bt_tasksim.errors import InputError, MachineError
@@ -191,14 +191,16 @@ def test_the_way_to_the_start_does_not_make_up_for_lost_time(monkeypatch: Any) -
     def stalls() -> Any:
         calls.append(True)
         if len(calls) == 4:
-            time.sleep(0.2)
+            time.sleep(0.04)
         return checked()
 
     monkeypatch.setattr(robot, "_checked", stalls)
     goal = START.copy()
     goal[0] += 0.05
-    robot._approach(goal)
+    beats: list[float] = []
+    robot._approach(goal, lambda: beats.append(time.monotonic()))
     assert len(robot.link.times) > 6
+    assert len(beats) > len(robot.link.times) and np.max(np.diff(beats)) < 0.1, "the watchdog watches"
     assert np.min(np.diff(robot.link.times)) > 0.03  # of a period of 0.05 s
 
 
@@ -208,7 +210,7 @@ def test_the_way_to_the_start_ends_where_something_pushes(monkeypatch: Any) -> N
     goal[0] += 0.05
     robot._newest[robot.setting.wrench.topic].value[:3] = (0.0, 0.0, 1000.0)
     with pytest.raises(MachineError, match=r"force on the tool 1e\+03 N"):
-        robot._approach(goal)
+        robot._approach(goal, lambda: None)
     assert not robot.link.times
 
 
@@ -223,7 +225,7 @@ def test_an_emergency_stop_tapped_while_a_run_begins(monkeypatch: Any) -> None:
     monkeypatch.setattr(robot, "_connected", connected)
     monkeypatch.setattr(robot, "_expect_messages", lambda: None)
     with pytest.raises(MachineError, match="the emergency stop was pressed: /emergency_stop"):
-        robot.reset(Scene("panda", objects={"cup": "on table"}).sample(0))
+        robot.reset(Scene("panda", objects={"cup": "on table"}).sample(0), lambda: None)
     assert not robot.link.sent
 
 
@@ -237,7 +239,7 @@ def test_old_forces_and_unseen_objects_are_errors() -> None:
     with pytest.raises(MachineError, match="nothing has come on /objects/cup/pose"):
         robot.state(robot.latest())
     robot._objects = ()
-    time.sleep(STALE + 0.02)
+    time.sleep(robot.limits.stale + 0.02)
     with pytest.raises(MachineError, match="stale: nothing usable on /wrist/wrench"):
         robot.state(robot.latest())
 
