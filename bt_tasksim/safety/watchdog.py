@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import select
 import subprocess
@@ -13,7 +14,7 @@ from dataclasses import asdict
 
 from bt_tasksim.errors import MachineError
 from bt_tasksim.safety.engine import ChannelSpec
-from bt_tasksim.safety.watchdog_process import BEAT, DONE, HOLD, RECORD
+from bt_tasksim.safety.watchdog_process import BEAT, DONE, ECHO, HOLD, RECORD
 
 START = 20.0
 """Longest time in seconds that the process may take to start."""
@@ -44,6 +45,7 @@ class Watchdog:
         assert self._process.stdin is not None and self._process.stdout is not None
         self._in, self._out = self._process.stdin.fileno(), self._process.stdout.fileno()
         self._heard, self._why = b"", ""
+        self._deadline, self._unanswered = deadline, math.inf
         setting = {**asdict(channel), "deadline": deadline}
         try:
             os.write(self._in, json.dumps(setting).encode() + b"\n")
@@ -67,27 +69,35 @@ class Watchdog:
 
     def beat(self) -> None:
         """Give a sign of life; the first one begins the watch."""
+        self._unanswered = min(self._unanswered, time.monotonic())
         self._write(BEAT)
 
     def rest(self) -> None:
         """End the watch, until the next beat."""
+        self._unanswered = math.inf
         self._write(DONE)
 
     def hold(self) -> None:
-        """Have it stop the robot now."""
+        """Have it stop the robot now; another one is needed after that."""
         self._write(HOLD)
+        self._why = self._why or "the watchdog was told to stop the robot"
 
     def trouble(self) -> str:
-        """What is wrong, as a sentence: it has stopped the robot, or is gone; empty where all is well."""
+        """What is wrong, as a sentence: it has stopped the robot, hangs, or is gone; empty if all is well."""
         if self._why:
             return self._why
         with contextlib.suppress(BlockingIOError):
-            self._heard += os.read(self._out, 1 << 12)
+            self._heard += os.read(self._out, 1 << 16)
+        if ECHO in self._heard:
+            self._heard, self._unanswered = self._heard.replace(ECHO, b""), math.inf
+        silent = time.monotonic() - self._unanswered
         if b"\n" in self._heard:
             word, _, why = self._heard.partition(b"\n")[0].decode().partition(" ")
             self._why = f"the watchdog has stopped the robot: {why}" if word == "held" else f"watchdog: {why}"
         elif self._process.poll() is not None:
             self._why = "the watchdog's process has ended"
+        elif silent > self._deadline:
+            self._why = f"the watchdog does not answer for {1000 * silent:.0f} ms"
         return self._why
 
     def close(self) -> None:

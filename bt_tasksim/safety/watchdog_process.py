@@ -2,8 +2,9 @@
 
 It reads from its standard input one JSON line that says how to reach the robot, and then records of nine
 bytes: a letter and a time of the monotonic clock. ``B`` is a beat, and the first one begins the watch; ``D``
-ends it, ``H`` asks for a hold at once. The end of the input is the end of the runner. What it did it says on
-its standard output, one line each, beginning with ``ready``, ``held`` or ``failed``. It imports the standard
+ends it, ``H`` asks for a hold at once. The end of the input is the end of the runner. Each reading of beats it
+answers with the byte `ECHO`; what it did it says on its standard output, one line each, beginning with
+``ready``, ``held`` or ``failed``. It imports the standard
 library and what the channel needs, and nothing else, so that whatever happens to the runner, this goes on.
 """
 
@@ -22,6 +23,7 @@ from typing import Any
 
 RECORD = struct.Struct("<cd")
 BEAT, DONE, HOLD = b"B", b"D", b"H"
+ECHO = b"\x06"
 
 
 class Watch:
@@ -70,6 +72,7 @@ def main() -> int:
         _say(f"failed {type(error).__name__}: {error}")
         return 1
     _say("ready")
+    os.set_blocking(1, False)  # a runner that does not listen must not keep this from its watch
     watch = Watch(float(setting["deadline"]))
 
     def hold(why: str) -> None:
@@ -92,6 +95,8 @@ def main() -> int:
                 return 0
             if watch.feed(data):
                 hold("the runner asked for it")
+            with contextlib.suppress(OSError):
+                os.write(1, ECHO)
         now = time.monotonic()
         left = watch.left(now)
         if left is not None and left <= 0.0:

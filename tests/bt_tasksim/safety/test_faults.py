@@ -130,6 +130,23 @@ def test_the_watchdog_watches_the_way_to_the_start_and_rests_then(arm):
     runner.pipeline.close()
 
 
+def test_a_watchdog_that_had_to_stop_the_arm_is_replaced(arm):
+    runner, leaf = runner_of(arm.port)
+    physics = runner.pipeline.physics
+    hold = physics.engine.hold
+
+    def fails(why, here):
+        raise MachineError("the connection to the arm is lost")
+
+    physics.engine.hold = fails
+    leaf.lasts = 0.3
+    runner.run(0)
+    assert arm.stopped()["latched"] == "the runner asked for it"
+    first, physics.engine.hold = physics.watchdog.pid, hold
+    assert runner.run(0).success and physics.watchdog.pid != first
+    runner.pipeline.close()
+
+
 def test_nothing_moves_where_the_period_does_not_suit_the_limits(arm):
     runner, _ = runner_of(arm.port)
     with pytest.raises(InputError, match="every 100 ms cannot expire"):

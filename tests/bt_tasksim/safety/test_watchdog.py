@@ -1,6 +1,7 @@
 """The watchdog's process: when it holds, what it says, and that the runner notices its end."""
 
 import os
+import re
 import signal
 import socket
 import struct
@@ -108,6 +109,23 @@ def test_the_runner_notices_that_it_was_killed(watchdog):
     time.sleep(0.1)
     watchdog.beat()
     assert watchdog.trouble() == "the watchdog's process has ended"
+
+
+def test_the_runner_notices_that_it_hangs(watchdog):
+    beating(watchdog, 0.3)
+    assert watchdog.trouble() == ""
+    os.kill(watchdog.pid, signal.SIGSTOP)
+    try:
+        beating(watchdog, DEADLINE + 0.05)
+        assert re.match(r"the watchdog does not answer for (1|2)\d\d ms", watchdog.trouble())
+    finally:
+        os.kill(watchdog.pid, signal.SIGCONT)
+
+
+def test_one_that_was_told_to_hold_serves_no_other_run(watchdog, line):
+    beating(watchdog, 0.1)
+    watchdog.hold()
+    assert watchdog.trouble() == "the watchdog was told to stop the robot"
 
 
 def test_it_holds_at_once_when_the_runner_is_gone(line):
