@@ -494,15 +494,15 @@ def _twin(options: argparse.Namespace) -> int:
             camera=options.camera,
         ) as twin,
     ):
-        print(f"twin of {scene.robot}, seed {options.seed}, in real time; Ctrl-C ends it")
         chosen = f" --robot {options.robot}" if options.robot else ""
         chosen += f" --ros {options.ros}" if options.ros else ""
         where = f"--seed {options.seed} --engines ros:127.0.0.1:{twin.port}"
-        print(f"  bt-tasksim run {options.tree}{chosen} {where}")
-        print(f"  evaluation channel at port {twin.evaluation_port}", flush=True)
         try:
+            print(f"twin of {scene.robot}, seed {options.seed}, in real time; Ctrl-C ends it")
+            print(f"  bt-tasksim run {options.tree}{chosen} {where}")
+            print(f"  evaluation channel at port {twin.evaluation_port}", flush=True)
             raise MachineError(twin.wait())
-        except KeyboardInterrupt:  # SIGTERM, too
+        except KeyboardInterrupt:  # SIGTERM and SIGHUP, too
             return 0
 
 

@@ -67,7 +67,7 @@ class LeafError(BtTasksimError, RuntimeError):
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, where it is to end things in order as Ctrl-C does."""
+    """SIGTERM or SIGHUP, where it is to end things in order as Ctrl-C does."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

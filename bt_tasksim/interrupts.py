@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: whom they reach, and what they must not break off."""
+"""Ctrl-C, SIGTERM and SIGHUP: whom they reach, and what they must not break off."""
 
 from __future__ import annotations
 
@@ -33,29 +33,34 @@ def held_back(spawning: bool = False) -> Iterator[None]:
 
 @contextmanager
 def terminable() -> Iterator[None]:
-    """SIGTERM raises `Terminated` in the block, unless it is handled already; on the main thread only."""
-    main = threading.current_thread() is threading.main_thread()
-    if not main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+    """SIGTERM and SIGHUP, of a terminal that goes away, raise `Terminated` in the block.
+
+    Not those that are handled or ignored already (nohup), and on the main thread only.
+    """
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def terminate(number: int, frame: Any) -> None:
         raise Terminated
 
-    signal.signal(signal.SIGTERM, terminate)
+    unhandled = [n for n in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) is signal.SIG_DFL]
+    for number in unhandled:
+        signal.signal(number, terminate)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number in unhandled:
+            signal.signal(number, signal.SIG_DFL)
 
 
 @contextmanager
 def ending() -> Iterator[None]:
-    """What ends things in order is not broken off by a second Ctrl-C or SIGTERM, which count for nothing."""
+    """What ends things in order is not broken off by a second signal of these, which counts for nothing."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     for number, handler in before.items():
         if callable(handler):
             signal.signal(number, lambda number, frame: None)

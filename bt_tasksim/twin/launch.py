@@ -19,10 +19,12 @@ import yaml
 
 from bt_tasksim.engines.ros.setting import load_setting
 from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.interrupts import ending
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.scene import ActorConfiguration
 from bt_tasksim.twin.environment import bridge_binary, bridge_variables, environment, root, ros_variables
 from bt_tasksim.twin.gap import load_gap
+from bt_tasksim.twin.orphans import note_bridge
 
 START = 30.0
 """Longest time in seconds that a process may take to start."""
@@ -92,6 +94,7 @@ class Twin:
             *("--robot", str(robot_file), "--ros", str(setting.source), "--configuration", str(world)),
             *("--seed", str(seed), "--evaluation-port", str(self.evaluation_port)),
             *(("--gap", os.path.abspath(gap)) if gap else ()),
+            *("--parent", str(os.getpid()), "--home", str(self._home)),
         ]
         try:
             self.start_bridge()
@@ -118,6 +121,7 @@ class Twin:
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
+        note_bridge(self._home, self.bridge.pid, binary)
         end = time.monotonic() + START
         while time.monotonic() < end:
             if self.bridge.poll() is not None:
@@ -182,24 +186,28 @@ class Twin:
 
     def close(self) -> None:
         """End every process."""
-        for process in (self.camera, self.node, self.bridge):
-            if process is None:
-                continue
-            process.terminate()
-            try:
-                process.wait(3.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-            if process.stdout is not None:
-                process.stdout.close()
-        shutil.rmtree(self._home, ignore_errors=True)
+        with ending():
+            for process in (self.camera, self.node, self.bridge):
+                if process is not None:
+                    _end(process)
+            shutil.rmtree(self._home, ignore_errors=True)
 
     def __enter__(self) -> Twin:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _end(process: subprocess.Popen[Any]) -> None:
+    process.terminate()
+    try:
+        process.wait(3.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    if process.stdout is not None:
+        process.stdout.close()
 
 
 def _wait_until_ready(process: subprocess.Popen[Any], name: str) -> None:

@@ -39,6 +39,7 @@ from bt_tasksim.twin.cell import Cell, Readings
 from bt_tasksim.twin.controller import MOST_POINTS, RefusedError, Trajectory
 from bt_tasksim.twin.evaluation import EvaluationServer, hidden_to_json
 from bt_tasksim.twin.gap import load_gap
+from bt_tasksim.twin.orphans import clear_up, is_orphan
 
 SENSOR_FAULTS = ("silent", "frozen", "delayed", "nan", "order")
 DELAY = 0.3
@@ -225,14 +226,14 @@ class TwinNode(Node):  # type: ignore[misc]
             print(f"twin: {sentence}", file=sys.stderr, flush=True)
 
 
-def run(node: TwinNode, server: EvaluationServer) -> None:
-    """Run until ROS is shut down."""
+def run(node: TwinNode, server: EvaluationServer, parent: int) -> None:
+    """Run until ROS is shut down, or the process that started this one is gone."""
     executor = SingleThreadedExecutor()
     executor.add_node(node)
 
     def going() -> bool:
         server.answer(node.answer)
-        return bool(rclpy.ok())
+        return bool(rclpy.ok()) and not is_orphan(parent)
 
     loop.run(node.cell.period, going, executor.spin_once, node.step, node.leave_out)
 
@@ -271,6 +272,8 @@ def main() -> int:
     parser.add_argument("--gap", default="", metavar="FILE")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--evaluation-port", type=int, default=0)
+    parser.add_argument("--parent", type=int, default=0, metavar="PID", help="without it, the twin ends")
+    parser.add_argument("--home", default="", metavar="DIR", help="to be cleared up then")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
@@ -288,7 +291,7 @@ def main() -> int:
     node = TwinNode(cell, setting)
     print(f"ready {server.port}", flush=True)
     try:
-        run(node, server)
+        run(node, server, options.parent)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
     except BtTasksimError as error:
@@ -298,6 +301,8 @@ def main() -> int:
         server.close()
         node.destroy_node()
         rclpy.try_shutdown()
+        if options.home and is_orphan(options.parent):
+            clear_up(Path(options.home))
     return 0
 
 

@@ -40,12 +40,23 @@ def test_this_thread_is_interrupted_afterwards():
     assert reached and signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, set())
 
 
-def test_sigterm_is_an_interrupt_where_it_is_asked_for():
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_is_an_interrupt_where_it_is_asked_for(number):
     reached = False
     with pytest.raises(Terminated), terminable():
-        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(number)
         reached = True
-    assert not reached and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert not reached and signal.getsignal(number) is signal.SIG_DFL
+
+
+def test_a_hangup_that_is_ignored_stays_so():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    try:
+        with terminable():
+            signal.raise_signal(signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_sigterm_that_is_handled_already_stays_so():
@@ -65,6 +76,7 @@ def test_an_ending_is_not_broken_off():
         with ending():
             signal.raise_signal(signal.SIGINT)
             signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGHUP)
             done = True
         assert done
         with pytest.raises(Terminated):

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,21 @@ WORLD = Scene("panda", objects={"cup": "on table"}).sample(0)
 
 def words(*more: str) -> list[str]:
     return [sys.executable, "-m", "bt_tasksim.cli", "twin", *more]
+
+
+def listens(port: int) -> bool:
+    try:
+        socket.create_connection(("127.0.0.1", port), 1.0).close()
+    except OSError:
+        return False
+    return True
+
+
+def within(seconds: float, happens: Callable[[], bool]) -> bool:
+    end = time.monotonic() + seconds
+    while not (done := happens()) and time.monotonic() < end:
+        time.sleep(0.1)
+    return done
 
 
 @pytest.fixture
@@ -72,13 +88,14 @@ def test_a_robot_without_its_topics(made, tmp_path) -> None:
         Twin(load_robot("panda"), WORLD, ros="x.yaml")
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_with_everything_it_started(made, stop: signal.Signals) -> None:
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+def test_it_ends_with_everything_it_started(made, tmp_path: Path, stop: signal.Signals) -> None:
     port = free_port()
     domain = str(1 + os.getpid() % 100)
     process = subprocess.Popen(
         words("--port", str(port), "--domain", domain),
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     assert process.stdout is not None
@@ -86,7 +103,6 @@ def test_it_ends_with_everything_it_started(made, stop: signal.Signals) -> None:
     assert "in real time" in lines[0] and f"ros:127.0.0.1:{port}" in lines[1]
     process.send_signal(stop)
     _, err = process.communicate(timeout=15)
-    assert process.returncode == 0 and not err, err
-    time.sleep(0.2)
-    with pytest.raises(OSError):
-        socket.create_connection(("127.0.0.1", port), 1.0)
+    assert process.returncode == (-stop if stop == signal.SIGKILL else 0) and not err, err
+    assert within(5.0, lambda: not listens(port) and not listens(int(lines[2].split()[-1])))
+    assert within(5.0, lambda: not list(tmp_path.iterdir()))
