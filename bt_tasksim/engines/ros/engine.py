@@ -11,7 +11,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -100,6 +100,7 @@ class RosRobot:
     def _forget(self) -> None:
         """Only what arrives from now on counts."""
         self.joints.forget()
+        self._told: Array | None = None
         self._newest: dict[str, Newest] = {}
 
     # ---- a run begins -----------------------------------------------------------------------------------
@@ -287,9 +288,9 @@ class RosRobot:
                 raise MachineError("the robot holds until a new run begins")
             link = self._alive()
             self._announce(link)
-            link.publish(setting.arm.command, messages.trajectory(setting.arm.joints, arm, self._run))
-            closing = (Point(hand, None, period),)
-            link.publish(setting.hand.command, messages.trajectory(setting.hand.joints, closing, self._run))
+            self._told, closing = arm[0].position, (Point(hand, None, period),)
+            for group, points in ((setting.arm, arm), (setting.hand, closing)):
+                link.publish(group.command, messages.trajectory(group.joints, points, self._run), period)
 
     def _announce(self, link: Link) -> None:
         """Say that this run has begun; a cell that knows it, or has ended it, does nothing about that."""
@@ -317,9 +318,16 @@ class RosRobot:
         ):
             return []
         velocity = np.clip(np.nan_to_num(joints.velocity[:n]), -limits.velocity, limits.velocity)
-        return [
-            messages.standing(joints.position[:n], velocity, limits.acceleration, limits.lower, limits.upper)
-        ]
+        point = messages.standing(
+            joints.position[:n], velocity, limits.acceleration, limits.lower, limits.upper
+        )
+        # A controller goes there from where it was told to be, and at most 1.5 times as fast as on average.
+        way = (
+            0.0
+            if self._told is None
+            else float(np.max(np.abs(point.position - self._told) / limits.velocity))
+        )
+        return [replace(point, time=max(point.time, 1.5 * way))]
 
     def hold_channel(self) -> ChannelSpec | None:
         """See `RealEngine.hold_channel`: a connection of its own to the same bridge."""

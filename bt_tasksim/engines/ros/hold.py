@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from bt_tasksim.engines.ros.websocket import WebSocket
 
-FRESH = 0.5
+FRESH = 0.1
 """Seconds for which a position counts as the robot's present one."""
 STOP = 0.1
 """Least seconds in which the arm is told to come to stand."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -67,7 +68,7 @@ class Link:
         self._roslibpy = roslibpy
         self._complaints = Complaints(complain)
         self._topics: dict[str, Any] = {}
-        self._slots: dict[str, dict[str, Any]] = {}
+        self._slots: dict[str, tuple[dict[str, Any] | None, float]] = {}
         self._lock = threading.Lock()
         logging.getLogger("roslibpy").setLevel(logging.CRITICAL)  # what it would say is said here
         self._ros: Any = roslibpy.Ros(address.host, address.port, transport="asyncio")
@@ -115,8 +116,13 @@ class Link:
         self._topics[topic] = made
         made.advertise()
 
-    def publish(self, topic: str, message: dict[str, Any]) -> None:
+    def publish(self, topic: str, message: dict[str, Any], within: float = math.inf) -> None:
         """Publish a message on an advertised topic; one that has not left yet is replaced by it.
+
+        Args:
+            topic: Its name.
+            message: The message.
+            within: Seconds in which it must leave this process; it is dropped then.
 
         Raises:
             MachineError: The connection is lost.
@@ -125,15 +131,15 @@ class Link:
             raise MachineError(self.lost)
         with self._lock:
             waiting = topic in self._slots
-            self._slots[topic] = message
+            self._slots[topic] = (message, time.monotonic() + within)
         if not waiting:
             loop = self._ros.factory.manager.loop
             loop.call_soon_threadsafe(self._leave, topic)
 
     def _leave(self, topic: str) -> None:
         with self._lock:
-            message = self._slots.pop(topic, None)
-        if message is not None and not self.lost:
+            message, until = self._slots.pop(topic, (None, 0.0))
+        if message is not None and not self.lost and time.monotonic() <= until:
             self._topics[topic].publish(self._roslibpy.Message(message))
 
     def _closed(self, _: Any) -> None:

@@ -20,6 +20,7 @@ from bt_tasksim.resources import asset
 from bt_tasksim.robot import load_robot
 from bt_tasksim.safety.engine import RealEngine
 from bt_tasksim.scene import Scene
+from bt_tasksim.twin.controller import Controller, Trajectory
 from bt_tasksim.world import JointTarget
 
 ROBOT = load_robot("panda")
@@ -33,7 +34,7 @@ class Link:
     def __init__(self) -> None:
         self.lost, self.sent = "", []
 
-    def publish(self, topic: str, message: dict[str, Any]) -> None:
+    def publish(self, topic: str, message: dict[str, Any], within: float = 0.0) -> None:
         self.sent.append((topic, message))
 
     def close(self) -> None:
@@ -166,7 +167,7 @@ class Echo(Link):
         super().__init__()
         self.robot, self.times = robot, []
 
-    def publish(self, topic: str, message: dict[str, Any]) -> None:
+    def publish(self, topic: str, message: dict[str, Any], within: float = 0.0) -> None:
         super().publish(topic, message)
         if topic == self.robot.setting.arm.command:
             self.times.append(time.monotonic())
@@ -300,6 +301,26 @@ def test_a_hold_where_the_arm_is_brakes() -> None:
     assert point["time_from_start"] == {"sec": 0, "nanosec": 100_000_000}
     arguments = robot.hold_channel().arguments
     assert arguments["acceleration"] == robot.limits.acceleration.tolist() and arguments["lower"][0] < 0.0
+
+
+def test_an_arm_far_off_its_command_is_given_the_time_to_stop_where_it_is() -> None:
+    robot = engine()
+    robot._held = False
+    feel(robot)
+    robot.send(JointTarget(START + 0.33, np.zeros(9), 0.15))
+    controller = Controller(
+        ROBOT.arm_joints, ROBOT.arm_lower, ROBOT.arm_upper, ROBOT.arm_velocity, ROBOT.rest
+    )
+    controller.stand(START[:7] + 0.33)
+    robot.hold("tracking", here=True)
+    (point,) = robot.link.sent[2][1]["points"]
+    after = point["time_from_start"]["nanosec"] / 1e9
+    controller.accept(
+        Trajectory(robot.setting.arm.joints, [point["positions"]], [point["velocities"]], [after]), 1.0
+    )
+    speeds = np.array([controller.setpoint(1.0 + 0.001 * k)[1] for k in range(400)])
+    assert np.all(np.abs(speeds) <= robot.limits.velocity * 1.001)
+    assert np.allclose(controller.setpoint(2.0)[0], START[:7])
 
 
 def test_tracking_must_be_somewhere(tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_the_watchdog_says_hold_and_where_the_arm_is(server: Server) -> None:
     states = {"name": ["x", "b", "a"], "position": [9.0, 2.0, 1.0]}
     server.say(json.dumps({"op": "publish", "topic": "/states", "msg": states}))
     server.say(json.dumps({"op": "publish", "msg": {"name": ["a", "b"], "position": [None, 1.0]}}))
-    time.sleep(0.1)
+    time.sleep(0.04)
     hold.hold("the runner is gone")
     while len(server.heard) < 5 and time.monotonic() < deadline:
         time.sleep(0.01)
