@@ -3,7 +3,9 @@
 
 It is one of its own because the ROS wheels start every Python in it anew with library paths of theirs. What
 the bridge's wheel lacks is put right here: its binary is made executable, and the library of the middleware
-is linked under the name by which it looks for one. Only the standard library is needed.
+is linked under the name by which it looks for one. It also needs Python as a shared library, which Debian and
+Ubuntu have in a package of its own: where that is not installed it is downloaded and unpacked into the
+environment, and nothing on the machine changes. Only the standard library is needed.
 """
 
 from __future__ import annotations
@@ -13,11 +15,17 @@ import shutil
 import stat
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 from make_venv import main as make_venv
+from private_apt import Apt, UnavailableError, own_sources, release
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+
+from bt_tasksim.errors import MachineError  # noqa: E402
+from bt_tasksim.twin.environment import python_library  # noqa: E402
 
 
 def put_right(folder: Path) -> None:
@@ -42,6 +50,47 @@ def put_right(folder: Path) -> None:
     link.symlink_to(os.path.relpath(middleware, links))
 
 
+def provide_library(folder: Path) -> None:
+    """Have the bridge find Python's shared library, in the environment where the machine has none.
+
+    Args:
+        folder: The virtual environment.
+
+    Raises:
+        UnavailableError: It cannot be had.
+    """
+    try:
+        python_library(folder)
+        return
+    except MachineError as error:
+        missing = str(error)
+    for tool in ("apt-get", "dpkg"):
+        if shutil.which(tool) is None:
+            raise UnavailableError(f"{missing}; this machine has no {tool} to fetch it with")
+    package = f"libpython{sys.version_info.major}.{sys.version_info.minor}"
+    print(f"Fetching Python's shared library ({package}) ...", file=sys.stderr)
+    _, codename = release()
+    with tempfile.TemporaryDirectory(dir=folder) as name:
+        apt = Apt(Path(name) / "apt", own_sources(Path("/etc/apt"), codename, None), None)
+        try:
+            apt("update")
+            apt("-qq", "download", package)
+        except UnavailableError as error:
+            raise UnavailableError(f"{missing}; {error}") from None
+        for deb in sorted(apt.debs.glob("*.deb")):
+            subprocess.run(
+                ["dpkg", "-x", str(deb), str(Path(name) / "root")], check=True, capture_output=True
+            )
+        keep = folder / "libpython"
+        keep.mkdir(exist_ok=True)
+        for library in filter(Path.is_file, Path(name, "root").rglob("libpython*.so.1.0")):
+            shutil.copy2(library, keep / library.name)
+    try:
+        python_library(folder)
+    except MachineError as error:
+        raise UnavailableError(f"{error}; package {package} does not hold it") from None
+
+
 def main(arguments: list[str]) -> int:
     """Make the environment named by the only argument. Returns the exit status."""
     folder = Path(arguments[0])
@@ -55,8 +104,9 @@ def main(arguments: list[str]) -> int:
             check=True,
         )
         put_right(folder)
+        provide_library(folder)
         (folder / "made").touch()
-    except (OSError, subprocess.SubprocessError, StopIteration) as error:
+    except (OSError, subprocess.SubprocessError, StopIteration, UnavailableError) as error:
         shutil.rmtree(folder, ignore_errors=True)
         print(f"Cannot make the twin's virtual environment: {error}", file=sys.stderr)
         return 1

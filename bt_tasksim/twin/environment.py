@@ -90,7 +90,7 @@ def bridge_variables(folder: Path, domain: int, home: Path) -> dict[str, str]:
         "HOME": str(home),
         "AMENT_PREFIX_PATH": str(folder),
         "LD_LIBRARY_PATH": os.pathsep.join([str(folder / "bridge"), str(folder / "lib"), *libraries]),
-        "LD_PRELOAD": str(python_library()),
+        "LD_PRELOAD": str(python_library(folder)),
     }
 
 
@@ -99,14 +99,18 @@ def bridge_binary(folder: Path) -> Path:
     return site_packages(folder) / "rosbridge_server_rs" / "rosbridge_server_rs_jazzy"
 
 
-def python_library() -> Path:
+def python_library(folder: Path) -> Path:
     """The shared library of this version of Python.
+
+    Args:
+        folder: The twin's environment, whose own copy comes first.
 
     Raises:
         MachineError: There is none.
     """
     name = f"libpython{sys.version_info.major}.{sys.version_info.minor}.so.1.0"
-    places = [Path(str(sysconfig.get_config_var("LIBDIR"))), Path(sys.base_prefix) / "lib", Path("/usr/lib")]
+    places = [folder / "libpython", Path(str(sysconfig.get_config_var("LIBDIR")))]
+    places += [Path(sys.base_prefix) / "lib", Path("/usr/lib")]
     places += sorted(Path("/usr/lib").glob("*-linux-gnu"))
     for place in places:
         if (place / name).is_file():
