@@ -43,11 +43,13 @@ class Image:
         camera: The camera.
         colour: ``(height, width, 3)`` uint8, RGB.
         depth: ``(height, width)`` float32 metres along the optical axis; 0 where nothing was seen.
+        taken: When, in seconds of `WorldState.time`; None where it shows the state it came with.
     """
 
     camera: CameraModel
     colour: Array
     depth: Array | None
+    taken: float | None = None
 
 
 @runtime_checkable
@@ -190,6 +192,11 @@ class EnginePipeline:
     def real(self) -> bool:
         """What it moves is a real robot."""
         return bool(getattr(self.physics, "real", False))
+
+    @property
+    def told(self) -> bool:
+        """A robot that had to hold was told so, in one way or another."""
+        return bool(getattr(self.physics, "told", True))
 
     def stop(self, why: str) -> None:
         """The run is over, or has to be: a robot holds until the next `reset`; a simulation need not."""

@@ -38,6 +38,8 @@ HELD = (0.2, 1.0)
 """Seconds from the beginning of a hold to a look, and from that to the next one: things slip in a hand."""
 LOOKS = 8
 """Looks after the end of contact, at most."""
+AGE = 0.1
+"""Seconds by which a picture may be old while the hand holds something, which has moved since."""
 SAME = (0.006, np.deg2rad(6.0))
 """Metres and radians within which two looks agree: the object is at rest."""
 
@@ -100,7 +102,7 @@ class CameraPostProcess:
         self._tracks = [Track() for _ in range(n)]
         self._estimate = np.full((n, 7), np.nan)
         self._builder = ObservationBuilder(self.robot, configuration)
-        self._next = 0.0
+        self._next, self._taken = 0.0, -np.inf
 
     def cameras(self, needed: bool) -> tuple[str, ...]:
         """The camera, when a concept asks for a look or an object is to be looked at."""
@@ -117,7 +119,8 @@ class CameraPostProcess:
         self._next = time + self._model.control_period
         self._feel(state)
         for image in images.values():
-            self._look(image, time)
+            if self._shows_now(image, time):
+                self._look(image, time)
         return self._builder.build(state, self._estimate.copy())
 
     def unseen(self) -> dict[str, str]:
@@ -165,6 +168,21 @@ class CameraPostProcess:
                 if distance < best:
                     best, found = distance, i
         return found
+
+    def _shows_now(self, image: Image, time: float) -> bool:
+        """Whether a picture is a new one, and what it shows still is; else a look waits for the next one."""
+        taken = image.taken
+        if taken is None:
+            return True
+        if taken <= self._taken:
+            return False
+        for track in self._tracks:
+            if track.grip is not None and time - taken > AGE:
+                return False
+            if track.grip is None and np.isfinite(track.due) and taken < track.due - WAIT:
+                return False  # it had not been let go, or it is the last look's once more
+        self._taken = taken
+        return True
 
     def _look(self, image: Image, time: float) -> None:
         if image.depth is None:

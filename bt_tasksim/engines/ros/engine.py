@@ -61,6 +61,10 @@ class Newest:
 class RosRobot:
     """A `RealEngine` through rosbridge.
 
+    Attributes:
+        joints: Joint states, and the cell's clock.
+        began: When the run began, seconds of `time.monotonic`.
+
     Args:
         robot: The robot.
         setting: Topics and names.

@@ -35,11 +35,11 @@ class Bench:
         )
         self.time, self.looked = 0.0, []
 
-    def tick(self, tool, contacts=(False, False), needed=False, shown=True):
+    def tick(self, tool, contacts=(False, False), needed=False, shown=True, taken=None):
         names = self.post.cameras(needed)
         self.looked.append(bool(names))
         things = [(box(self.pose, SIZE), self.colour)] if shown else []
-        images = {name: image(things)[0] for name in names}
+        images = {name: dataclasses.replace(image(things)[0], taken=taken) for name in names}
         force = np.array([[0, 1.0, 0], [0, -1.0, 0]]) * np.array(contacts)[:, None]
         n = len(self.robot.joints)
         state = WorldState(
@@ -169,6 +169,43 @@ def test_what_was_seen_and_is_hidden_keeps_its_pose_and_is_given_up():
         last = bench.tick(AWAY, shown=False)
     assert np.allclose(last.objects, first.objects, atol=1e-6)
     assert sum(bench.looked[2:]) == LOOKS
+
+
+def test_one_picture_is_one_look():
+    bench = Bench()
+    bench.tick(AWAY, needed=True, taken=-0.1)
+    bench.pose[:2] += 0.05  # an old picture would not show it
+    assert bench.error(bench.tick(AWAY, needed=True, taken=-0.1)) > 0.05
+    assert bench.error(bench.tick(AWAY, needed=True, taken=0.05)) < 0.001
+
+
+def test_a_picture_from_before_the_hand_let_go_is_not_used():
+    bench = Bench()
+    tool = above(bench)
+    bench.tick(AWAY, needed=True, taken=-0.1)
+    bench.tick(tool, (True, True))
+    lay, bench.pose = bench.pose, bench.pose + np.array([0.05, 0.02, 0, 0, 0, 0, 0])
+    there, old = bench.pose, bench.time
+    for _ in range(12):  # a slow camera still shows what was when the hand held it
+        bench.pose = lay
+        seen = bench.tick(AWAY, taken=old)
+    assert bench.looked[-1]  # it goes on asking
+    bench.pose = there
+    assert bench.error(seen) > 0.05
+    assert bench.error(bench.tick(AWAY, taken=bench.time)) < 0.001
+
+
+def test_what_the_hand_holds_is_not_looked_for_where_it_was():
+    bench = Bench()
+    tool = above(bench)
+    bench.tick(AWAY, needed=True, taken=-0.1)
+    bench.tick(tool, (True, True))
+    slipped = bench.pose + np.array([0.004, 0, 0, 0, 0, 0, 0])
+    held, bench.pose = bench.pose, slipped
+    for _ in range(8):
+        seen = bench.tick(tool, (True, True), taken=bench.time - 0.15)
+    assert bench.looked[-1] and np.allclose(seen.objects[0], held, atol=1e-3)
+    assert bench.error(bench.tick(tool, (True, True), taken=bench.time - 0.05)) < 0.001
 
 
 def test_a_camera_without_depth_is_an_error():
