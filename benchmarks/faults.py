@@ -103,6 +103,8 @@ class Seen:
         running: Nodes that had not ended.
         again: A fresh run afterwards worked.
         left_out: Seconds of the run in which the twin's physics stood still, since the machine was busy.
+        fastest: Greatest speed of the set-points after the fault, as a share of a joint's limit.
+        hardest: Greatest acceleration, likewise; within a command it may be four times the limit.
     """
 
     held: float
@@ -114,6 +116,8 @@ class Seen:
     running: list[str]
     again: bool
     left_out: float = 0.0
+    fastest: float = math.nan
+    hardest: float = math.nan
 
     @property
     def good(self) -> bool:
@@ -333,7 +337,8 @@ def _after(
     held, still = (math.inf if note[key] is None else note[key] for key in ("held", "still"))
     left_out = last["left_out"]
     said = " ".join(said.split())
-    return Seen(held, still, note["far"], drift, note["why"], said, running, again(), left_out)
+    peaks = note["fastest"], note["hardest"]
+    return Seen(held, still, note["far"], drift, note["why"], said, running, again(), left_out, *peaks)
 
 
 def _running(runner: Any) -> list[str]:

@@ -167,7 +167,7 @@ class Runner:
                 finally:
                     end_all(tree, None)
             if pipeline.real and isinstance(error, KeyboardInterrupt):
-                raise type(error)("every node has ended, and the arm holds") from error
+                raise type(error)(f"every node has ended, and {_holding(pipeline)}") from error
             raise
         if status == Status.SUCCESS:
             why = "the tree succeeded; there is no ground truth to judge it by"
@@ -223,7 +223,7 @@ class Runner:
             except SafetyStop as stop:
                 leaf = context.tool_writer or tree.tip() or tree
                 end_all(tree, None)
-                why = f"{leaf.name}: {stop}; the arm holds"
+                why = f"{leaf.name}: {stop}; {_holding(pipeline)}"
                 return steps, f"safety stop, {stop.limit.replace('_', ' ')}", why
             steps += 1
 
@@ -284,6 +284,11 @@ class Runner:
             hidden = pipeline.hidden()
             assert hidden is not None
         return judge(configuration, world, hidden)
+
+
+def _holding(pipeline: EnginePipeline) -> str:
+    """What the arm does after a stop."""
+    return "the arm holds" if pipeline.told else "nobody could tell the arm to hold: its last command expires"
 
 
 def raising_leaf(error: BaseException, tree: Behaviour) -> Behaviour | None:

@@ -27,6 +27,7 @@ class GuardedRobot:
 
     Attributes:
         real: What it moves is no simulation.
+        told: The last hold was said to the robot, or to a watchdog that is there.
 
     Args:
         engine: The robot's engine.
@@ -36,7 +37,7 @@ class GuardedRobot:
 
     def __init__(self, engine: RealEngine, guard: Guard, clock: Clock) -> None:
         self.engine, self.guard, self.clock = engine, guard, clock
-        self.real = True
+        self.real = self.told = True
         self.watchdog: Watchdog | None = None
         self._lock = threading.RLock()  # an interrupt during a hold leads to another one
         self._held = True
@@ -114,9 +115,9 @@ class GuardedRobot:
             try:
                 self.engine.hold(why, here)
             except Exception:  # whatever it is, there is another way
-                if self.watchdog is not None:
-                    self.watchdog.hold()
+                self.told = self.watchdog is not None and self.watchdog.hold()
             else:
+                self.told = True
                 if self.watchdog is not None:
                     self.watchdog.rest()
             self._held = True

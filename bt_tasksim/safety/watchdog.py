@@ -77,10 +77,11 @@ class Watchdog:
         self._unanswered = math.inf
         self._write(DONE)
 
-    def hold(self) -> None:
-        """Have it stop the robot now; another one is needed after that."""
+    def hold(self) -> bool:
+        """Have it stop the robot now; says whether its process is there. Another one is needed after that."""
         self._write(HOLD)
         self._why = self._why or "the watchdog was told to stop the robot"
+        return self._process.poll() is None
 
     def trouble(self) -> str:
         """What is wrong, as a sentence: it has stopped the robot, hangs, or is gone; empty if all is well."""

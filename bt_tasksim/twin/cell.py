@@ -191,7 +191,7 @@ class Cell:
         self._state = self._physics.step(JointTarget(position, velocity))
         self._leaving.append((self.time + self.gap.sizes["state_latency"], self._read()))
         if self.note is not None:
-            self._take_note(self.note)
+            self._take_note(self.note, arm[1])
 
     def _read(self) -> Readings:
         state, sizes, normal = self._state, self.gap.sizes, self._rng.standard_normal
@@ -239,7 +239,12 @@ class Cell:
     def _arm_position(self) -> Array:
         return self._state.joint_position[: self._n]
 
-    def _take_note(self, note: Note) -> None:
+    def _take_note(self, note: Note, speed: Array) -> None:
+        if note.speed is not None:
+            change = np.abs(speed - note.speed) / self.period
+            note.hardest = max(note.hardest, float(np.max(change / self.robot.arm_acceleration)))
+        note.speed = speed
+        note.fastest = max(note.fastest, float(np.max(np.abs(speed) / self.robot.arm_velocity)))
         position = self._arm_position()
         note.far = max(note.far, float(np.max(np.abs(position - note.position))))
         if note.held is None and self.time > self._arm.ends():
@@ -279,6 +284,9 @@ class Note:
         why: By what.
         still: When it stood.
         far: Farthest that a joint got, rad.
+        fastest: Greatest speed of the set-points, as a share of a joint's limit.
+        hardest: Greatest acceleration, likewise, from one period of the controller to the next.
+        speed: The last speed of the set-points ``(n,)``.
     """
 
     name: str
@@ -288,6 +296,9 @@ class Note:
     why: str = ""
     still: float | None = None
     far: float = 0.0
+    fastest: float = 0.0
+    hardest: float = 0.0
+    speed: Array | None = None
 
     def to_json(self) -> dict[str, Any]:
         """In plain data, times since the fault."""
@@ -297,4 +308,6 @@ class Note:
             "still": None if self.still is None else self.still - self.began,
             "why": self.why,
             "far": self.far,
+            "fastest": self.fastest,
+            "hardest": self.hardest,
         }

@@ -65,7 +65,7 @@ class Arm:
     def inject(self, name: str, now: float) -> None:
         self.fault = {
             "name": name, "at": now, "q": list(self.q), "held": None, "why": "", "still": None,
-            "far": 0.0, "speed": max(map(abs, self.v)), "after_hold": 0.0, "q_held": None,
+            "far": 0.0, "fastest": 0.0,
         }  # fmt: skip
 
     def advance(self, now: float, dt: float) -> None:
@@ -80,10 +80,8 @@ class Arm:
         note = self.fault
         if note is not None:
             note["far"] = max(note["far"], *(abs(a - b) for a, b in zip(self.q, note["q"], strict=True)))
+            note["fastest"] = max(note["fastest"], *map(abs, self.v))
             if note["held"] is not None:
-                note["q_held"] = note["q_held"] or list(self.q)
-                far = (abs(a - b) for a, b in zip(self.q, note["q_held"], strict=True))
-                note["after_hold"] = max(note["after_hold"], *far)
                 if max(map(abs, self.v)) < STILL:
                     note["still"] = note["still"] or now
                 else:

@@ -41,7 +41,7 @@ class Seen:
         said: The message.
         running: Nodes that had not ended.
         again: A fresh run afterwards was as it should be.
-        refused: Commands that came after the hold, and were refused.
+        fastest: Greatest speed of a joint after the fault, rad/s.
         busy: Longest time between two steps of the arm's process.
     """
 
@@ -52,7 +52,7 @@ class Seen:
     said: str
     running: list[str]
     again: bool
-    refused: int
+    fastest: float
     busy: float
 
 
@@ -210,7 +210,7 @@ def _after(
         said=" ".join(said.split()),
         running=running,
         again=again(),
-        refused=last["refused"],
+        fastest=last["fault"]["fastest"],
         busy=told["busy"],
     )
 

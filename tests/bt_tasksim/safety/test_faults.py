@@ -40,6 +40,7 @@ def test_the_arm_holds_in_time_and_the_reason_is_said(fault):
             break  # else the arm's own process was kept waiting, and its times say nothing
     assert seen.held <= REACTION
     assert seen.far <= 0.2 and seen.drift <= 0.002, "it moves little farther, and stands then"
+    assert seen.fastest <= 1.0, "and no faster than it went before"
     assert SAID[fault] in seen.said, seen.said
     assert seen.running == [], "every node has ended"
     assert seen.again, "a fresh run works"
@@ -141,9 +142,29 @@ def test_a_watchdog_that_had_to_stop_the_arm_is_replaced(arm):
     physics.engine.hold = fails
     leaf.lasts = 0.3
     runner.run(0)
-    assert arm.stopped()["latched"] == "the runner asked for it"
+    assert arm.stopped()["latched"] == "the runner asked for it" and runner.pipeline.told
     first, physics.engine.hold = physics.watchdog.pid, hold
     assert runner.run(0).success and physics.watchdog.pid != first
+    runner.pipeline.close()
+
+
+def test_that_nobody_could_tell_the_arm_is_said(arm):
+    runner, leaf = runner_of(arm.port)
+    physics = runner.pipeline.physics
+    hold = physics.engine.hold
+
+    def dies(tool):
+        physics.watchdog._process.kill()
+        physics.watchdog._process.wait()
+        return tool
+
+    def fails(why, here):
+        raise MachineError("the connection to the arm is lost")
+
+    physics.engine.hold, leaf.trouble = fails, dies
+    why = runner.run(0).why
+    assert why.endswith("ended; nobody could tell the arm to hold: its last command expires"), why
+    physics.engine.hold = hold
     runner.pipeline.close()
 
 

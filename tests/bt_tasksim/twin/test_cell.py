@@ -110,9 +110,11 @@ def test_the_emergency_stop(cell: Cell) -> None:
     cell.begin("one")
     cell.command("arm", forward(cell))
     run(cell, 0.06)
+    cell.watch("stop")
     cell.press(True)
     run(cell, 0.5)
-    still = first_joint(cell)
+    still, note = first_joint(cell), cell.tell()["fault"]
+    assert 0.0 < note["fastest"] <= 1.0 and 0.0 < note["hardest"] <= 1.05, "within the arm's limits"
     cell.begin("two")  # as long as it is pressed there is no new run
     with pytest.raises(RefusedError, match="emergency stop"):
         cell.command("arm", forward(cell, run="two"))

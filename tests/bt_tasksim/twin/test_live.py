@@ -84,6 +84,7 @@ def world_of(configuration: Any, robot: Any) -> Any:
 def test_a_fault_ends_in_a_hold_and_a_fresh_run_works(bench: Bench, fault: str, said: str) -> None:
     seen = measure(bench, fault, seed=0)
     assert seen.held < LATEST and seen.far < 0.15 and seen.drift < 5e-3
+    assert seen.fastest < 1.0 and seen.hardest < 4.2, "no faster and no harder than a command may be"
     assert re.search(said, seen.said + seen.by), seen
     assert not seen.running and seen.again
 
@@ -99,6 +100,7 @@ def test_a_cell_of_ros2_control_alone(bench: Bench, tmp_path: Path, fault: str) 
         seen = measure(plain, fault, seed=0)
         assert plain.evaluation.tell()["refused"] == 0
     assert seen.held < LATEST and seen.far < 0.15 and seen.drift < 5e-3
+    assert seen.fastest < 1.0 and seen.hardest < 4.2, "no faster and no harder than a command may be"
     assert not seen.running and seen.again, seen
 
 
