@@ -44,7 +44,7 @@ def table(monkeypatch: Any, tmp_path: Path, outcomes: dict[str, Any]) -> tuple[i
 
 
 def test_everything_held_in_time(monkeypatch: Any, tmp_path: Path, capsys: Any) -> None:
-    outcomes = {"a": {}, "b": {"held": 0.25, "far": math.nan, "fastest": 0.0, "hardest": 0.0}, "c": {"left_out": 0.3}}
+    outcomes = {"a": {}, "b": {"held": 0.25, "far": math.nan}, "c": {"left_out": 0.3}}
     status, found = table(monkeypatch, tmp_path, outcomes)
     assert status == 0 and len(found["b"]) == 2
     lines = capsys.readouterr().out.splitlines()[2:]
@@ -70,7 +70,18 @@ class Evaluation:
     """Says the same again and again."""
 
     def __init__(self, **note: Any) -> None:
-        self._told = {"fault": {"held": None, "still": None, "far": 0.3, "fastest": 0.0, "hardest": 0.0, "why": "", **note}, "left_out": 0.2}
+        self._told = {
+            "fault": {
+                "held": None,
+                "still": None,
+                "far": 0.3,
+                "fastest": 0.0,
+                "hardest": 0.0,
+                "why": "",
+                **note,
+            },
+            "left_out": 0.2,
+        }
         self._told["position"] = [0.0] * 7
 
     def tell(self) -> dict[str, Any]:
