@@ -4,8 +4,8 @@ It reads from its standard input one JSON line that says how to reach the robot,
 bytes: a letter and a time of the monotonic clock. ``B`` is a beat, and the first one begins the watch; ``D``
 ends it, ``H`` asks for a hold at once. The end of the input is the end of the runner. On its standard output
 it answers what it has read with the byte `ECHO`, and says what it did, one line each, beginning with
-``ready``, ``held`` or ``failed``. It imports the standard library and what the channel needs, and nothing else, so that
-whatever happens to the runner, this goes on.
+``ready``, ``held`` or ``failed``. It imports the standard library and what the channel needs, and nothing
+else, so that whatever happens to the runner, this goes on.
 """
 
 from __future__ import annotations
