@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import importlib.util
 import json
+import select
 import statistics
 import subprocess
 import sys
@@ -23,7 +25,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from benchmarks.success import RESULTS
-from bt_tasksim.engines.registry import ENGINES, EngineOptions
+from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import MachineError
 from bt_tasksim.files import write_text
 from bt_tasksim.runner import Runner, Step
@@ -33,6 +35,8 @@ from trees.load import load_source
 EVERY = 10
 """Control periods from one picture to the next, where pictures are drawn."""
 CAMERA = "perception"
+START = 60.0
+"""Seconds that a server may take to start."""
 
 
 def main() -> int:
@@ -49,7 +53,7 @@ def main() -> int:
 
 def measure(rounds: int, episodes: int) -> dict[str, Any]:
     """Control steps per second of every arrangement, in turns, and ratios to that in one process."""
-    here = "mujoco" if "mujoco" in ENGINES else "sapien"
+    here = "mujoco" if importlib.util.find_spec("mujoco") else "sapien"
     found: dict[str, Any] = {"mixed_physics": here}
     with contextlib.ExitStack() as servers:
         physics, other = (servers.enter_context(served("physics", "sapien")) for _ in range(2))
@@ -62,26 +66,31 @@ def measure(rounds: int, episodes: int) -> dict[str, Any]:
         found |= compared(plain, rounds, episodes, pictures=False)
         found["step_us"] = step_times(plain["in_process"])
         found["served_step_us"] = step_times(plain["physics_served"])
-    try:
-        with served("rendering", "sapien") as rendering:
-            drawn = {
-                "pictures_in_process": EngineOptions(engines=here, rendering=True),
-                "pictures_served": EngineOptions(engines=here, rendering=True, renderer=rendering),
-            }
-            found |= compared(drawn, max(rounds // 3, 1), 1, pictures=True)
-    except MachineError as error:
-        found["pictures_missing"] = str(error)
-    return found
+    with contextlib.ExitStack() as servers:
+        try:
+            rendering = servers.enter_context(served("rendering", "sapien"))
+        except MachineError as error:
+            return found | {"pictures_missing": str(error)}
+        drawn = {
+            "pictures_in_process": EngineOptions(engines=here, rendering=True),
+            "pictures_served": EngineOptions(engines=here, rendering=True, renderer=rendering),
+        }
+        return found | compared(drawn, max(rounds // 3, 1), 1, pictures=True)
 
 
 @contextlib.contextmanager
 def served(role: str, name: str) -> Iterator[str]:
-    """An engine in a process of its own, by the name that a client gives it."""
+    """An engine in a process of its own, by the name that a client gives it.
+
+    Raises:
+        MachineError: It does not start.
+    """
     words = [sys.executable, "-m", "bt_tasksim.cli", "serve-engine", role, name, "--port", "0"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    line = process.stdout.readline()
     try:
+        ready, _, _ = select.select([process.stdout], [], [], START)
+        line = process.stdout.readline() if ready else ""
         if not line:
             raise MachineError(f"the {role} engine cannot be served on this machine")
         yield f"remote:127.0.0.1:{line.rpartition(':')[2].split()[0]}"

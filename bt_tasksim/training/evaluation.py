@@ -11,7 +11,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -158,6 +158,29 @@ def evaluate(
         raise InputError("an engine in another process serves one client at a time: evaluate with 1 worker")
     started = time.perf_counter()
     runner = _runner(job)  # errors show here, before any process starts
+    with closing(runner.pipeline):  # what serves one client at a time is free for the next one
+        found = _outcomes(runner, job, seeds, workers, progress, stream)
+    engines, perception = result_names(job.options, runner.pipeline)
+    return Evaluation(
+        scenario=_name(job),
+        robot=runner.robot.name,
+        engines=engines,
+        perception=perception,
+        policies=_policies(runner),
+        outcomes=tuple(found[s] for s in seeds),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _outcomes(
+    runner: Any,
+    job: Job,
+    seeds: Sequence[int],
+    workers: int,
+    progress: Callable[[Outcome], None] | None,
+    stream: str,
+) -> dict[int, Outcome]:
+    """Outcomes by seed."""
     found: dict[int, Outcome] = {}
     if workers == 1:
         for seed in seeds:
@@ -174,16 +197,7 @@ def evaluate(
                 found[outcome.seed] = outcome
                 if progress is not None:
                     progress(outcome)
-    engines, perception = result_names(job.options, runner.pipeline)
-    return Evaluation(
-        scenario=_name(job),
-        robot=runner.robot.name,
-        engines=engines,
-        perception=perception,
-        policies=_policies(runner),
-        outcomes=tuple(found[s] for s in seeds),
-        seconds=time.perf_counter() - started,
-    )
+    return found
 
 
 def episode(runner: Any, seed: int, stream: str = "evaluation") -> Outcome:

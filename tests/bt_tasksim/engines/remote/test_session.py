@@ -1,18 +1,22 @@
 """What a served engine answers, without sockets: owners, episodes, roles, and errors of every kind."""
 
+import contextlib
 import dataclasses
 
 import numpy as np
 import pytest
 
+from bt_tasksim.engines.physics_sapien import SapienPhysics
 from bt_tasksim.engines.remote.configurations import for_sending
 from bt_tasksim.engines.remote.handshake import identity, mismatch
-from bt_tasksim.engines.remote.messages import REPLIES, Message, decode, encode, sizes_of
+from bt_tasksim.engines.remote.messages import REPLIES, BadMessageError, Message, decode, encode, sizes_of
 from bt_tasksim.engines.remote.session import Session, error_of, plain_sentence
 from bt_tasksim.errors import InputError, LostEngine, MachineError, NoWayError, UnreachableError
 from bt_tasksim.robot import load_robot
+from bt_tasksim.world import JointTarget
 
 from .conftest import hello
+from .test_messages import damaged
 
 ME, YOU = b"me", b"you"
 
@@ -174,6 +178,51 @@ def test_nonsense_is_answered_with_the_number_that_could_be_read(stage):
     reply = stage.frames(frames[:-1])
     assert reply.number == 77 and "announces 2 arrays and has 1" in sentence(reply)
     assert stage.step().kind == "state" and len(stage.refused) == 2
+
+
+def test_ten_thousand_malformed_messages_move_nothing(robot, world, sizes):
+    """From the owner itself, in an episode; afterwards the robot goes on as one that was left in peace."""
+    rng, calls = np.random.default_rng(5), []
+
+    class Counted(SapienPhysics):
+        def reset(self, configuration):
+            calls.append("reset")
+            return super().reset(configuration)
+
+        def step(self, target):
+            calls.append("step")
+            return super().step(target)
+
+    session = Session(Counted(robot), "physics", "sapien", robot)
+
+    def answer(frames):
+        return decode(session.answer(ME, frames, lambda owner: True), REPLIES, sizes)
+
+    sent = {"configuration": for_sending(world, robot)}
+    start = np.concatenate([robot.rest, robot.hand_open])
+    step = encode(Message(3, "step", arrays={"position": start + 0.05, "velocity": np.zeros(9)}), sizes)
+    originals = [
+        hello(robot, "physics"),
+        encode(Message(2, "reset", sent), sizes),
+        step,
+        encode(Message(4, "hidden"), sizes),
+    ]
+    assert answer(originals[0]).kind == "welcome" and answer(originals[1]).kind == "state"
+    kinds, malformed = ("hello", "reset", "step", "hidden"), 0
+    while malformed < 10_000:
+        frames = damaged(rng, [bytes(f) for f in originals[malformed % 4]])
+        with contextlib.suppress(BadMessageError):
+            decode(frames, kinds, sizes)
+            continue  # the damage has left a good message
+        malformed += 1
+        reply = answer(frames)
+        assert reply.kind == "error" and reply.fields["sentence"]
+    assert calls == ["reset"]
+    alone = SapienPhysics(robot)
+    alone.reset(world)
+    expected = alone.step(JointTarget(start + 0.05, np.zeros(9)))
+    moved = answer(step)
+    assert all(np.array_equal(moved.arrays[name], getattr(expected, name)) for name in moved.arrays)
 
 
 # ---- what differs -----------------------------------------------------------------------------------------
