@@ -1,12 +1,14 @@
 """The model is the world as it was drawn: masses, centres of mass, inertia, poses, limits and drives."""
 
 import numpy as np
+import pinocchio
 import pytest
 
 from bt_tasksim import poses
 from bt_tasksim.engines.mujoco_contacts import TIMESTEP
 from bt_tasksim.engines.mujoco_model import GRAVITY, build_world
 from bt_tasksim.engines.mujoco_robot import drive_armature
+from bt_tasksim.engines.urdf_links import load_links
 from bt_tasksim.errors import InputError
 from bt_tasksim.resources import asset
 from bt_tasksim.robot import load_robot
@@ -78,6 +80,48 @@ def test_drives_are_those_of_the_robots_file(name):
     for i, joint in enumerate(robot.joints):
         assert model.joint(joint).damping[0] == 0.0
         assert model.dof_armature[model.joint(joint).dofadr[0]] == pytest.approx(armature[i])
+
+
+@pytest.mark.parametrize(
+    ("name", "within"),
+    [("panda", 1e-12), ("so100", 1e-12), ("xarm7_ability", 1.1e-3)],  # two links of that hand cannot be
+)
+def test_inertia_is_that_of_the_urdf(name, within):
+    """Joint-space inertia beside Pinocchio's, kg m^2 (for sliding joints kg)."""
+    robot = load_robot(name)
+    world = build_world(mujoco, robot, Scene(robot=name).sample(0))
+    theirs, rng = pinocchio.buildModelFromUrdf(str(robot.urdf)), np.random.default_rng(0)
+    joints = [theirs.joints[theirs.getJointId(joint)] for joint in robot.joints]
+    data, at = mujoco.MjData(world.model), [joint.idx_v for joint in joints]
+    low = np.concatenate([robot.arm_lower, robot.hand_open])
+    high = np.concatenate([robot.arm_upper, robot.hand_closed])
+    for _ in range(5):
+        position, q = rng.uniform(np.minimum(low, high), np.maximum(low, high)), pinocchio.neutral(theirs)
+        for joint, value in zip(joints, position, strict=True):
+            turns = joint.nq == 2  # of a joint without limits Pinocchio has cosine and sine
+            q[joint.idx_q : joint.idx_q + joint.nq] = (np.cos(value), np.sin(value)) if turns else value
+        data.qpos[world.joint_qpos] = position
+        mujoco.mj_forward(world.model, data)
+        whole = np.zeros((world.model.nv, world.model.nv))
+        mujoco.mj_fullM(world.model, data, whole)
+        ours = whole[np.ix_(world.joint_dof, world.joint_dof)] - np.diag(drive_armature(robot))
+        upper = np.triu(pinocchio.crba(theirs, theirs.createData(), q))
+        expected = (upper + np.triu(upper, 1).T)[np.ix_(at, at)]
+        assert np.abs(ours - expected).max() < within
+
+
+def test_only_an_inertia_that_cannot_be_is_changed():
+    robot = load_robot("xarm7_ability")
+    model = build_world(mujoco, robot, Scene(robot="xarm7_ability").sample(0)).model
+    changed = []
+    for link in load_links(robot.urdf):
+        if link.inertial is not None:
+            xx, yy, zz, xy, xz, yz = link.inertial.inertia
+            principal = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            if not np.allclose(np.sort(model.body(f"robot/{link.link}").inertia), principal, rtol=1e-3):
+                changed.append(link.link)
+    assert changed == ["base", "thumb_base"]
+    assert model.body("robot/base").inertia == pytest.approx([0.89e-3] * 3, rel=0.01)
 
 
 def test_the_pandas_hand_keeps_the_armature_of_its_file():
