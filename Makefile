@@ -16,10 +16,10 @@ TWIN := .twin
 demo: setup
 	$(VENV)/bin/bt-tasksim demo
 
-LIVE := tests/bt_tasksim/twin/test_live.py
+LIVE := $(wildcard tests/bt_tasksim/twin/test_live*.py)
 
 test: setup
-	$(VENV)/bin/python -m pytest $(PYTEST_FLAGS) --ignore $(LIVE)
+	$(VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(addprefix --ignore ,$(LIVE))
 
 # Real ROS processes in real time: one test after the other.
 test-twin: setup twin-environment

@@ -44,11 +44,11 @@ class Pictures:
         self.colour.clear()
         self.depth.clear()
 
-    def fresh(self, now: float) -> bool:
-        """There is a picture of colour and one of depth that show what is now."""
+    def since(self, begin: float) -> bool:
+        """There is a picture of colour and one of depth that were not taken before a moment."""
         if self.calibration is None:
             return False
-        return all(newest and now - newest[-1][0] <= STALE for newest in (self.colour, self.depth))
+        return all(newest and newest[-1][0] >= begin for newest in (self.colour, self.depth))
 
 
 class RosCameras:
@@ -81,9 +81,10 @@ class RosCameras:
                 self._subscribe(link, pictures)
         for pictures in self._cameras.values():
             pictures.forget()
-        end = time.monotonic() + PATIENCE
+        begin = time.monotonic()
+        end = begin + PATIENCE
         for name, pictures in self._cameras.items():
-            while not pictures.fresh(time.monotonic()):  # a bridge hands on old ones to whoever is new
+            while not pictures.since(begin):  # a bridge hands on old ones to whoever is new
                 if link.lost or time.monotonic() > end:
                     topics = pictures.topics
                     raise MachineError(

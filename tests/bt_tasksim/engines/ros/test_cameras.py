@@ -68,6 +68,16 @@ def test_a_new_run_has_pictures_of_its_own() -> None:
     assert cameras.render(None, "scene").colour[0, 0, 0] == 9  # type: ignore[arg-type]
 
 
+def test_an_old_picture_that_a_bridge_hands_on_does_not_count() -> None:
+    robot = Robot()
+    cameras = RosCameras(robot)  # type: ignore[arg-type]
+    old = time.monotonic() - 0.9
+    threading.Timer(0.05, lambda: robot.picture(old, shade=7)).start()
+    threading.Timer(0.2, lambda: robot.picture(time.monotonic(), shade=9)).start()
+    cameras.reset(None)  # type: ignore[arg-type]
+    assert cameras.render(None, "scene").colour[0, 0, 0] == 9  # type: ignore[arg-type]
+
+
 def test_inverse_depth_is_refused() -> None:
     robot = Robot()
     cameras = RosCameras(robot)  # type: ignore[arg-type]

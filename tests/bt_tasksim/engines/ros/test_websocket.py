@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from bt_tasksim.engines.ros.hold import RosHold
-from bt_tasksim.engines.ros.websocket import WebSocket
+from bt_tasksim.engines.ros.websocket import LARGEST, WebSocket
 
 websockets = pytest.importorskip("websockets")
 
@@ -88,6 +88,11 @@ def test_pings_are_answered_and_long_texts_skipped(server: Server) -> None:
     reading.start()
     assert server.ping() < 0.5
     reading.join()
+    texts = ("x" * (LARGEST + 1), "y" * 3 * LARGEST, "a short one")
+    saying = threading.Thread(target=lambda: [server.say(text) for text in texts])
+    saying.start()
+    assert socket.receive(5.0) == "a short one"
+    saying.join()
     socket.close()
 
 
