@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim import poses
+from bt_tasksim.engines.disturbance import Knock
+from bt_tasksim.engines.urdf_links import links_below, load_links
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.errors import MachineError
 from bt_tasksim.poses import Array
@@ -100,11 +102,9 @@ class SapienPhysics:
         self._build_fixtures(configuration)
         self._build_objects(configuration)
         self._build_robot(configuration)
-        self._disturbance = configuration.disturbance
-        self._disturbed = _DISTURBANCE_WAITING if configuration.disturbance else _DISTURBANCE_OVER
-        self._held_since: float | None = None
-        self._push_end = 0.0
-        self._names = [actor.name for actor in configuration.objects]
+        disturbance, names = configuration.disturbance, [actor.name for actor in configuration.objects]
+        self._knock = Knock(disturbance)
+        self._knocked = names.index(disturbance.object) if disturbance is not None else -1
         self._n_bodies = len(configuration.objects) + len(configuration.fixtures)
         return self._state()
 
@@ -198,7 +198,7 @@ class SapienPhysics:
         links = {link.name: link for link in articulation.get_links()}
         self._links = links
         pads = self._physx.PhysxMaterial(robot.pads.friction, robot.pads.friction, 0.0)
-        hand = _links_below(articulation, links[robot.wrist_link])
+        hand = links_below(load_links(robot.urdf), robot.wrist_link)
         tip_of = {name: i for i, tip in enumerate(robot.tips) for name in tip.links}
         base = links[robot.base_link]
         for name, link in links.items():
@@ -264,7 +264,7 @@ class SapienPhysics:
             if any(abs(v) > fast for (_, v), fast in zip(asked[self._n_arm :], self._fast, strict=True)):
                 self._watch = WATCHED
             self._asked = asked
-        if self._disturbed != _DISTURBANCE_OVER:
+        if not self._knock.over:
             for _ in range(self._substeps):
                 self._disturbed_step()
         elif self._falling:
@@ -296,7 +296,7 @@ class SapienPhysics:
         self._scene.set_timestep(self._dt / FINE)
         self._last_dt = self._dt / FINE
         for _ in range(n * FINE):
-            if self._disturbed == _DISTURBANCE_PUSHING:
+            if self._knock.pushing:
                 self._push()
             self._system.step()
             self._read_depth()
@@ -424,38 +424,25 @@ class SapienPhysics:
 
     def _disturbed_step(self) -> None:
         """One physics step, with a push that begins some time after the object was first held clear."""
-        disturbance = self._disturbance
-        assert disturbance is not None
-        if self._disturbed == _DISTURBANCE_WAITING:
-            k = self._names.index(disturbance.object)
-            if self._held_since is None:
-                if self._hand_force[k] > 1.0 and not any(i == k for i, _ in self._support):
-                    self._held_since = self._time
-            elif self._time - self._held_since >= disturbance.delay:
-                self._disturbed = _DISTURBANCE_PUSHING
-                self._push_end = self._time + disturbance.limit
-        if self._disturbed == _DISTURBANCE_PUSHING or self._falling:
+        k = self._knocked
+        held = self._hand_force[k] > 1.0 and not any(i == k for i, _ in self._support)
+        self._knock.watch(self._time, held)
+        if self._knock.pushing or self._falling:
             self._fine_steps(1)
         else:
             self._system.step()
 
     def _push(self) -> None:
         """Push the object until it has left the hand, no faster than the disturbance says."""
-        disturbance = self._disturbance
-        assert disturbance is not None
-        k = self._names.index(disturbance.object)
         self._read_contacts()
-        if self._time > self._push_end or self._hand_force[k] <= 0.0:
-            self._disturbed = _DISTURBANCE_OVER
-            return
-        force = np.array(disturbance.force)
-        body = self._objects[k]
-        if float(body.linear_velocity @ force) < disturbance.speed * float(np.linalg.norm(force)):
+        body = self._objects[self._knocked]
+        touched = self._hand_force[self._knocked] > 0.0
+        force = self._knock.force(self._time, touched, body.linear_velocity)
+        if force.any():
             body.wake_up()
             body.add_force_at_point(force.tolist(), body.entity_pose.p)
 
 
-_DISTURBANCE_WAITING, _DISTURBANCE_PUSHING, _DISTURBANCE_OVER = range(3)
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -471,13 +458,3 @@ def _is_end(link: Any, links: list[Any]) -> bool:
     """A fixed link without shapes that carries no other."""
     carries = any(other.parent is link for other in links)
     return link.joint_record.joint_type == "fixed" and not link.collision_records and not carries
-
-
-def _links_below(articulation: Any, root: Any) -> set[str]:
-    """Names of a link and of all links that it carries."""
-    names = {root.name}
-    for joint in articulation.get_joints():
-        parent, child = joint.get_parent_link(), joint.get_child_link()
-        if parent is not None and parent.name in names:
-            names.add(child.name)
-    return names
