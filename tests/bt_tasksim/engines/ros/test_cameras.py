@@ -34,14 +34,15 @@ class Robot:
     def subscribe(self, topic: str, kind: str, handle: Any, throttle: int = 0) -> None:
         self._handles[topic] = handle
 
-    def picture(self, taken: float, shade: int = 0) -> None:
-        """Colour and depth of one instant."""
+    def picture(self, taken: float, shade: int = 0, damaged: bool = False) -> None:
+        """Colour and depth of one instant, or files that break off."""
         header = {"stamp": {"sec": int(taken), "nanosec": int(taken % 1 * 1e9)}, "frame_id": "camera"}
         info = {"header": header, "width": 8, "height": 6, "k": [6.0, 0, 4, 0, 6.0, 3, 0, 0, 1], "d": []}
         self._handles[TOPICS.info](info, taken)
         colour, depth = np.full((6, 8, 3), shade, np.uint8), np.full((6, 8), 1000, np.uint16)
         for topic, pixels in ((TOPICS.colour, colour), (TOPICS.depth, depth)):
-            data = base64.b64encode(cv2.imencode(".png", pixels)[1].tobytes()).decode()
+            content = cv2.imencode(".png", pixels)[1].tobytes()
+            data = base64.b64encode(content[:40] if damaged else content).decode()
             self._handles[topic]({"header": header, "format": "png", "data": data}, taken)
 
 
@@ -66,6 +67,17 @@ def test_a_new_run_has_pictures_of_its_own() -> None:
     threading.Timer(0.2, lambda: robot.picture(time.monotonic(), shade=9)).start()
     cameras.reset(None)  # type: ignore[arg-type]  # the first run's picture is not a second old
     assert cameras.render(None, "scene").colour[0, 0, 0] == 9  # type: ignore[arg-type]
+
+
+def test_a_picture_of_the_last_run_does_not_stand_in_for_a_damaged_one() -> None:
+    robot = Robot()
+    cameras = RosCameras(robot)  # type: ignore[arg-type]
+    threading.Timer(0.05, lambda: robot.picture(time.monotonic(), shade=7)).start()
+    cameras.reset(None)  # type: ignore[arg-type]
+    threading.Timer(0.05, lambda: robot.picture(time.monotonic(), damaged=True)).start()
+    cameras.reset(None)  # type: ignore[arg-type]
+    with pytest.raises(MachineError, match="camera 'scene': colour image: cannot be read"):
+        cameras.render(None, "scene")  # type: ignore[arg-type]
 
 
 def test_an_old_picture_that_a_bridge_hands_on_does_not_count() -> None:
