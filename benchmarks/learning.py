@@ -3,8 +3,8 @@
     python -m benchmarks.learning            # some minutes, on an idle machine
     python -m benchmarks.learning --quick
 
-1. Environment steps per second without a learner: ``grasp_then_pick`` with a fixed policy, whole episodes
-   with resets and what follows, against ManiSkill's ``PickCube-v1`` with random actions; both with 100 Hz
+1. Environment steps per second without a learner: ``grasp_then_pick``, whole episodes with resets and what
+   follows, against ManiSkill's ``PickCube-v1``; both with actions that were decided beforehand, 100 Hz
    physics and 20 Hz control, one step being one control period; in one process and in two.
 2. Transitions per second that a learner gets: our `train` with two workers against stable-baselines3 PPO on
    ``PickCube-v1`` with the same network, rollout, minibatch and epochs, the better of one process and two. A
@@ -37,7 +37,6 @@ from bt_tasksim.network import Network
 from bt_tasksim.policy import LearnedPolicy, load_policy
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.episode import EpisodeEnv
-from bt_tasksim.training.rollouts import Task, Workers, collect
 from concept_nodes import Grasp
 from trees.scenarios import grasp_then_pick
 
@@ -82,57 +81,91 @@ ROWS = (
 
 
 class Ours:
-    """``grasp_then_pick`` with the reference policy; control periods are counted over processes."""
+    """``grasp_then_pick`` in processes of its own, as `Peer` is, with actions that were decided beforehand.
+
+    A lane is run once with the reference policy and noise, and its actions are kept; the same worlds with the
+    same actions are the same episodes, and those are timed.
+    """
 
     def __init__(self) -> None:
-        self.network = untrained(grasp_then_pick.scene().robot)
-        self.deviation = np.full(Grasp.actions + 1, DEVIATION, np.float32)
-        self.deviation[-1] = 0.0
-        self._periods = multiprocessing.get_context("fork").Value("q", 0)
-        self._env: Any = None
-        self._pool: Workers | None = None
+        self._workers: list[tuple[Any, Any]] = []
         self._lane = 0
 
-    def make(self) -> EpisodeEnv:
-        """An environment whose control periods are counted."""
-        env = EpisodeEnv(grasp_then_pick.build(), grasp_then_pick.scene(), lesson=2)
-        step = env.runner.step
-
-        def counted(command: Any) -> None:
-            with self._periods.get_lock():
-                self._periods.value += 1
-            step(command)
-
-        env.runner.step = counted  # type: ignore[method-assign]
-        return env
-
     def rate(self, processes: int, lanes: int) -> tuple[float, float]:
-        """Control periods and decisions per second of lanes of `LANE` decisions."""
-        tasks = []
-        for _ in range(lanes):
-            self._lane += 1
-            seed = (0, self._lane)
-            tasks.append(Task("lane", self.network.arrays(), self.deviation, seed, LANE, 2))
-        if processes == 1:
-            self._env = self._env or self.make()
-        elif self._pool is None:
-            self._pool = Workers(self.make, processes)
-            list(self._pool.each(tasks[:1] * processes))  # builds their environments
-        self._periods.value = 0
+        """Control periods and decisions per second of ``lanes`` lanes of `LANE` decisions in each process."""
+        context = multiprocessing.get_context("fork")
+        while len(self._workers) < processes:
+            mine, theirs = context.Pipe()
+            process = context.Process(target=_serve, args=(theirs,), daemon=True)
+            process.start()
+            theirs.close()
+            self._workers.append((mine, process))
+        pipes = [pipe for pipe, _ in self._workers[:processes]]
+        for pipe in pipes:
+            pipe.send(range(self._lane, self._lane + lanes))
+            self._lane += lanes
+        for pipe in pipes:
+            pipe.recv()
         started = time.perf_counter()
-        if processes == 1:
-            for task in tasks:
-                collect(self._env, task)
-        else:
-            assert self._pool is not None
-            list(self._pool.each(tasks))
+        for pipe in pipes:
+            pipe.send("again")
+        periods = sum(pipe.recv() for pipe in pipes)
         spent = time.perf_counter() - started
-        return self._periods.value / spent, lanes * LANE / spent
+        return periods / spent, processes * lanes * LANE / spent
 
     def close(self) -> None:
-        """End the workers."""
-        if self._pool is not None:
-            self._pool.close()
+        """End the processes."""
+        for pipe, process in self._workers:
+            pipe.close()
+            process.join(timeout=10.0)
+            if process.is_alive():
+                process.kill()
+
+
+def _serve(pipe: Any) -> None:
+    """Decide lanes, and run them again and count their control periods, until nobody asks any more."""
+    env = EpisodeEnv(grasp_then_pick.build(), grasp_then_pick.scene(), lesson=2)
+    network, periods, step = untrained(env.scene.robot), [0], env.runner.step
+
+    def counted(command: Any) -> None:
+        periods[0] += 1
+        step(command)
+
+    env.runner.step = counted  # type: ignore[method-assign]
+    lanes: list[list[tuple[int, list[Any]]]] = []
+    while True:
+        try:
+            asked = pipe.recv()
+        except EOFError:
+            return
+        if asked != "again":
+            lanes = [decided(env, network, lane) for lane in asked]
+        periods[0] = 0
+        if asked == "again":
+            for episodes in lanes:
+                for seed, actions in episodes:
+                    env.reset(seed=seed)
+                    for action in actions:
+                        env.step(action)
+        pipe.send(periods[0])
+
+
+def decided(env: EpisodeEnv, network: Network, lane: int) -> list[tuple[int, list[Any]]]:
+    """The episodes of a lane: their seeds, and the actions of the network with noise."""
+    rng = np.random.default_rng((0, lane))
+    noise = rng.normal(0.0, DEVIATION, (LANE, Grasp.actions + 1)).astype(np.float32)
+    noise[:, -1] = 0.0
+    episodes: list[tuple[int, list[Any]]] = []
+    over = True
+    for row in noise:
+        if over:
+            episodes.append((int(rng.integers(2**31)), []))
+            features, _ = env.reset(seed=episodes[-1][0])
+        action = np.clip(network(features) + row, -1.0, 1.0)
+        episodes[-1][1].append(action)
+        features, _, terminated, truncated, _ = env.step(action)
+        over = terminated or truncated
+    return episodes
 
 
 def ours_learn(rollouts: int, config: TrainConfig) -> float:
@@ -163,7 +196,7 @@ def throughput(rounds: int, lanes: int, peer: Peer) -> dict[str, float]:
         ours.rate(1, 1)
         for _ in range(rounds):
             for processes in (1, 2):
-                periods, decisions = ours.rate(processes, lanes * processes)
+                periods, decisions = ours.rate(processes, lanes)
                 _note(table, **{f"steps_{processes}": periods, f"decisions_{processes}": decisions})
                 if not peer.missing:
                     other = peer.steps(processes, 150 * lanes * processes)

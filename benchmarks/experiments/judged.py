@@ -13,7 +13,7 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import InputError
 from bt_tasksim.network import Network
-from bt_tasksim.policy import PROGRAMMED, LearnedPolicy, Policy, ProgrammedPolicy
+from bt_tasksim.policy import PROGRAMMED, Action, LearnedPolicy, Policy, ProgrammedPolicy
 from bt_tasksim.policy_files import load_policy
 from bt_tasksim.policy_library import find_policy
 from bt_tasksim.scene import Scene
@@ -105,9 +105,8 @@ def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
         assert decision is not None
         action = policy.act(decision.leaf.model, decision.seen, decision.memory)
         nearer += float(action.terminate)
-        signal = 1.0 if nearer >= 1.0 else -1.0
-        motion = np.clip(np.asarray(action.motion, float), -1.0, 1.0)
-        _, _, terminated, truncated, info = env.step(np.append(motion, signal))
+        motion = np.asarray(action.motion, np.float64)
+        _, _, terminated, truncated, info = env.act(Action(motion, np.bool_(nearer >= 1.0)))
         decisions += 1
         if terminated or truncated:
             hidden = env.runner.context.hidden()

@@ -13,7 +13,7 @@ from py_trees.common import Status
 from bt_tasksim.concept import TIMED_OUT, VIOLATED, ConceptModel, Decision
 from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import BtTasksimError, InputError, LeafError
-from bt_tasksim.policy import Policy, split_action
+from bt_tasksim.policy import Action, Policy, split_action
 from bt_tasksim.poses import Array
 from bt_tasksim.runner import LONGEST, Runner, end_all, failed_leaf, raising_leaf
 from bt_tasksim.scene import Scene
@@ -143,13 +143,21 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             InputError: The action has the wrong shape or is not finite.
             RuntimeError: There is no episode.
         """
-        decision = self._decision
-        if decision is None:
-            raise RuntimeError("step() without an episode: call reset() first")
         action = np.asarray(action, np.float64)
         if action.shape != self._action_shape or not np.isfinite(action).all():
             raise InputError(f"an action should be {self._action_shape[0]} finite numbers, found {action}")
-        decision.leaf.decide(split_action(action))
+        return self.act(split_action(action))
+
+    def act(self, action: Action) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """`step` with what a policy decides: a programmed one may ask for more than an action's bounds allow.
+
+        Raises:
+            RuntimeError: There is no episode.
+        """
+        decision = self._decision
+        if decision is None:
+            raise RuntimeError("step() without an episode: call reset() first")
+        decision.leaf.decide(action)
         self._decision = None
         parts = dict.fromkeys(PARTS, 0.0)
         found = self._until_decision()
