@@ -178,15 +178,15 @@ def superellipsoid(half_size: Array, e1: float, e2: float, n: int = 16) -> Trian
 
 def mass_properties(mesh: TriangleMesh) -> MassProperties:
     """Volume, centre of mass and inertia of the solid inside a closed mesh, by signed tetrahedra."""
-    corners = mesh.vertices[mesh.faces]
-    a, b, c = corners.transpose(1, 2, 0)
+    corners = [mesh.vertices[mesh.faces[:, k]] for k in range(3)]
+    a, b, c = (corner.T for corner in corners)
     det = (a * (b[[1, 2, 0]] * c[[2, 0, 1]] - b[[2, 0, 1]] * c[[1, 2, 0]])).sum(axis=0)
     volume = float(np.sum(det)) / 6
-    total = np.sum(corners, axis=1)
+    total = corners[0] + corners[1] + corners[2]
     centre = np.sum(det[:, None] * total, axis=0) / (24 * volume)
     centre = np.where(np.abs(centre) < 1e-9, 0.0, centre)
     weighed = det[:, None]
-    second = sum(corners[:, k].T @ (weighed * corners[:, k]) for k in range(3)) + total.T @ (weighed * total)
+    second = sum(corner.T @ (weighed * corner) for corner in corners) + total.T @ (weighed * total)
     second = second / (120 * volume) - np.outer(centre, centre)
     tensor = np.trace(second) * np.eye(3) - second
     if np.max(np.abs(tensor - np.diag(np.diag(tensor)))) < 1e-4 * np.trace(tensor):

@@ -20,7 +20,7 @@ CLOSE = (170, 100, 470, 400)
 """Left, top, right and bottom of the part of a picture around an object on the table."""
 WHOLE = (80, 0, 560, 480)
 SIDE, CAPTION = 190, 16
-MOST_COLOURS = 96
+MOST_COLOURS = 256
 
 
 @dataclass(frozen=True)
@@ -120,5 +120,6 @@ def sheet(path: Path, strips: Sequence[Strip], columns: int = 1) -> None:
         for n, picture in enumerate(strip.pictures):
             board.paste(Image.fromarray(picture), (x + n * SIDE, y + CAPTION))
     path.parent.mkdir(parents=True, exist_ok=True)
-    colours = board.quantize(MOST_COLOURS, dither=Image.Dither.NONE)
+    # An octree keeps the colours of small objects, which a median cut gives to the table.
+    colours = board.quantize(MOST_COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     colours.save(path, optimize=True)

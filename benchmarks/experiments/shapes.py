@@ -17,7 +17,7 @@ from benchmarks.success import FIRST_SEED
 from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import InputError
 from bt_tasksim.policy import PROGRAMMED
-from bt_tasksim.training.evaluation import Job
+from bt_tasksim.training.evaluation import Job, evaluate
 from trees.scenarios import grasp_then_pick
 
 NOISE, DRAWS = "original", 300
@@ -110,7 +110,7 @@ def draw_as(found: dict[str, Any], folder: Path, letter: str) -> None:
 
 
 def film(found: dict[str, Any], request: Request, letter: str = "B") -> None:
-    """Frames of the first success of each shape."""
+    """Frames of the first success of each shape, and of the first failure of each kind."""
     robot = found["robot"]
     policy = str(policy_of(request, robot))
     job = Job("grasp_then_pick", None, robot, EngineOptions(noise=NOISE), policies=(("grasp", policy),))
@@ -119,4 +119,8 @@ def film(found: dict[str, Any], request: Request, letter: str = "B") -> None:
         good = [row[0] for row in found["draws"] if row[1] == kind and row[4]]
         if good:
             strips.append(frames.film(job, good[0], f"{kind}, seed {good[0]}"))
+    failed: dict[str, int] = {}
+    for outcome in evaluate(job, [row[0] for row in found["draws"] if not row[4]], request.workers).outcomes:
+        failed.setdefault(grasp.failure(outcome), outcome.seed)
+    strips += [frames.film(job, seed, f"{kind}, seed {seed}") for kind, seed in failed.items()]
     frames.sheet(request.pictures / f"{letter}-frames.png", strips, columns=2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import isfinite
 from typing import Any
 
 import gymnasium
@@ -144,7 +145,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             RuntimeError: There is no episode.
         """
         action = np.asarray(action, np.float64)
-        if action.shape != self._action_shape or not np.isfinite(action).all():
+        if action.shape != self._action_shape or not isfinite(action @ action):
             raise InputError(f"an action should be {self._action_shape[0]} finite numbers, found {action}")
         return self.act(split_action(action))
 
