@@ -30,6 +30,8 @@ SAID = {
     "SIGKILL of the runner": "bt-tasksim watchdog: the runner is gone",
     "SIGSTOP of the runner": "bt-tasksim watchdog: no sign of life from the runner for",
 }
+OR = {"SIGSTOP of the runner": "late: no command for"}
+"""What may be said instead: the last command expires before the watchdog's time, and the runner goes on then."""
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -41,7 +43,7 @@ def test_the_arm_holds_in_time_and_the_reason_is_said(fault):
     assert seen.held <= REACTION
     assert seen.far <= 0.2 and seen.drift <= 0.002, "it moves little farther, and stands then"
     assert seen.fastest <= 1.0, "and no faster than it went before"
-    assert SAID[fault] in seen.said, seen.said
+    assert SAID[fault] in seen.said or OR.get(fault, SAID[fault]) in seen.said, seen.said
     assert seen.running == [], "every node has ended"
     assert seen.again, "a fresh run works"
 
