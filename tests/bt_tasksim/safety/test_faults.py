@@ -31,7 +31,7 @@ SAID = {
     "SIGSTOP of the runner": "bt-tasksim watchdog: no sign of life from the runner for",
 }
 OR = {"SIGSTOP of the runner": "late: no command for"}
-"""What may be said instead: the last command expires before the watchdog's time, and the runner goes on then."""
+"""What may be said instead: the last command expires before the watchdog's time, and the runner goes on."""
 
 
 @pytest.mark.parametrize("fault", FAULTS)
