@@ -104,8 +104,11 @@ _OBSERVATION = {
 }
 _TARGET = {"position": ArraySpec(("joints",)), "velocity": ArraySpec(("joints",))}
 _COMMAND = {"tool": ArraySpec((7,), optional=True), "hand": ArraySpec(("closures",), optional=True)}
-_COLOUR = ArraySpec(("height", "width", 3), "|u1")
-_DEPTH = ArraySpec(("height", "width"), "<f4", optional=True)
+_IMAGE = {
+    "colour": ArraySpec(("height", "width", 3), "|u1"),
+    "depth": ArraySpec(("height", "width"), "<f4", optional=True),
+    "taken": ArraySpec((), optional=True),
+}
 
 REQUESTS: Mapping[str, MessageSpec] = {
     "hello": MessageSpec({"role": str, "version": str, "robot": str, "digests": dict[str, str]}),
@@ -294,15 +297,14 @@ def _array_specs(kind: str, images: int) -> dict[str, ArraySpec]:
     specs = dict(SCHEMA[kind].arrays)
     for i in range(images):
         named = {"height": f"height {i}", "width": f"width {i}"}
-        for part, spec in (("colour", _COLOUR), ("depth", _DEPTH)):
+        for part, spec in _IMAGE.items():
             shape = tuple(named.get(n, n) if isinstance(n, str) else n for n in spec.shape)
             specs[f"{part} {i}"] = ArraySpec(shape, spec.dtype, spec.values, spec.optional)
     return specs
 
 
 def _image_arrays(images: Sequence[Image]) -> dict[str, Array]:
-    arrays = {f"colour {i}": image.colour for i, image in enumerate(images)}
-    return {**arrays, **{f"depth {i}": image.depth for i, image in enumerate(images)}}
+    return {f"{part} {i}": getattr(image, part) for i, image in enumerate(images) for part in _IMAGE}
 
 
 def _cameras(plain: Any) -> tuple[CameraModel, ...]:
@@ -316,10 +318,11 @@ def _cameras(plain: Any) -> tuple[CameraModel, ...]:
 def _images(cameras: Sequence[CameraModel], arrays: dict[str, Array]) -> list[Image]:
     found = []
     for i, camera in enumerate(cameras):
-        colour, depth = arrays.pop(f"colour {i}"), arrays.pop(f"depth {i}", None)
+        colour, depth, taken = (arrays.pop(f"{part} {i}", None) for part in _IMAGE)
+        assert colour is not None, "an image without colour was refused"
         if colour.shape[:2] != (camera.height, camera.width):
             raise InputError(f"an image of {colour.shape} is not what its camera {shown(camera.name)} gives")
-        found.append(Image(camera, colour, depth))
+        found.append(Image(camera, colour, depth, None if taken is None else float(taken)))
     return found
 
 

@@ -98,18 +98,20 @@ def test_one_number_that_is_not_finite_is_refused_on_either_side(message, data):
 
 
 def test_images_travel_with_their_cameras_and_without_a_copy(image, state):
-    flat = dataclasses.replace(image, depth=None, camera=dataclasses.replace(image.camera, name="other"))
+    camera = dataclasses.replace(image.camera, name="other")
+    flat = dataclasses.replace(image, depth=None, camera=camera, taken=1.25)
     message = Message(1, "observe", arrays=arrays_of(state), images=(image, flat))
     sizes = SIZES | {"objects": 2}
     frames = encode(message, sizes)
-    assert isinstance(frames[-1], memoryview) and frames[-1].obj is not None
+    assert isinstance(frames[-2], memoryview) and frames[-2].obj is not None
     back = decode(frames, ["observe"], sizes)
     assert [i.camera.name for i in back.images] == ["scene", "other"]
     for a, b in zip(back.images, (image, flat), strict=True):
         assert same(a.colour, b.colour) and (a.camera.width, a.camera.height) == (320, 240)
         assert (a.depth is None and b.depth is None) or same(a.depth, b.depth)
         assert same(a.camera.matrix, b.camera.matrix) and same(a.camera.pose, b.camera.pose)
-    assert np.shares_memory(back.images[0].colour, np.frombuffer(frames[-3], np.uint8))
+        assert a.taken == b.taken
+    assert np.shares_memory(back.images[0].colour, np.frombuffer(frames[-4], np.uint8))
     wrong = dataclasses.replace(image, camera=dataclasses.replace(image.camera, width=319))
     with pytest.raises(BadMessageError, match="is not what its camera 'scene' gives"):
         decode(encode(Message(1, "image", images=(wrong,)), {}), ["image"], {})
@@ -161,7 +163,8 @@ def test_a_changed_array_is_another_layout(monkeypatch):
     for kind, array in (("step", ArraySpec((3,))), ("truth", ArraySpec(("joints",), "<f4"))):
         monkeypatch.setitem(SCHEMA, kind, MessageSpec(arrays={"time": array}))
         digests.add(layout_digest())
-    monkeypatch.setattr(messages_file, "_DEPTH", ArraySpec(("height", "width"), "<f8", optional=True))
+    wide = ArraySpec(("height", "width"), "<f8", optional=True)
+    monkeypatch.setitem(messages_file._IMAGE, "depth", wide)
     digests.add(layout_digest())
     monkeypatch.setattr(messages_file, "PROTOCOL", 2)
     assert len(digests | {layout_digest()}) == 5
