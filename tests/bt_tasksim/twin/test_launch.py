@@ -88,6 +88,12 @@ def test_a_robot_without_its_topics(made, tmp_path) -> None:
         Twin(load_robot("panda"), WORLD, ros="x.yaml")
 
 
+def attentive() -> None:
+    """No signal is ignored, whoever started the tests, be it a job in the background or with nohup."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 def test_it_ends_with_everything_it_started(made, tmp_path: Path, stop: signal.Signals) -> None:
     port = free_port()
@@ -96,7 +102,7 @@ def test_it_ends_with_everything_it_started(made, tmp_path: Path, stop: signal.S
         words("--port", str(port), "--domain", domain),
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
         env={**os.environ, "TMPDIR": str(tmp_path)},
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=attentive,
     )  # fmt: skip
     assert process.stdout is not None
     lines = [process.stdout.readline() for _ in range(3)]

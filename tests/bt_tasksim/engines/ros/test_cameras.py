@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bt_tasksim.engines.ros.cameras import RosCameras
+from bt_tasksim.engines.ros.cameras import EVERY, TOGETHER, RosCameras
 from bt_tasksim.engines.ros.setting import load_setting
 from bt_tasksim.errors import MachineError
 from bt_tasksim.robot import load_robot
@@ -34,16 +34,19 @@ class Robot:
     def subscribe(self, topic: str, kind: str, handle: Any, throttle: int = 0) -> None:
         self._handles[topic] = handle
 
-    def picture(self, taken: float, shade: int = 0, damaged: bool = False) -> None:
-        """Colour and depth of one instant, or files that break off."""
-        header = {"stamp": {"sec": int(taken), "nanosec": int(taken % 1 * 1e9)}, "frame_id": "camera"}
+    def picture(self, taken: float, shade: int = 0, damaged: bool = False, later: float = 0.0) -> None:
+        """Colour and depth, of one instant but for so many seconds, or files that break off."""
+        header, after = (
+            {"stamp": {"sec": int(t), "nanosec": int(t % 1 * 1e9)}, "frame_id": "camera"}
+            for t in (taken, taken + later)
+        )
         info = {"header": header, "width": 8, "height": 6, "k": [6.0, 0, 4, 0, 6.0, 3, 0, 0, 1], "d": []}
         self._handles[TOPICS.info](info, taken)
         colour, depth = np.full((6, 8, 3), shade, np.uint8), np.full((6, 8), 1000, np.uint16)
-        for topic, pixels in ((TOPICS.colour, colour), (TOPICS.depth, depth)):
+        for topic, pixels, head in ((TOPICS.colour, colour, header), (TOPICS.depth, depth, after)):
             content = cv2.imencode(".png", pixels)[1].tobytes()
             data = base64.b64encode(content[:40] if damaged else content).decode()
-            self._handles[topic]({"header": header, "format": "png", "data": data}, taken)
+            self._handles[topic]({"header": head, "format": "png", "data": data}, taken)
 
 
 def test_a_picture_says_when_it_was_taken() -> None:
@@ -57,6 +60,33 @@ def test_a_picture_says_when_it_was_taken() -> None:
     robot.picture(time.monotonic(), shade=9)
     newer = cameras.render(None, "scene", depth=True)  # type: ignore[arg-type]
     assert newer.taken is not None and newer.taken > image.taken and newer.colour[0, 0, 0] == 9
+
+
+def test_colour_and_depth_are_of_one_instant() -> None:
+    robot = Robot()
+    cameras = RosCameras(robot)  # type: ignore[arg-type]
+    threading.Timer(0.05, lambda: robot.picture(time.monotonic(), shade=7, later=0.08)).start()
+    threading.Timer(0.3, lambda: robot.picture(time.monotonic(), shade=9, later=0.02)).start()
+    cameras.reset(None)  # type: ignore[arg-type]  # the first ones do not belong together
+    image = cameras.render(None, "scene", depth=True)  # type: ignore[arg-type]
+    assert image.colour[0, 0, 0] == 9 and image.taken == pytest.approx(0.3, abs=0.09)
+
+
+@pytest.mark.parametrize("period", [0.01, 0.033, 0.039, 0.041, 0.05, 0.067, 0.1, 0.2])
+def test_what_a_bridge_leaves_of_colour_and_depth_belongs_together(period: float) -> None:
+    """Pictures of any rate, of which a bridge hands on one each 40 ms at most, colour from another one on."""
+
+    def left(first: int) -> list[float]:
+        kept: list[float] = []
+        for taken in np.arange(first, 400) * period:
+            if not kept or taken - kept[-1] >= EVERY / 1000.0:
+                kept.append(float(taken))
+        return kept
+
+    for first in range(5):
+        colour, depth = np.array(left(0)), np.array(left(first))
+        apart = np.abs(colour[5:50, None] - depth[None, :]).min(axis=1)
+        assert apart.max() <= TOGETHER
 
 
 def test_a_new_run_has_pictures_of_its_own() -> None:
