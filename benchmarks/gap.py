@@ -1,7 +1,8 @@
 """The same trees and policies in SAPIEN, in MuJoCo and on the twin over ROS, on the same draws.
 
-``python -m benchmarks.gap --episodes 100 --json benchmarks/results/gap.json`` runs `pick_and_throw` and
-`shelf_to_shelf`, each with the programmed and with the learned grasp, and prints a table with 95 % intervals.
+``python -m benchmarks.gap --episodes 100 --save`` runs `pick_and_throw` and `shelf_to_shelf`, each with the
+programmed and with the learned grasp, prints a table with 95 % intervals, and writes each row to a file
+``benchmarks/results/gap-<scenario>-<grasp>-<engines>.json``, so that several calls can measure parts of it.
 On the twin, success is judged by its own hidden state, read through the evaluation channel after the run; the
 run is in real time (about ten seconds an episode), in the other two as fast as it goes.
 """
@@ -15,10 +16,10 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from benchmarks.faults import bench_of
+from benchmarks.success import RESULTS
 from bt_tasksim.engines.registry import EngineOptions
 from bt_tasksim.errors import BtTasksimError
 from bt_tasksim.files import write_text
@@ -104,20 +105,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--grasps", nargs="*", default=list(GRASPS), choices=GRASPS)
     parser.add_argument("--engines", nargs="*", default=list(ENGINES), choices=ENGINES)
     parser.add_argument("--domain", type=int, default=45)
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--save", action="store_true", help="write each row to benchmarks/results")
     options = parser.parse_args(arguments)
     seeds = range(options.seed, options.seed + options.episodes)
-    rows: list[dict[str, Any]] = []
     print("| scenario | grasp | engines | success | 95 % interval | failures |")
     print("|---|---|---|---|---|---|")
     for scenario in options.scenarios:
         for grasp in options.grasps:
             for engines in options.engines:
                 episodes = _episodes(scenario, grasp, engines, seeds, options.domain)
-                rows.append(_row(scenario, grasp, engines, episodes))
-                print(_line(rows[-1]), flush=True)
-                if options.json:
-                    write_text(options.json, json.dumps(rows, indent=1) + "\n")
+                row = _row(scenario, grasp, engines, episodes)
+                print(_line(row), flush=True)
+                if options.save:
+                    name = f"gap-{scenario}-{grasp}-{engines}.json"
+                    write_text(RESULTS / name, json.dumps(row, indent=1) + "\n")
     return 0
 
 

@@ -94,7 +94,7 @@ def test_a_cell_of_ros2_control_alone(bench: Bench, tmp_path: Path, fault: str) 
     """Nobody announces runs or takes a word to hold: what stops the arm is the watchdog's own trajectory."""
     data = yaml.safe_load(bench.setting.source.read_text())
     del data["begin"], data["hold"]
-    data["emergency_stop"] = {"topic": data["emergency_stop"], "every": 1.0}
+    data["emergency_stop"]["every"] = 1.0
     (tmp_path / "cell.yaml").write_text(yaml.safe_dump(data))
     with bench_of(bench.twin.domain - 1 or 101, str(tmp_path / "cell.yaml")) as plain:
         seen = measure(plain, fault, seed=0)
