@@ -1,8 +1,8 @@
 """Measured numbers into the documentation: ``python -m benchmarks.tables``.
 
 Reads ``benchmarks/results/*.json`` and writes the tables between the marker comments of README.md,
-docs/evaluation.md, docs/training.md, docs/experiments.md and docs/remote_engines.md, so that no number is
-typed by hand. Results are what the measurements write:
+docs/evaluation.md, docs/training.md, docs/experiments.md, docs/remote_engines.md and docs/twin.md, so that no
+number is typed by hand. Results are what the measurements write:
 
 - ``<scenario>-<robot>[-camera][-fromlogs].json`` by ``python -m benchmarks.success``, in the format of
   ``bt-tasksim evaluate --json``;
@@ -12,6 +12,8 @@ typed by hand. Results are what the measurements write:
 - ``experiment-<letter>.json`` by ``python -m benchmarks.experiments <letter>``;
 - ``speed.json`` by ``bt-tasksim bench --json``;
 - ``remote.json`` by ``python -m benchmarks.remote``;
+- ``gap-<scenario>-<grasp>-<engines>.json`` by ``python -m benchmarks.gap``, ``faults.json`` by
+  ``python -m benchmarks.faults``, ``loop.json`` by ``python -m benchmarks.loop``;
 - ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
 
 ``--check`` changes nothing and fails when a table is not up to date.
@@ -26,7 +28,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from benchmarks import learned_tables
+from benchmarks import learned_tables, robot_tables
 from benchmarks.experiments import pages as experiment_tables
 from benchmarks.success import FIRST_SEED, RESULTS, SCENARIOS
 from benchmarks.success import ROWS as MEASURED
@@ -39,13 +41,14 @@ PAGES = (
     "docs/training.md",
     "docs/experiments.md",
     "docs/remote_engines.md",
+    "docs/twin.md",
 )
 ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
 KINDS = ("camera", "fromlogs")
-OTHER = ("speed", "decomposition", "learning", "remote")
-APART = ("oracle-", "grasp-", "experiment-", "training-")
-"""How results begin that have tables of their own: see `benchmarks.learned_tables`, `experiments.pages`."""
+OTHER = ("speed", "decomposition", "learning", "remote", "faults", "loop")
+APART = ("oracle-", "grasp-", "experiment-", "training-", "gap-")
+"""How results begin whose tables are made in `learned_tables`, `robot_tables` and `experiments.pages`."""
 NOT_YET = "not measured yet"
 
 
@@ -211,6 +214,7 @@ TABLES = {
     "decomposition": decomposition,
     "remote": remote,
     **learned_tables.TABLES,
+    **robot_tables.TABLES,
     **experiment_tables.TABLES,
 }
 MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end of table -->)", re.DOTALL)

@@ -22,6 +22,9 @@ from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 
 SETTLED = 3
 """Ticks for which opposing contacts and a still hand must be seen."""
+ACCELERATION = 3.0
+"""Peak acceleration of the tool on the way to the grasp, m/s^2. It matters where the way is short, as for a
+second grasp beside the first one: an arm that is hurried comes to the object beside its path."""
 TIGHTENING = 0.2
 """The Panda's fingers press 1 N more in each control period. Measured with the middle of the action and a
 fixed number of control periods from opposing contacts on: the Ability hand holds 143 of 150 objects, and at
@@ -159,7 +162,8 @@ class Grasp(ConceptModel):
         approach = poses.rotate(goal[3:], np.array([0.0, 0.0, 1.0]))
         back = goal.copy()
         back[:3] -= self.standoff * approach
-        path = plan([*_way_out(seen, back), back, goal], self.speed, blend=0.03)
+        way = [*_way_out(seen, back), back, goal]
+        path = plan(way, self.speed, blend=0.03, acceleration=ACCELERATION)
         estimate = self._estimate(seen, goal, approach)
         middle = np.zeros(CLOSE + 1)
         deeper = SLANTED * math.sqrt(max(0.0, 1.0 - estimate[3] ** 2))
