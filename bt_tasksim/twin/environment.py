@@ -55,8 +55,8 @@ def site_packages(folder: Path) -> Path:
 def ros_variables(domain: int) -> dict[str, str]:
     """Variables of a process that speaks ROS with processes of this machine alone.
 
-    Messages go by UDP. Fast DDS's shared memory has locks in it that a killed process may leave behind, so that
-    the next one hears nothing, and files that it does leave behind.
+    Messages go by UDP. Fast DDS's shared memory has locks that a killed process may leave behind, so that the
+    next one hears nothing, and files that it does leave behind.
 
     Args:
         domain: Number of the ROS domain, 0 to 101; processes of different domains do not hear each other.

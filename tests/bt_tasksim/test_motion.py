@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bt_tasksim import poses
-from bt_tasksim.motion import Path, minimum_jerk, plan, sample
+from bt_tasksim.motion import TURN_BACK, Path, minimum_jerk, plan, sample
 
 torch = pytest.importorskip("torch")
 
@@ -56,6 +56,35 @@ def test_a_corner_is_rounded_and_no_more_than_asked():
     assert 0.005 < near < 0.05
     off = np.minimum(np.abs(tool[:, 1]), np.abs(tool[:, 0] - 0.4))
     assert off.max() < 0.05 and np.all(off[np.linalg.norm(tool[:, :3] - b[:3], axis=-1) > 0.051] < 1e-3)
+
+
+def accelerations(path, period=0.01):
+    tool = np.array([sample(path, t)[:3] for t in np.arange(-0.1, float(path.duration) + 0.1, period)])
+    velocity = np.diff(tool, axis=0) / period
+    smooth = np.array([np.convolve(v, np.full(5, 0.2), "valid") for v in velocity.T]).T  # the table's steps
+    return np.linalg.norm(np.diff(smooth, axis=0), axis=-1) / period
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.01, 0.02])
+@pytest.mark.parametrize("up", [0.03, 0.06, 0.1])
+def test_a_path_that_turns_back_does_so_gently(up, aside):
+    low, high, end = (poses.pose(p) for p in ([0, 0, 0.05], [aside, 0, 0.05 + up], [aside, 0, 0.0]))
+    path = plan([low, high, end], 0.5, blend=0.03, samples=200)
+    assert accelerations(path).max() < 1.3 * TURN_BACK
+    _, tool = walk(path)
+    assert tool[:, 2].max() > 0.05 + up / 4 and np.allclose(tool[-1], end)
+    assert np.abs(tool[:, 0] - aside / 2).max() <= aside / 2 + 1e-9  # and beside no line
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.02, 0.5), st.floats(0.5, 5.0))
+def test_a_short_path_is_not_hurried(length, acceleration):
+    a, b = poses.pose([0.3, 0.1, 0.2]), poses.pose([0.3, 0.1, 0.2 + length])
+    path = plan([a, b], 0.5, acceleration=acceleration, samples=2)
+    times = np.linspace(0.0, float(path.duration), 2001)
+    z = np.array([sample(path, t)[2] for t in times])
+    assert np.abs(np.diff(z, 2)).max() / times[1] ** 2 <= 1.01 * acceleration
+    assert float(path.duration) >= float(plan([a, b], 0.5, samples=2).duration)
 
 
 def test_a_straight_path_is_straight():
