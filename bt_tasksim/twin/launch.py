@@ -18,6 +18,7 @@ from typing import IO, Any
 import yaml
 
 from bt_tasksim.engines.ros.setting import load_setting
+from bt_tasksim.engines.ros.websocket import WebSocket
 from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.interrupts import ending
 from bt_tasksim.robot import RobotDescription
@@ -76,7 +77,7 @@ class Twin:
         if camera and not setting.cameras:
             raise InputError(f"'{setting.source}' names no cameras")
         self._python = environment(build)
-        self.domain, self._log = domain, log
+        self.domain, self._log, self._heard = domain, log, setting.wrench.topic
         self.port = port or free_port()
         self.evaluation_port = evaluation_port or free_port()
         self._home = Path(tempfile.mkdtemp(prefix="bt-tasksim-twin-"))
@@ -106,7 +107,7 @@ class Twin:
             raise
 
     def start_bridge(self) -> None:
-        """Start rosbridge, and wait until it listens.
+        """Start rosbridge, and wait until it listens, and hears the node where that runs.
 
         Raises:
             MachineError: It does not.
@@ -129,12 +130,12 @@ class Twin:
                     f"rosbridge ended with status {self.bridge.returncode}; is port {self.port} free?"
                 )
             with contextlib.suppress(OSError), socket.create_connection((LOOPBACK, self.port), 1.0):
-                return
+                return self._meet()
             time.sleep(0.02)
         raise MachineError(f"rosbridge does not listen at port {self.port} after {START:g} s")
 
     def start_node(self) -> None:
-        """Start the node, and wait until it is ready.
+        """Start the node, and wait until it is ready, and the bridge hears it.
 
         Raises:
             MachineError: It is not.
@@ -147,6 +148,24 @@ class Twin:
             start_new_session=True,
         )
         _wait_until_ready(self.node, "the twin")
+        self._meet()
+
+    def _meet(self) -> None:
+        """Wait until what the node says comes out of the bridge: it takes them seconds to find each other."""
+        if any(process is None or process.poll() is not None for process in (self.bridge, self.node)):
+            return
+        try:
+            listener = WebSocket(LOOPBACK, self.port)
+            try:
+                topic = {"topic": self._heard, "type": "geometry_msgs/WrenchStamped"}
+                listener.send(json.dumps({"op": "subscribe", **topic}))
+                heard = listener.receive(START)
+            finally:
+                listener.close()
+        except OSError as error:
+            raise MachineError(f"rosbridge has gone: {error}") from None
+        if heard is None:
+            raise MachineError(f"rosbridge hears nothing of the twin after {START:g} s")
 
     def start_camera(self, robot: str, ros: str, rate: int) -> None:
         """Start the camera, and wait for its first picture.
