@@ -10,6 +10,7 @@ import numpy as np
 from bt_tasksim import poses
 from bt_tasksim.engines.disturbance import Knock
 from bt_tasksim.engines.urdf_links import links_below, load_links
+from bt_tasksim.engines.urdf_visuals import load_collisions
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.errors import MachineError
 from bt_tasksim.poses import Array
@@ -168,6 +169,7 @@ class SapienPhysics:
         """
         if self._builder is None:
             robot = self.robot
+            load_collisions(robot.urdf)  # an InputError where a mesh is missing; SAPIEN goes on without it
             loader = self._scene.create_urdf_loader()
             loader.fix_root_link = True
             self._builder = loader.parse(str(robot.urdf))[0][0]

@@ -159,7 +159,10 @@ def _policy(name: str, value: Any) -> str:
 def _no_wider(what: str, smaller: Array, larger: Array) -> None:
     if np.any(smaller > larger + 1e-9):
         i = int(np.argmax(smaller - larger))
-        raise InputError(f"safety.{what} is wider than the arm's own limit for joint {i + 1}")
+        raise InputError(
+            f"safety.{what} is wider than the arm's own limit for joint {i + 1} of {len(smaller)}, by "
+            f"{float(smaller[i] - larger[i]):.3g}"
+        )
 
 
 def _one(data: Mapping[str, Any], name: str, key: str) -> float:

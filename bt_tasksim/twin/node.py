@@ -35,7 +35,7 @@ from bt_tasksim.robot import load_robot
 from bt_tasksim.scene import ActorConfiguration
 from bt_tasksim.twin import loop
 from bt_tasksim.twin.button import Button
-from bt_tasksim.twin.cell import Cell, Readings
+from bt_tasksim.twin.cell import NEVER, Cell, Readings
 from bt_tasksim.twin.controller import MOST_POINTS, RefusedError, Trajectory
 from bt_tasksim.twin.evaluation import EvaluationServer, hidden_to_json
 from bt_tasksim.twin.gap import load_gap
@@ -79,6 +79,7 @@ class TwinNode(Node):  # type: ignore[misc]
         here = {int(wire): own for own, wire in enumerate(setting.order)}
         self._wire = [here.get(k, -1) for k in range(len(setting.wire))]
         self._tick = 0
+        self._stopped = cell.stopped
         self._worlds = 0
 
     # ---- commands ---------------------------------------------------------------------------------------
@@ -117,6 +118,10 @@ class TwinNode(Node):  # type: ignore[misc]
     def step(self) -> None:
         """One period: physics, and what the sensors say."""
         self.cell.step()
+        if self.cell.stopped != self._stopped:
+            self._stopped = self.cell.stopped
+            if self._stopped not in ("", NEVER):
+                print(f"twin: the arm holds: {self._stopped}", file=sys.stderr, flush=True)
         self._tick += 1
         for reading in self.cell.readings():
             self._publish(reading)

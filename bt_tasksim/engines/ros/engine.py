@@ -7,6 +7,8 @@ trajectories out. Nothing here waits but `reset`, and nothing judges: the guard 
 
 from __future__ import annotations
 
+import itertools
+import math
 import threading
 import time
 import uuid
@@ -42,7 +44,11 @@ UNSEEN = 1.0
 STILL = (0.02, 0.03)
 """Speed (rad/s) and distance (rad) within which the arm stands where a run begins."""
 SETTLE = 5.0
-"""Seconds within which it must."""
+"""Seconds within which it must, once it has been told to be there."""
+LONGEST = 60.0
+"""Seconds that the way there may take."""
+HAND = 0.25
+"""Share of the hand's range by which a joint of it may be off there."""
 MATCH = 0.3
 """Seconds after which whoever listens to a topic has found whoever publishes there."""
 ANNOUNCED = 2.0
@@ -86,7 +92,10 @@ class RosRobot:
                 f"'{setting.source}' names no topic for the poses of objects: use --perception camera"
             )
         if robot.safety is None:
-            raise InputError(f"robot file '{robot.source}' has no section 'safety'")
+            raise InputError(
+                f"robot file '{robot.source}' has no section 'safety', and without limits nothing is moved: "
+                "docs/safety.md says what belongs in it"
+            )
         self.robot, self.setting, self.address, self.kinematics = robot, setting, address, kinematics
         self.tracked = tracked
         self.limits = robot.safety
@@ -183,7 +192,7 @@ class RosRobot:
             if time.monotonic() > end:
                 raise MachineError(
                     f"nothing usable has come for {PATIENCE:g} s on {', '.join(silent)}: do the topics of "
-                    f"'{self.setting.source}' exist, and does the robot publish there?"
+                    f"'{self.setting.source}' exist, does the robot publish there, what was refused above?"
                 )
             time.sleep(0.01)
 
@@ -206,11 +215,20 @@ class RosRobot:
         Raises:
             MachineError: It does not follow, or was stopped.
         """
-        start = self._checked().position
-        speed, acceleration = self._gentle()
         period, n = 0.05, len(self.robot.arm_joints)
+        self._checked_posture(goal)
+        start = self._begin_hand(beat, period)
+        speed, acceleration = self._gentle()
+        motions = approach(start, goal, speed, acceleration, period)
+        way = list(itertools.islice(motions, int(LONGEST / period)))
+        if next(motions, None) is not None:
+            k = int(np.argmax(np.abs(start - goal) / speed))
+            raise MachineError(
+                f"the way to the start would take more than {LONGEST:g} s: {self.robot.joints[k]} is "
+                f"{abs(start[k] - goal[k]):.2f} away; is 'approach' in '{self.setting.source}' too small?"
+            )
         following = time.monotonic()
-        for motion in approach(start, goal, speed, acceleration, period):
+        for motion in way:
             following = max(following, time.monotonic())  # what was late is not made up for
             beat()
             self._send(JointTarget(motion.position, motion.velocity, self.limits.validity), period)
@@ -227,17 +245,65 @@ class RosRobot:
             reading = self._checked()
             off = np.abs(reading.position - goal)[:n]
             if np.all(off < STILL[1]) and np.all(np.abs(reading.velocity[:n]) < STILL[0]):
-                return
+                return self._check_hand(reading.position - goal)
             if time.monotonic() > end:
                 raise self._astray(
                     int(np.argmax(off)), float(off.max()), "does not come to stand at its start"
                 )
             time.sleep(0.02)
 
+    def _checked_posture(self, goal: Array) -> None:
+        """The tool of a run that begins may not be where the guard would stop the run at once.
+
+        Raises:
+            InputError: It is.
+        """
+        tool, limits = self.kinematics.forward(goal)[:3], self.limits
+        if np.any(tool < limits.workspace[0]) or np.any(tool > limits.workspace[1]):
+            at = ", ".join(f"{x:.2f}" for x in tool)
+            raise InputError(
+                f"a run would begin with the tool at ({at}), outside of safety.workspace: change that or the "
+                f"rest posture in '{self.robot.source}'"
+            )
+
+    def _begin_hand(self, beat: Callable[[], None], period: float) -> Array:
+        """Have the hand's controller follow from where the hand is, and say where everything is.
+
+        It may have been told to close on something that is in the way, and what is commanded next must not be
+        a jump for it; so it gets the time for its whole way, while the arm stands.
+        """
+        n, (low, high) = len(self.robot.arm_joints), self.robot.hand_range
+        start = self._checked().position.copy()
+        start[n:] = np.clip(start[n:], low, high)
+        stand = JointTarget(start, np.zeros_like(start), self.limits.validity)
+        for k in reversed(range(math.ceil(1.0 / (self.robot.hand_speed * period)))):
+            beat()
+            self._send(stand, period, (k + 1) * period)
+            time.sleep(period)
+            self._checked()
+        return start
+
+    def _check_hand(self, off: Array) -> None:
+        """The hand has come to its start, too.
+
+        Raises:
+            MachineError: A joint is far from there.
+        """
+        n, (low, high) = len(self.robot.arm_joints), self.robot.hand_range
+        share = np.abs(off[n:]) / np.max(high - low)
+        if np.any(share > HAND):
+            k = int(np.argmax(share))
+            name, far = self.robot.joints[n + k], abs(off[n + k])
+            raise MachineError(
+                f"the hand does not come to its start: {name} is {far:.3f} away; is the controller of "
+                f"'{self.setting.hand.command}' active?"
+            )
+
     def _gentle(self) -> tuple[Array, Array]:
         """Speeds and accelerations ``(n_joints,)`` of the way to the start."""
         robot, share = self.robot, self.setting.approach
-        span = np.maximum(np.abs(robot.hand_closed - robot.hand_open), 1e-3) * robot.hand_speed
+        low, high = robot.hand_range
+        span = np.maximum(high - low, 0.1 * np.max(high - low)) * robot.hand_speed  # some joints only follow
         speed = np.concatenate([self.limits.velocity, span])
         acceleration = np.concatenate([self.limits.acceleration, span / 0.1])
         return share * speed, share * acceleration
@@ -251,13 +317,21 @@ class RosRobot:
         if self._held:
             raise MachineError(self.emergency.why or "the robot was told to hold")
         reading = self.latest()
-        if reading.names != self.robot.joints or not np.all(np.isfinite(reading.position)):
+        topic = self.setting.joint_states
+        if reading.names != self.robot.joints:
             raise MachineError(
-                f"{self.setting.joint_states}: joints in another order, or no numbers; see its file"
+                f"{topic} names other joints than joint_states.joints in '{self.setting.source}', or in "
+                f"another order: {', '.join(self.joints.heard)}"
             )
+        if not np.all(np.isfinite(reading.position)):
+            k = int(np.argmin(np.isfinite(reading.position)))
+            raise MachineError(f"{topic}: the position of {reading.names[k]} is {reading.position[k]}")
         age = time.monotonic() - reading.stamp
-        if age > self.limits.stale:
-            raise MachineError(f"{self.setting.joint_states} is silent for {1000 * age:.0f} ms")
+        if age > (limit := self.limits.stale):
+            raise MachineError(
+                f"{topic} is silent for {1000 * age:.0f} ms, the limit is {1000 * limit:.0f} ms: look at "
+                "network and load"
+            )
         if breach := checks.wrench(self._wrench(), self.limits.force, self.limits.torque):
             raise MachineError(breach.sentence)
         return reading
@@ -275,7 +349,7 @@ class RosRobot:
         """See `RealEngine.send`."""
         self._send(target, self._period)
 
-    def _send(self, target: JointTarget, period: float) -> None:
+    def _send(self, target: JointTarget, period: float, hand_takes: float = 0.0) -> None:
         setting, limits, n = self.setting, self.limits, len(self.robot.arm_joints)
         arm = messages.ending_at_rest(
             target.position[:n],
@@ -292,7 +366,7 @@ class RosRobot:
                 raise MachineError("the robot holds until a new run begins")
             link = self._alive()
             self._announce(link)
-            self._told, closing = arm[0].position, (Point(hand, None, period),)
+            self._told, closing = arm[0].position, (Point(hand, None, max(period, hand_takes)),)
             for group, points in ((setting.arm, arm), (setting.hand, closing)):
                 link.publish(group.command, messages.trajectory(group.joints, points, self._run), period)
 

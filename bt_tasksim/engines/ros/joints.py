@@ -21,6 +21,7 @@ class JointFeed:
 
     Attributes:
         newest: None before the first ones.
+        heard: Names on the wire, as the newest ones have them.
         offset: Seconds from the cell's clock to this machine's `time.monotonic`, the shortest delay of a
             message included; infinite before the first ones.
 
@@ -42,6 +43,7 @@ class JointFeed:
     def forget(self) -> None:
         """Only what arrives from now on counts."""
         self.newest: JointReading | None = None
+        self.heard: tuple[str, ...] = ()
         self._stamp = -math.inf
 
     def convert(self, stamp: float, arrived: float) -> float:
@@ -68,7 +70,7 @@ class JointFeed:
             behind = 1000.0 * (self._stamp - came.stamp)
             raise RefusedError(f"joint states: stamped {behind:.0f} ms before the last ones, not after them")
         stamp = self._clock.convert(came.stamp, arrived)
-        self._stamp, self.offset = came.stamp, stamp - came.stamp
+        self._stamp, self.offset, self.heard = came.stamp, stamp - came.stamp, came.names
         if came.names == setting.wire:
             order, names = setting.order, self._robot.joints
         else:  # the guard says what is wrong with them

@@ -179,8 +179,8 @@ def _setting(data: Mapping[str, Any], robot: RobotDescription, path: Path) -> Ro
     wire = names(data["joint_states"]["joints"], "joint_states.joints")
     if len(set(wire)) < len(wire):
         raise InputError("joint_states.joints names a joint twice")
-    arm = _group(data["arm"], "arm", len(robot.arm_joints), wire)
-    hand = _group(data["hand"], "hand", len(robot.hand_joints), wire)
+    arm = _group(data["arm"], "arm", robot.arm_joints, wire)
+    hand = _group(data["hand"], "hand", robot.hand_joints, wire)
     if both := set(arm.joints) & set(hand.joints):
         raise InputError(f"'{sorted(both)[0]}' is in arm.joints and in hand.joints")
     approach = positive(data.get("approach", 0.3), "approach")
@@ -212,8 +212,8 @@ def _setting(data: Mapping[str, Any], robot: RobotDescription, path: Path) -> Ro
     return setting
 
 
-def _group(data: Mapping[str, Any], what: str, n: int, wire: tuple[str, ...]) -> Group:
-    joints = names(data["joints"], f"{what}.joints")
+def _group(data: Mapping[str, Any], what: str, own: tuple[str, ...], wire: tuple[str, ...]) -> Group:
+    joints, n = names(data["joints"], f"{what}.joints"), len(own)
     if len(joints) != n or len(set(joints)) != n:
         raise InputError(
             f"{what}.joints should name the {n} joints of the robot's {what}, found {list(joints)}"
@@ -222,6 +222,12 @@ def _group(data: Mapping[str, Any], what: str, n: int, wire: tuple[str, ...]) ->
         if name not in wire:
             raise InputError(
                 f"{what}.joints names '{name}', which joint_states.joints lacks{nearest(name, wire)}"
+            )
+    for name, here in zip(joints, own, strict=True):
+        if name != here and name in own:
+            raise InputError(
+                f"{what}.joints has the robot's joints in another order, '{name}' where '{here}' should be: "
+                "the n-th name here is the n-th joint of the robot's file"
             )
     return Group(_topic(data["command"], f"{what}.command"), joints)
 

@@ -93,7 +93,7 @@ def test_another_order_is_left_to_the_guard() -> None:
     wrong = [ROBOT.joints[1], ROBOT.joints[0], *ROBOT.joints[2:]]
     robot.joints.take(states(wrong, START, 5.0), 100.0)
     assert robot.latest().names == tuple(wrong)
-    with pytest.raises(MachineError, match="in another order"):
+    with pytest.raises(MachineError, match=f"another order: {wrong[0]}, {wrong[1]}"):
         robot._held = False
         robot._checked()
 
@@ -218,6 +218,49 @@ def test_the_way_to_the_start_ends_where_something_pushes(monkeypatch: Any) -> N
     with pytest.raises(MachineError, match=r"force on the tool 1e\+03 N"):
         robot._approach(goal, lambda: None)
     assert not robot.link.times
+
+
+def test_the_hand_is_given_time_to_where_it_is(monkeypatch: Any) -> None:
+    """Its controller may have been told to close on something; a jump from there would be refused."""
+    robot = approaching(monkeypatch)
+    outside = START.copy()
+    outside[7:] = (0.0401, -0.0002)  # as measured, a little beyond what can be commanded
+    now = time.monotonic()
+    robot.joints.take(states(robot.setting.wire, outside, now), now)
+    robot._approach(START, lambda: None)
+    hand = [m["points"] for topic, m in robot.link.sent if topic == robot.setting.hand.command]
+    times = [p[0]["time_from_start"]["sec"] + 1e-9 * p[0]["time_from_start"]["nanosec"] for p in hand]
+    low, high = ROBOT.hand_range
+    assert times[0] == pytest.approx(1.0 / ROBOT.hand_speed, abs=0.02) and times[-1] <= 0.051
+    assert hand[0][0]["positions"] == pytest.approx([0.04, 0.0])
+    assert all(np.all(low <= p[0]["positions"]) and np.all(p[0]["positions"] <= high) for p in hand)
+    assert hand[-1][0]["positions"] == pytest.approx(ROBOT.hand_open)
+
+
+def test_a_hand_that_does_not_follow_is_noticed(monkeypatch: Any) -> None:
+    robot = approaching(monkeypatch)
+    goal = START.copy()
+    goal[7:] = ROBOT.hand_closed  # the echo's hand stays open
+    with pytest.raises(MachineError, match=r"does not come to its start: panda_finger_joint1 is 0\.040"):
+        robot._approach(goal, lambda: None)
+
+
+def test_a_way_to_the_start_that_would_take_for_ever(monkeypatch: Any) -> None:
+    robot = approaching(monkeypatch)
+    robot.setting = dataclasses.replace(robot.setting, approach=1e-3)
+    goal = START.copy()
+    goal[2] += 1.0
+    with pytest.raises(MachineError, match=r"would take more than 60 s: panda_joint3 is 1\.00 away"):
+        robot._approach(goal, lambda: None)
+
+
+def test_a_start_outside_of_the_workspace_is_refused_before_anything_moves(monkeypatch: Any) -> None:
+    robot = approaching(monkeypatch)
+    box = np.array([[0.9, -1.0, 0.0], [1.0, 1.0, 1.0]])
+    robot.limits = dataclasses.replace(robot.limits, workspace=box)
+    with pytest.raises(InputError, match=r"tool at \(.*\), outside of safety.workspace"):
+        robot._approach(START, lambda: None)
+    assert not robot.link.sent
 
 
 def test_an_emergency_stop_tapped_while_a_run_begins(monkeypatch: Any) -> None:

@@ -61,6 +61,11 @@ def test_the_order_on_the_wire_is_of_its_own(tmp_path: Path) -> None:
         ({"arm__joints": ["panda_joint1"]}, "7 joints of the robot's arm"),
         ({"joint_states__joints": ["panda_joint1"] * 2}, "names a joint twice"),
         ({"arm__joints": [f"panda_joint{i}" for i in (1, 2, 3, 4, 5, 6, 8)]}, "'panda_joint8'.*lacks"),
+        (
+            {"arm__joints": [f"panda_joint{i}" for i in (2, 1, 3, 4, 5, 6, 7)]},
+            "the robot's joints in another order, 'panda_joint2' where 'panda_joint1' should be",
+        ),
+        ({"hand__joints": ["panda_finger_joint2", "panda_finger_joint1"]}, "hand.joints has the robot's"),
         ({"arm__command": "arm controller"}, "arm.command should be a topic"),
         ({"hold": "/begin"}, "the topic '/begin' is named twice"),
         ({"approach": 3}, "approach should be a share"),
