@@ -162,10 +162,18 @@ class Bench:
         button.close()
 
     def restart(self) -> None:
-        """Have both processes run again, and the evaluation channel answer."""
-        if self.twin.bridge is None or self.twin.bridge.poll() is not None:
+        """Have both processes run again, and the evaluation channel answer.
+
+        A node that was killed takes its bridge with it, as where `bt-tasksim twin` is started again.
+        """
+        bridge, node = self.twin.bridge, self.twin.node
+        again = node is None or node.poll() is not None
+        if again and bridge is not None and bridge.poll() is None:
+            bridge.terminate()
+            bridge.wait()
+        if bridge is None or bridge.poll() is not None:
             self.twin.start_bridge()
-        if self.twin.node is None or self.twin.node.poll() is not None:
+        if again:
             self.twin.start_node()
             self.evaluation.close()
             self.evaluation = EvaluationClient(self.twin.evaluation_port)
