@@ -69,7 +69,7 @@ def messages(results: Results) -> str:
     """One message of each fault, as it was shown."""
     lines = ["| fault | said |", "|---|---|"]
     for fault, seen in (results.get("faults") or {}).items():
-        lines.append(f"| {fault} | `{seen[0]['said'].replace('|', '/')}` |")
+        lines.append(f"| {fault} | `{seen[0]['said'].replace('|', '/').replace(' []', '')}` |")
     return "\n".join(lines)
 
 
