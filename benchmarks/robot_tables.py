@@ -69,7 +69,8 @@ def messages(results: Results) -> str:
     """One message of each fault, as it was shown."""
     lines = ["| fault | said |", "|---|---|"]
     for fault, seen in (results.get("faults") or {}).items():
-        lines.append(f"| {fault} | `{seen[0]['said'].replace('|', '/').replace(' []', '')}` |")
+        said = seen[0]["said"].replace("|", "/").replace(" []", "").replace("bt-tasksim ", "")
+        lines.append(f"| {fault} | `{said}` |")
     return "\n".join(lines)
 
 
