@@ -497,6 +497,7 @@ def _twin(options: argparse.Namespace) -> int:
         chosen = f" --robot {options.robot}" if options.robot else ""
         chosen += f" --ros {options.ros}" if options.ros else ""
         chosen += f" --scene {options.scene}" if options.scene else ""
+        chosen += " --perception camera" if options.camera else ""
         where = f"--seed {options.seed} --engines ros:127.0.0.1:{twin.port}"
         try:
             print(f"twin of {scene.robot}, seed {options.seed}, in real time; Ctrl-C ends it")

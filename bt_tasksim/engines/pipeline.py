@@ -149,7 +149,12 @@ class EnginePipeline:
             self.rendering.reset(configuration)
         self.postprocess.reset(configuration, model)
         self.last = Command()
-        return self._observe(needed=True)
+        observation = self._observe(needed=True)
+        begin: Any = getattr(self.physics, "begin", None)
+        if begin is None:
+            return observation
+        self.state = begin()  # pictures and the first look have taken their time
+        return self._observe(needed=False)
 
     def step(self, command: Command, *, look: bool = False) -> Observation:
         """One control period: a part of the command that nobody wrote keeps its last target.

@@ -11,6 +11,7 @@ objects' shapes and colours by category, the calibrated fixtures and places.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,6 +66,29 @@ class Track:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class Look:
+    """A picture, and what was believed when it came.
+
+    Attributes:
+        image: The picture.
+        estimate: Poses ``(n, 7)`` of the objects.
+        handled: For each object, whether the hand held it, and whether it had touched it.
+    """
+
+    image: Image
+    estimate: Array
+    handled: tuple[tuple[bool, bool], ...]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a look found: fits by object, and for each object a sentence in case that it has none."""
+
+    fits: Mapping[int, Fit]
+    notes: tuple[str, ...]
+
+
 class CameraPostProcess:
     """A post-process engine with images.
 
@@ -75,20 +99,32 @@ class CameraPostProcess:
         robot: The robot.
         errors: Errors that are added to rendered images; on a real robot `camera_errors.PERFECT`.
         camera: Name of the RGB-D camera.
+        background: Look in a thread of its own, as a robot's control rate wants it. What was found counts
+            once it is there, unless the hand has taken or let go the object since. Where an object was never
+            seen, a look is waited for all the same.
     """
 
     perception = "camera"
 
     def __init__(
-        self, robot: RobotDescription, errors: CameraErrors | None = None, camera: str = "scene"
+        self,
+        robot: RobotDescription,
+        errors: CameraErrors | None = None,
+        camera: str = "scene",
+        background: bool = False,
     ) -> None:
         self.robot = robot
         self.errors = CameraErrors() if errors is None else errors
         self.camera = camera
+        self._thread = ThreadPoolExecutor(1, "bt-tasksim-look") if background else None
+        self._pending: tuple[Look, Future[Found]] | None = None
 
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> None:
         """See `PostProcessEngine.reset`."""
         n = len(configuration.objects)
+        if self._pending is not None:
+            self._pending[1].exception()  # it is over before anything changes under it
+            self._pending = None
         self._model = model
         self._targets = [
             Target(known, actor.shape())
@@ -106,6 +142,8 @@ class CameraPostProcess:
 
     def cameras(self, needed: bool) -> tuple[str, ...]:
         """The camera, when a concept asks for a look or an object is to be looked at."""
+        if self._pending is not None:
+            return ()  # what is found now counts first
         due = any(track.due <= self._next + 1e-6 for track in self._tracks)
         return (self.camera,) if self._tracks and (needed or due) else ()
 
@@ -118,6 +156,10 @@ class CameraPostProcess:
         time = float(state.time)
         self._next = time + self._model.control_period
         self._feel(state)
+        if self._pending is not None and self._pending[1].done():
+            look, found = self._pending
+            self._pending = None
+            self._conclude(look, found.result(), time)
         for image in images.values():
             if self._shows_now(image, time):
                 self._look(image, time)
@@ -185,13 +227,27 @@ class CameraPostProcess:
         return True
 
     def _look(self, image: Image, time: float) -> None:
+        """Have a picture looked at, and believe what was found, now or later."""
+        look = Look(image, self._estimate.copy(), tuple(map(_handled, self._tracks)))
+        if self._thread is None or not np.all(np.isfinite(self._estimate)):
+            self._conclude(look, self._search(look), time)
+        elif self._pending is None:
+            self._pending = (look, self._thread.submit(self._search, look))
+
+    def _search(self, look: Look) -> Found:
+        """Find the objects in a picture; changes nothing but the state of the generator.
+
+        Raises:
+            MachineError: The image has no depth.
+        """
+        image, notes = look.image, []
         if image.depth is None:
             raise MachineError(f"camera '{image.camera.name}' gives no depth: poses need an RGB-D camera")
         camera = as_calibrated(image.camera, self._calibration)
         depth = self.errors.depth(image.depth, self._rng)
         masks = classify(image.colour, self._colours, self._others)
         fits: list[tuple[Fit, int, Segment]] = []
-        for i, (target, track) in enumerate(zip(self._targets, self._tracks, strict=True)):
+        for i, target in enumerate(self._targets):
             alike = [k for k, colour in enumerate(self._colours) if colour == self._colours[i]]
             segments = find_segments(
                 camera,
@@ -203,44 +259,53 @@ class CameraPostProcess:
             )
             others = np.any([m for k, m in enumerate(masks) if k not in alike] or [0 * masks[i]], axis=0)
             for segment in segments[: 2 + len(alike)]:
-                fit = self._estimated(i, View(camera, depth, self._rng.permutation(segment.points), others))
+                view = View(camera, depth, self._rng.permutation(segment.points), others)
+                fit = self._estimated(i, view, look)
                 if fit is not None:
                     fits.append((fit, i, segment))
             pixels = segments[0].pixels if segments else 0
             amount = f"{pixels} pixels" if pixels else f"fewer than {SMALLEST} pixels"
-            track.note = (
+            notes.append(
                 f"{target.model.name} is not seen: camera '{image.camera.name}' shows {amount} "
                 f"of its colour{' but not its shape' if pixels else ''}"
             )
-        found: set[int] = set()
+        found: dict[int, Fit] = {}
         taken = np.zeros(depth.shape, bool)
         for fit, i, segment in sorted(fits, key=lambda f: f[0].cost):  # objects of one colour compete
             if i not in found and np.count_nonzero(taken & segment.mask) < segment.pixels / 4:
-                found.add(i)
+                found[i] = fit
                 taken |= segment.mask
-                self._tracks[i].note = ""
-                self._accept(i, fit, time)
+        return Found(found, tuple(notes))
+
+    def _conclude(self, look: Look, found: Found, time: float) -> None:
+        """Believe what a look has found, but for what the hand has taken or let go since."""
         for i, track in enumerate(self._tracks):
-            if i not in found:
+            if _handled(track) != look.handled[i]:
+                continue
+            track.note = "" if i in found.fits else found.notes[i]
+            if i in found.fits:
+                self._accept(i, found.fits[i], look.estimate[i], time)
+            else:
                 self._again(track, time, settled=False)
 
-    def _estimated(self, i: int, view: View) -> Fit | None:
+    def _estimated(self, i: int, view: View, look: Look) -> Fit | None:
         """The fit of object ``i`` to what may be it, or None."""
-        target, before = self._targets[i], self._estimate[i]
-        if self._tracks[i].grip is not None:
+        target, before = self._targets[i], look.estimate[i]
+        if look.handled[i][0]:
             fit = follow(target, view, before, self._model.places.values())
             moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
             turned = float(poses.angle_between(fit.pose[3:], before[3:]))
             return fit if fit.cost < 0.3 and moved < 0.02 and turned < 0.35 else None
         known = before if np.isfinite(before[0]) else None
-        return estimate_pose(target, view, [*self._model.places.values(), *self._tops(i)], known)
+        places = [*self._model.places.values(), *self._tops(i, look.estimate)]
+        return estimate_pose(target, view, places, known)
 
-    def _tops(self, i: int) -> list[PlaceModel]:
+    def _tops(self, i: int, estimate: Array) -> list[PlaceModel]:
         """The tops of the other objects that stand, as places."""
         tops = []
         table = next(iter(self._model.places.values()), None)
         for k, target in enumerate(self._targets):
-            pose = self._estimate[k]
+            pose = estimate[k]
             if k == i or table is None or not np.isfinite(pose[0]):
                 continue
             if poses.rotate(pose[3:], np.array([0.0, 0.0, 1.0]))[2] > 0.99:
@@ -251,9 +316,10 @@ class CameraPostProcess:
                 )
         return tops
 
-    def _accept(self, i: int, fit: Fit, time: float) -> None:
-        track, before = self._tracks[i], self._estimate[i].copy()
-        self._estimate[i] = fit.pose
+    def _accept(self, i: int, fit: Fit, before: Array, time: float) -> None:
+        track = self._tracks[i]
+        if track.grip is None or self._thread is None:  # else the hand has moved on with it
+            self._estimate[i] = fit.pose
         if track.grip is not None:
             # What holds is the tool: its pose is known far better than the object's.
             back = poses.multiply(poses.inverse(before), fit.pose)
@@ -272,3 +338,7 @@ class CameraPostProcess:
         elif np.isfinite(track.due) and track.due <= time + 1e-6:
             track.looks -= 1
             track.due = np.inf if settled or track.looks <= 0 else time + WAIT
+
+
+def _handled(track: Track) -> tuple[bool, bool]:
+    return track.grip is not None, track.touched

@@ -196,7 +196,7 @@ def ros_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePipel
         from bt_tasksim.engines.camera_errors import PERFECT
         from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
 
-        postprocess = CameraPostProcess(robot, PERFECT)
+        postprocess = CameraPostProcess(robot, PERFECT, background=True)
     rendering = RosCameras(engine) if not tracked else None
     return robot_pipeline(robot, engine, postprocess, rendering)
 

@@ -63,8 +63,9 @@ class Guard:
         self.check_period(period)
         self.period, self._shortest = period, self.limits.validity - period
         self.stopped = None
-        still = np.zeros_like(position)
-        self.motion = Motion(np.array(position, float), still)
+        still, begin, n = np.zeros_like(position), np.array(position, float), self._n
+        begin[n:] = np.clip(begin[n:], self.lower[n:], self.upper[n:])  # measured, and so beside its range
+        self.motion = Motion(begin, still)
         self._reference = self.motion
         self._tool = self.forward(self.motion.position)
         self._twist = np.zeros(6)
@@ -128,6 +129,8 @@ class Guard:
         share = 1.0 - min(max(seconds, 0.0) / braking, 1.0)
         velocity = self.motion.velocity * share
         position = rest - (rest - self.motion.position) * share**2
+        velocity[self._n :] = 0.0  # a hand goes where it was told, and no further
+        position[self._n :] = self.motion.position[self._n :]
         self.motion, self._tool = Motion(position, velocity), self.forward(position)
         before = self.forward(position - self.period * velocity)
         self._twist = checks.twist(before, self._tool, self.period)

@@ -78,6 +78,20 @@ class GuardedRobot:
         self.clock.start(period)
         return state
 
+    def begin(self) -> WorldState:
+        """The run begins now, after a `reset` and whatever else it took: the clock starts, from this state.
+
+        Raises:
+            SafetyStop: The robot's state is not to be trusted.
+        """
+        try:
+            state = self._read()
+        except MachineError as error:
+            self.hold(f"the run did not begin: {error}")
+            raise
+        self.clock.start(self.guard.period)
+        return state
+
     def step(self, target: JointTarget) -> WorldState:
         """Send one command, wait until the next tick begins, and read.
 

@@ -55,6 +55,23 @@ class Engines:
         return state, sorted(images)
 
 
+class Robot(Engines):
+    """Of which a run begins when everything is ready."""
+
+    def begin(self):
+        self.calls.append("begin")
+        return "state at the begin"
+
+
+def test_a_robots_time_begins_after_the_first_look():
+    robot = Robot(wants=["front"])
+    pipeline = EnginePipeline(robot, robot, robot, robot)
+    assert pipeline.reset(None, None) == ("state at the begin", [])
+    looked = robot.calls.index("rendering front of state 0 with depth")
+    assert robot.calls[looked:] == [robot.calls[looked], "post-process", "begin", "post-process"]
+    assert pipeline.state == "state at the begin"
+
+
 @pytest.fixture
 def engines():
     return Engines(wants=["front"])

@@ -23,12 +23,12 @@ PERIOD = 0.05
 class Bench:
     """A post-process engine with hand-made states and ray-cast images of one box."""
 
-    def __init__(self, errors=PERFECT, seed=1):
+    def __init__(self, errors=PERFECT, seed=1, background=False):
         self.world = SCENE.sample(seed)
         self.robot = load_robot("panda")
         self.pose = np.array(self.world.objects[0].pose)
         self.colour = self.world.objects[0].colour
-        self.post = CameraPostProcess(self.robot, errors)
+        self.post = CameraPostProcess(self.robot, errors, background=background)
         blind = (dataclasses.replace(self.world.objects[0], pose=(np.nan,) * 7),)
         self.post.reset(
             dataclasses.replace(self.world, objects=blind), self.world.world_model(["left", "right"], 0.08)
@@ -89,6 +89,63 @@ def test_a_concept_gets_the_look_it_asks_for():
     bench.pose[:2] += 0.05
     assert bench.error(bench.tick(AWAY)) > 0.05
     assert bench.error(bench.tick(AWAY, needed=True)) < 0.001
+
+
+def done(bench):
+    """The look that is under way, if there is one, has found what it finds."""
+    if bench.post._pending is not None:
+        bench.post._pending[1].result(10.0)
+
+
+def test_looks_in_the_background_find_the_same_a_tick_later():
+    here, there = Bench(), Bench(background=True)
+    assert np.array_equal(here.tick(AWAY, needed=True).objects, there.tick(AWAY, needed=True).objects)
+    for bench in (here, there):
+        bench.pose[:2] += 0.05
+    found = here.tick(AWAY, needed=True)
+    assert there.error(there.tick(AWAY, needed=True)) > 0.05  # the first look was waited for, this one is not
+    done(there)
+    assert np.array_equal(there.tick(AWAY).objects, found.objects)
+    assert there.post.unseen() == {}
+
+
+def test_what_the_hand_has_taken_during_a_look_is_not_moved_by_it():
+    bench = Bench(background=True)
+    before = bench.tick(AWAY, needed=True).objects
+    tool = above(bench)
+    bench.pose[:2] += 0.05
+    bench.tick(AWAY, needed=True)
+    done(bench)
+    assert np.allclose(bench.tick(tool, (True, True)).objects, before)
+
+
+def test_a_hold_is_corrected_by_a_look_in_the_background():
+    bench = Bench(background=True)
+    tool = above(bench)
+    bench.tick(AWAY, needed=True)
+    bench.tick(tool, (True, True))
+    lift = poses.pose([0.0, 0.0, 0.15])
+    tool, bench.pose = poses.multiply(lift, tool), poses.multiply(lift, bench.pose)
+    bench.tick(tool, (True, True))
+    bench.pose = bench.pose + np.array([0.004, 0, -0.003, 0, 0, 0, 0])  # it slips
+    assert bench.error(bench.tick(tool, (True, True), needed=True)) > 0.004
+    done(bench)
+    step = poses.pose([0.03, -0.02, 0.01])
+    for _ in range(30):  # the tool goes on, also while there are looks
+        tool, bench.pose = poses.multiply(step, tool), poses.multiply(step, bench.pose)
+        step = poses.pose([0.001, 0.0, 0.0])
+        seen = bench.tick(tool, (True, True))
+        done(bench)
+    assert bench.error(seen) < 0.001 and sum(bench.looked[4:]) >= 1
+
+
+def test_a_new_episode_waits_for_the_look_of_the_last_one():
+    bench = Bench(background=True)
+    bench.tick(AWAY, needed=True)
+    bench.pose[:2] += 0.05
+    bench.tick(AWAY, needed=True)
+    bench.post.reset(bench.world, bench.world.world_model(["left", "right"], 0.08))
+    assert bench.post._pending is None and not np.isfinite(bench.tick(AWAY).objects).any()
 
 
 def test_errors_of_the_camera_are_seeded():

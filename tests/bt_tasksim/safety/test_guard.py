@@ -254,6 +254,18 @@ def test_a_command_that_comes_late_does_not_jerk_the_arm(gap):
     assert controller.setpoint(now)[0][0] > START[0] + 1.0
 
 
+@pytest.mark.parametrize("late", [0.0, 0.02])
+def test_a_hand_measured_beside_its_range_is_commanded_inside(late):
+    guard = guard_of({"joint_acceleration": "clip", "tool_acceleration": "clip"})
+    guard.begin(START + np.concatenate([np.zeros(N), [2e-4, -2e-4]]), PERIOD)
+    for k in range(1, 5):  # as hard as is clipped, so that part of each motion is left out
+        sent = guard.command(target(offset(0.04 * k, 0.03 * k)))
+        assert np.all(sent.position <= guard.upper) and np.all(sent.position >= guard.lower)
+        if late:
+            guard.late(late)
+            assert np.all(guard.motion.position[N:] == sent.position[N:])
+
+
 def test_a_robot_without_limits_is_not_driven():
     with pytest.raises(InputError, match="has no section 'safety'"):
         Guard(dataclasses.replace(ROBOT, safety=None), KINEMATICS.forward)
