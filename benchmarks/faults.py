@@ -131,14 +131,15 @@ class Bench:
     Args:
         domain: ROS domain.
         ros: File with topics and names; by default the robot's bundled one.
+        camera: With pictures.
     """
 
-    def __init__(self, domain: int = 43, ros: str = "") -> None:
+    def __init__(self, domain: int = 43, ros: str = "", camera: bool = False) -> None:
         self.robot, self.ros = load_robot("panda"), ros
         self.setting = load_setting(self.robot, ros)
         self.configuration = SCENE.sample(0)
         quiet: Any = subprocess.DEVNULL
-        self.twin = Twin(self.robot, self.configuration, domain=domain, ros=ros, log=quiet)
+        self.twin = Twin(self.robot, self.configuration, domain=domain, ros=ros, log=quiet, camera=camera)
         try:
             self.evaluation = EvaluationClient(self.twin.evaluation_port)
         except BaseException:
@@ -378,9 +379,9 @@ def run_child(port: int, ros: str) -> None:
 
 
 @contextlib.contextmanager
-def bench_of(domain: int, ros: str = "") -> Iterator[Bench]:
+def bench_of(domain: int, ros: str = "", camera: bool = False) -> Iterator[Bench]:
     """A bench, closed at the end."""
-    bench = Bench(domain, ros)
+    bench = Bench(domain, ros, camera)
     try:
         yield bench
     finally:

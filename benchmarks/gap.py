@@ -36,6 +36,8 @@ FIRST_SEED = 70_000
 SCENARIOS = ("pick_and_throw", "shelf_to_shelf")
 GRASPS = {"programmed": (("Grasp", "programmed"),), "learned": (("Grasp", "grasp-panda"),)}
 ENGINES = ("sapien", "mujoco", "twin")
+CAMERA = "twin-camera"
+"""The twin with perception by its camera instead of tracked poses; measured where it is asked for."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +57,15 @@ def in_process(scenario: str, grasp: str, engines: str, seeds: Sequence[int]) ->
     return [Episode(o.seed, o.success, o.reason, o.why) for o in found.outcomes]
 
 
-def on_the_twin(scenario: str, grasp: str, seeds: Sequence[int], domain: int) -> list[Episode]:
+def on_the_twin(
+    scenario: str, grasp: str, seeds: Sequence[int], domain: int, camera: bool = False
+) -> list[Episode]:
     """Episodes over ROS, judged by the twin's own truth."""
     source = load_source(scenario, policies=GRASPS[grasp])
     robot = load_robot(source.scene.robot)
-    with bench_of(domain) as bench:
-        options = EngineOptions(engines=f"ros:127.0.0.1:{bench.twin.port}")
+    with bench_of(domain, camera=camera) as bench:
+        perception = "camera" if camera else "state"
+        options = EngineOptions(engines=f"ros:127.0.0.1:{bench.twin.port}", perception=perception)
         runner = Runner(source.build(), source.scene, options)
         assert runner.pipeline is not None
         try:
@@ -103,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=FIRST_SEED)
     parser.add_argument("--scenarios", nargs="*", default=list(SCENARIOS), choices=SCENARIOS)
     parser.add_argument("--grasps", nargs="*", default=list(GRASPS), choices=GRASPS)
-    parser.add_argument("--engines", nargs="*", default=list(ENGINES), choices=ENGINES)
+    parser.add_argument("--engines", nargs="*", default=list(ENGINES), choices=[*ENGINES, CAMERA])
     parser.add_argument("--domain", type=int, default=45)
     parser.add_argument("--save", action="store_true", help="write each row to benchmarks/results")
     options = parser.parse_args(arguments)
@@ -123,8 +128,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _episodes(scenario: str, grasp: str, engines: str, seeds: Sequence[int], domain: int) -> list[Episode]:
-    if engines == "twin":
-        return on_the_twin(scenario, grasp, seeds, domain)
+    if engines in ("twin", CAMERA):
+        return on_the_twin(scenario, grasp, seeds, domain, engines == CAMERA)
     return in_process(scenario, grasp, engines, seeds)
 
 
