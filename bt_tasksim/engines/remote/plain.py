@@ -65,8 +65,8 @@ def from_plain(kind: Any, data: Any, where: str = "it") -> Any:
             raise _wrong(where, "true or false", data)
         return data
     if kind is int:
-        if isinstance(data, bool) or not isinstance(data, int):
-            raise _wrong(where, "a whole number", data)
+        if isinstance(data, bool) or not isinstance(data, int) or not -(1 << 63) <= data < 1 << 64:
+            raise _wrong(where, "a whole number within 64 bits", data)
         return data
     if kind is float:
         return _number(data, where)
