@@ -50,8 +50,8 @@ class Cell:
         stopped: Why it refuses commands; empty while it takes them.
         pressed: The emergency stop is pressed.
         refused: Count of refused commands.
+        unfit: How many of them for what they were, and not because it holds.
         accepted: Count of the others.
-
         left_out: Seconds of real time by which physics has lagged and not caught up.
 
     Args:
@@ -103,7 +103,7 @@ class Cell:
         self._run, self.pressed = "", False
         self.stopped = NEVER if self.announced else ""
         self._ended: set[str] = set()
-        self.refused = self.accepted = 0
+        self.refused = self.unfit = self.accepted = 0
         self.left_out = 0.0
         self.note: Note | None = None
 
@@ -136,6 +136,7 @@ class Cell:
             controller.check(trajectory, self.time)
         except RefusedError:
             self.refused += 1
+            self.unfit += not self.stopped
             raise
         due = self.time + self.gap.sizes["command_latency"]
         self._pending.append((due, lambda: self._begin_trajectory(controller, trajectory)))
@@ -146,6 +147,7 @@ class Cell:
             self.accepted += 1
         except RefusedError:
             self.refused += 1
+            self.unfit += 1
 
     def begin(self, run: str) -> None:
         """A new run begins, and ends a hold and the run before it; never one that was ended before."""
@@ -265,6 +267,7 @@ class Cell:
             "stopped": self.stopped,
             "accepted": self.accepted,
             "refused": self.refused,
+            "unfit": self.unfit,
             "left_out": self.left_out,
             "position": self._arm_position().tolist(),
             "speed": float(np.max(np.abs(self._state.joint_velocity[: self._n]))),

@@ -65,6 +65,7 @@ def test_no_command_before_a_run_and_of_no_other_run(cell: Cell) -> None:
         cell.command("arm", forward(cell, run=""))
     run(cell, 0.2)
     assert abs(first_joint(cell)) < 1e-3 and cell.refused == 3
+    assert cell.unfit == 2, "nothing is wrong with what comes while it holds"
 
 
 def test_commands_that_stop_expire(cell: Cell) -> None:
