@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterator
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import pytest
 
 from benchmarks.faults import Bench
+from bt_tasksim.engines.ros.websocket import WebSocket
 from bt_tasksim.errors import MachineError
 from bt_tasksim.twin.environment import environment
 
@@ -22,3 +27,48 @@ def bench() -> Iterator[Bench]:
     made = Bench(domain=1 + os.getpid() % 100)
     yield made
     made.close()
+
+
+class Stranger:
+    """Somebody else in the cell who publishes whatever comes to mind.
+
+    Attributes:
+        sent: Messages by topic.
+    """
+
+    def __init__(self, port: int, kinds: Mapping[str, str]) -> None:
+        self.socket, self.sent = WebSocket("127.0.0.1", port), Counter[str]()
+        self._n = 0
+        for topic, kind in kinds.items():
+            self.socket.send(json.dumps({"op": "advertise", "topic": topic, "type": kind}))
+
+    def publish(self, topic: str, message: Any) -> None:
+        self.sent[topic] += 1
+        self.socket.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
+        self._n += 1
+        if self._n % 8 == 0:
+            self._meet()
+
+    def _meet(self) -> None:
+        """Wait until the bridge has dealt with everything: it lets go of who leaves 16 complaints unread."""
+        self.socket.send(json.dumps({"op": "are you there", "id": str(self._n)}))
+        end = time.monotonic() + 10.0
+        while time.monotonic() < end:
+            text = self.socket.receive(1.0)
+            if text is not None and json.loads(text).get("id") == str(self._n):
+                return
+        raise AssertionError("the bridge has not answered for 10 s")
+
+
+@pytest.fixture
+def stranger(bench: Bench) -> Iterator[Callable[[Mapping[str, str]], Stranger]]:
+    """Somebody who publishes on topics of these types."""
+    made: list[Stranger] = []
+
+    def make(kinds: Mapping[str, str]) -> Stranger:
+        made.append(Stranger(bench.twin.port, kinds))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.socket.close()

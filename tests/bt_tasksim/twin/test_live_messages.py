@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import copy
-import json
 import random
 import time
 from collections import Counter
@@ -19,27 +18,9 @@ from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.ros import messages
 from bt_tasksim.engines.ros.link import Link
 from bt_tasksim.engines.ros.messages import RefusedError
-from bt_tasksim.engines.ros.websocket import WebSocket
 
 COMMANDS, READINGS = 6000, 4000
 RUN = "run"
-
-
-class Stranger:
-    """Somebody else in the cell who publishes whatever comes to mind.
-
-    Attributes:
-        sent: Messages by topic.
-    """
-
-    def __init__(self, port: int, kinds: dict[str, str]) -> None:
-        self.socket, self.sent = WebSocket("127.0.0.1", port), Counter[str]()
-        for topic, kind in kinds.items():
-            self.socket.send(json.dumps({"op": "advertise", "topic": topic, "type": kind}))
-
-    def publish(self, topic: str, message: Any) -> None:
-        self.sent[topic] += 1
-        self.socket.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
 
 
 # ---- to the twin ------------------------------------------------------------------------------------------
@@ -114,7 +95,7 @@ def ill_typed(n: int) -> list[Damage]:
     ]
 
 
-def test_thousands_of_wrong_commands(bench: Bench) -> None:
+def test_thousands_of_wrong_commands(bench: Bench, stranger: Any) -> None:
     """Each one is refused or dropped, also by topics that stop and begin; none is carried out."""
     bench.restart()
     bench.evaluation.load(bench.configuration)
@@ -125,43 +106,42 @@ def test_thousands_of_wrong_commands(bench: Bench) -> None:
         **dict.fromkeys(texts, "std_msgs/String"),
         setting.emergency_stop: "std_msgs/Bool",
     }
-    stranger = Stranger(bench.twin.port, kinds)
+    somebody = stranger(kinds)
     end = time.monotonic() + 10.0
     while bench.evaluation.tell()["stopped"] and time.monotonic() < end:  # until they have found each other
-        stranger.publish(setting.begin, {"data": RUN})
+        somebody.publish(setting.begin, {"data": RUN})
         time.sleep(0.2)
     before = bench.evaluation.tell()
     assert not before["stopped"] and not before["refused"]
-    stranger.sent.clear()
+    somebody.sent.clear()
     hand = bench.robot.hand_open.tolist()
     groups = [(setting.arm, before["position"]), (setting.hand, hand)]
     fit = 0
     for k in range(COMMANDS):
         if k % 20 == 19:
             data = rng.choice([3, [1], {"a": 1}, 1.5, [[]]])
-            stranger.publish(rng.choice(texts), {"data": data})
+            somebody.publish(rng.choice(texts), {"data": data})
         elif k % 20 == 18:
-            stranger.publish(setting.emergency_stop, {"data": rng.choice(["x", [1], {"a": 1}, 2**70])})
+            somebody.publish(setting.emergency_stop, {"data": rng.choice(["x", [1], {"a": 1}, 2**70])})
         else:
             group, here = groups[k % 2]
             n, typed = len(group.joints), rng.random() < 0.8
             damage = rng.choice(well_typed(n) if typed else ill_typed(n))
             fit += typed
-            stranger.publish(group.command, damage(trajectory(group.joints, here), rng))
+            somebody.publish(group.command, damage(trajectory(group.joints, here), rng))
         time.sleep(0.001)
     time.sleep(1.0)
     after = bench.evaluation.tell()
-    dropped = stranger.sent[setting.arm.command] + stranger.sent[setting.hand.command] - after["refused"]
-    print(f"{sum(stranger.sent.values())} sent, {after['refused']} refused, {dropped} dropped")
-    assert sum(stranger.sent.values()) == COMMANDS
+    dropped = somebody.sent[setting.arm.command] + somebody.sent[setting.hand.command] - after["refused"]
+    print(f"{sum(somebody.sent.values())} sent, {after['refused']} refused, {dropped} dropped")
+    assert sum(somebody.sent.values()) == COMMANDS
     assert after["accepted"] == 0 and after["refused"] > fit / 4 and dropped >= 0
     assert not after["stopped"] and not bench.twin.ended()
     assert np.allclose(before["position"], after["position"], atol=2e-3)
     # What is good is carried out all the same.
-    stranger.publish(setting.arm.command, trajectory(setting.arm.joints, after["position"]))
+    somebody.publish(setting.arm.command, trajectory(setting.arm.joints, after["position"]))
     time.sleep(0.5)
     assert bench.evaluation.tell()["accepted"] == 1
-    stranger.socket.close()
 
 
 # ---- from the cell ----------------------------------------------------------------------------------------
@@ -232,7 +212,7 @@ def damaged(message: Any, rng: random.Random) -> Any:
     return message
 
 
-def test_thousands_of_wrong_readings(bench: Bench) -> None:
+def test_thousands_of_wrong_readings(bench: Bench, stranger: Any) -> None:
     """What the bridge hands on is refused with a sentence, or still a message of finite numbers."""
     bench.restart()
     rng, refused, used = random.Random(7), Counter[str](), Counter[str]()
@@ -256,28 +236,27 @@ def test_thousands_of_wrong_readings(bench: Bench) -> None:
     try:
         for topic, (kind, _) in GOOD.items():
             link.subscribe(topic, kind, handler(topic))
-        stranger = Stranger(bench.twin.port, {topic: kind for topic, (kind, _) in GOOD.items()})
+        somebody = stranger({topic: kind for topic, (kind, _) in GOOD.items()})
         end = time.monotonic() + 10.0
         while len(used) < len(GOOD) and time.monotonic() < end:  # until they have found each other
             for topic, (_, good) in GOOD.items():
-                stranger.publish(topic, good)
+                somebody.publish(topic, good)
             time.sleep(0.2)
         assert len(used) == len(GOOD), used
         time.sleep(0.5)
-        for counter in (stranger.sent, used, refused):
+        for counter in (somebody.sent, used, refused):
             counter.clear()
         topics = list(GOOD)
         for k in range(READINGS):
             topic = topics[k % len(topics)]
-            stranger.publish(topic, damaged(GOOD[topic][1], rng))
+            somebody.publish(topic, damaged(GOOD[topic][1], rng))
             time.sleep(0.0005)
         time.sleep(1.0)
-        stranger.socket.close()
     finally:
         link.close()
-    dropped = stranger.sent.total() - refused.total() - used.total()
+    dropped = somebody.sent.total() - refused.total() - used.total()
     print(f"{READINGS} sent, {refused.total()} refused, {dropped} dropped, {used.total()} still good")
-    assert stranger.sent.total() == READINGS and dropped >= 0
+    assert somebody.sent.total() == READINGS and dropped >= 0
     assert not unexpected, unexpected[:3]
     assert refused.total() > READINGS / 20
     assert not bench.twin.ended()
