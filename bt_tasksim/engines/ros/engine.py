@@ -7,14 +7,12 @@ trajectories out. Nothing here waits but `reset`, and nothing judges: the guard 
 
 from __future__ import annotations
 
-import itertools
-import math
 import threading
 import time
 import uuid
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,31 +22,20 @@ from bt_tasksim.engines.ros.button import Button
 from bt_tasksim.engines.ros.joints import JointFeed
 from bt_tasksim.engines.ros.link import PATIENCE, Link
 from bt_tasksim.engines.ros.messages import Point
+from bt_tasksim.engines.ros.sensors import Sensors
 from bt_tasksim.engines.ros.setting import RosSetting
+from bt_tasksim.engines.ros.start import WayToStart
 from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.poses import Array
 from bt_tasksim.robot import RobotDescription
 from bt_tasksim.safety import checks
 from bt_tasksim.safety.engine import ChannelSpec, EmergencyStop, JointReading
-from bt_tasksim.safety.motion import approach
 from bt_tasksim.world import JointTarget, WorldState
 
 if TYPE_CHECKING:
     from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
     from bt_tasksim.scene import ActorConfiguration
 
-STALE = 0.3
-"""Seconds after which forces are too old to act on; joint states have a limit of their own."""
-UNSEEN = 1.0
-"""Seconds after which a tracked object counts as lost."""
-STILL = (0.02, 0.03)
-"""Speed (rad/s) and distance (rad) within which the arm stands where a run begins."""
-SETTLE = 5.0
-"""Seconds within which it must, once it has been told to be there."""
-LONGEST = 60.0
-"""Seconds that the way there may take."""
-HAND = 0.25
-"""Share of the hand's range by which a joint of it may be off there."""
 MATCH = 0.3
 """Seconds after which whoever listens to a topic has found whoever publishes there."""
 ANNOUNCED = 2.0
@@ -56,19 +43,12 @@ ANNOUNCED = 2.0
 TRAJECTORY, TEXT = "trajectory_msgs/JointTrajectory", "std_msgs/String"
 
 
-@dataclass(frozen=True, slots=True)
-class Newest:
-    """The newest value of a topic, and when it was measured, seconds of `time.monotonic`."""
-
-    value: Array
-    stamp: float
-
-
 class RosRobot:
     """A `RealEngine` through rosbridge.
 
     Attributes:
         joints: Joint states, and the cell's clock.
+        sensors: Forces and tracked objects.
         began: When the run began, seconds of `time.monotonic`.
 
     Args:
@@ -104,17 +84,17 @@ class RosRobot:
         self.emergency.held_down = lambda: self.button.pressed
         self.link: Link | None = None
         self._lock = threading.RLock()
-        self._objects: tuple[str, ...] = ()
         self._held, self._run, self._period, self._announced = True, "", 0.05, 0.0
         self.began = 0.0
         self.joints = JointFeed(robot, setting)
+        self.sensors = Sensors(robot, setting, self.joints.convert)
         self._forget()
 
     def _forget(self) -> None:
         """Only what arrives from now on counts."""
         self.joints.forget()
         self._told: Array | None = None
-        self._newest: dict[str, Newest] = {}
+        self.sensors.forget()
 
     # ---- a run begins -----------------------------------------------------------------------------------
 
@@ -140,45 +120,31 @@ class RosRobot:
         goal = np.array(
             configuration.joint_position or np.concatenate([self.robot.rest, self.robot.hand_open])
         )
-        self._approach(goal, beat)
+        self._way().go(goal, beat)
         self.began = time.monotonic()
+
+    def _way(self) -> WayToStart:
+        return WayToStart(self.robot, self.limits, self.setting, self.kinematics, self._checked, self._send)
 
     def _connected(self, configuration: ActorConfiguration) -> Link:
         """The connection, with the topics of this world's objects."""
         objects = tuple(actor.name for actor in configuration.objects) if self.tracked else ()
-        if self.link is not None and not self.link.lost and objects == self._objects:
+        if self.link is not None and not self.link.lost and objects == self.sensors.objects:
             return self.link
         self.close()
         self.button.anew()
         self.joints.anew()
         link, setting = Link(self.address), self.setting
-        self.link, self._objects = link, objects
+        self.link = link
         for topic in (setting.arm.command, setting.hand.command):
             link.advertise(topic, TRAJECTORY)
         for topic in filter(None, (setting.begin, setting.hold)):
             link.advertise(topic, TEXT)
         link.subscribe(setting.emergency_stop, "std_msgs/Bool", self.button.take)
         link.subscribe(setting.joint_states, "sensor_msgs/JointState", self.joints.take)
-        self._listen(
-            link, setting.wrench.topic, "geometry_msgs/WrenchStamped", messages.wrench, setting.wrench.frame
-        )
-        for topic in setting.tips.topics:
-            self._listen(link, topic, "geometry_msgs/WrenchStamped", messages.wrench, setting.tips.frame)
-        for name in objects:
-            assert setting.objects is not None
-            topic = setting.object_topic(name)
-            self._listen(link, topic, "geometry_msgs/PoseStamped", messages.pose, setting.objects.frame)
+        self.sensors.listen(link, objects)
         time.sleep(MATCH)
         return link
-
-    def _listen(
-        self, link: Link, topic: str, kind: str, read: Callable[[Any, str], tuple[Array, float]], frame: str
-    ) -> None:
-        def handle(message: Any, arrived: float) -> None:
-            value, stamp = read(message, frame)
-            self._newest[topic] = Newest(value, self.joints.convert(stamp, arrived))
-
-        link.subscribe(topic, kind, handle)
 
     def _expect_messages(self) -> None:
         """Wait until every topic has spoken.
@@ -197,116 +163,10 @@ class RosRobot:
             time.sleep(0.01)
 
     def _silent(self) -> list[str]:
-        setting = self.setting
-        wanted = [setting.wrench.topic, *setting.tips.topics, *map(setting.object_topic, self._objects)]
-        now = time.monotonic()
-        silent = [] if self.joints.newest is not None else [setting.joint_states]
+        silent = [] if self.joints.newest is not None else [self.setting.joint_states]
         if self.button.silent():
-            silent.append(setting.emergency_stop)
-        for topic in wanted:
-            newest = self._newest.get(topic)
-            if newest is None or now - newest.stamp > STALE:
-                silent.append(topic)
-        return silent
-
-    def _approach(self, goal: Array, beat: Callable[[], None]) -> None:
-        """Go to where the run begins, slowly, and wait until the arm stands there.
-
-        Raises:
-            MachineError: It does not follow, or was stopped.
-        """
-        period, n = 0.05, len(self.robot.arm_joints)
-        self._checked_posture(goal)
-        start = self._begin_hand(beat, period)
-        speed, acceleration = self._gentle()
-        motions = approach(start, goal, speed, acceleration, period)
-        way = list(itertools.islice(motions, int(LONGEST / period)))
-        if next(motions, None) is not None:
-            k = int(np.argmax(np.abs(start - goal) / speed))
-            raise MachineError(
-                f"the way to the start would take more than {LONGEST:g} s: {self.robot.joints[k]} is "
-                f"{abs(start[k] - goal[k]):.2f} away; is 'approach' in '{self.setting.source}' too small?"
-            )
-        following = time.monotonic()
-        for motion in way:
-            following = max(following, time.monotonic())  # what was late is not made up for
-            beat()
-            self._send(JointTarget(motion.position, motion.velocity, self.limits.validity), period)
-            following += period
-            time.sleep(max(following - time.monotonic(), 0.0))
-            off = np.abs(self._checked().position - motion.position)[:n]
-            if np.any(off > self.limits.tracking):
-                raise self._astray(
-                    int(np.argmax(off)), float(off.max()), "does not follow the way to its start"
-                )
-        end = time.monotonic() + SETTLE
-        while True:
-            beat()
-            reading = self._checked()
-            off = np.abs(reading.position - goal)[:n]
-            if np.all(off < STILL[1]) and np.all(np.abs(reading.velocity[:n]) < STILL[0]):
-                return self._check_hand(reading.position - goal)
-            if time.monotonic() > end:
-                raise self._astray(
-                    int(np.argmax(off)), float(off.max()), "does not come to stand at its start"
-                )
-            time.sleep(0.02)
-
-    def _checked_posture(self, goal: Array) -> None:
-        """The tool of a run that begins may not be where the guard would stop the run at once.
-
-        Raises:
-            InputError: It is.
-        """
-        tool, limits = self.kinematics.forward(goal)[:3], self.limits
-        if np.any(tool < limits.workspace[0]) or np.any(tool > limits.workspace[1]):
-            at = ", ".join(f"{x:.2f}" for x in tool)
-            raise InputError(
-                f"a run would begin with the tool at ({at}), outside of safety.workspace: change that or the "
-                f"rest posture in '{self.robot.source}'"
-            )
-
-    def _begin_hand(self, beat: Callable[[], None], period: float) -> Array:
-        """Have the hand's controller follow from where the hand is, and say where everything is.
-
-        It may have been told to close on something that is in the way, and what is commanded next must not be
-        a jump for it; so it gets the time for its whole way, while the arm stands.
-        """
-        n, (low, high) = len(self.robot.arm_joints), self.robot.hand_range
-        start = self._checked().position.copy()
-        start[n:] = np.clip(start[n:], low, high)
-        stand = JointTarget(start, np.zeros_like(start), self.limits.validity)
-        for k in reversed(range(math.ceil(1.0 / (self.robot.hand_speed * period)))):
-            beat()
-            self._send(stand, period, (k + 1) * period)
-            time.sleep(period)
-            self._checked()
-        return start
-
-    def _check_hand(self, off: Array) -> None:
-        """The hand has come to its start, too.
-
-        Raises:
-            MachineError: A joint is far from there.
-        """
-        n, (low, high) = len(self.robot.arm_joints), self.robot.hand_range
-        share = np.abs(off[n:]) / np.max(high - low)
-        if np.any(share > HAND):
-            k = int(np.argmax(share))
-            name, far = self.robot.joints[n + k], abs(off[n + k])
-            raise MachineError(
-                f"the hand does not come to its start: {name} is {far:.3f} away; is the controller of "
-                f"'{self.setting.hand.command}' active?"
-            )
-
-    def _gentle(self) -> tuple[Array, Array]:
-        """Speeds and accelerations ``(n_joints,)`` of the way to the start."""
-        robot, share = self.robot, self.setting.approach
-        low, high = robot.hand_range
-        span = np.maximum(high - low, 0.1 * np.max(high - low)) * robot.hand_speed  # some joints only follow
-        speed = np.concatenate([self.limits.velocity, span])
-        acceleration = np.concatenate([self.limits.acceleration, span / 0.1])
-        return share * speed, share * acceleration
+            silent.append(self.setting.emergency_stop)
+        return silent + self.sensors.silent()
 
     def _checked(self) -> JointReading:
         """The newest joint states, of the names and the age that a motion needs, while nothing pushes.
@@ -332,16 +192,11 @@ class RosRobot:
                 f"{topic} is silent for {1000 * age:.0f} ms, the limit is {1000 * limit:.0f} ms: look at "
                 "network and load"
             )
-        if breach := checks.wrench(self._wrench(), self.limits.force, self.limits.torque):
+        if breach := checks.wrench(
+            self.sensors.wrench(self.limits.stale), self.limits.force, self.limits.torque
+        ):
             raise MachineError(breach.sentence)
         return reading
-
-    def _astray(self, joint: int, off: float, what: str) -> MachineError:
-        name = self.robot.joints[joint]
-        return MachineError(
-            f"the arm {what}: {name} is {off:.2f} rad away; is the controller of "
-            f"'{self.setting.arm.command}' active?"
-        )
 
     # ---- commands ---------------------------------------------------------------------------------------
 
@@ -444,49 +299,20 @@ class RosRobot:
             MachineError: Forces or objects have not been heard of for too long.
         """
         self._alive()
-        setting, now, wrench = self.setting, time.monotonic(), self._wrench()
         position, effort = np.array(reading.position), np.zeros_like(reading.position)
         if reading.effort is not None:
             effort = np.nan_to_num(reading.effort)
-        objects = [self._fresh(setting.object_topic(name), now, UNSEEN) for name in self._objects]
         return WorldState(
-            time=np.float64(now - self.began),
+            time=np.float64(time.monotonic() - self.began),
             joint_position=position,
             joint_velocity=np.array(reading.velocity),
             joint_effort=effort,
-            wrench=wrench,
-            tip_force=self._tip_force(effort, now),
+            wrench=self.sensors.wrench(self.limits.stale),
+            tip_force=self.sensors.tip_force(effort),
             tool_pose=self.kinematics.forward(position),
             tips=self.kinematics.tips(position),
-            objects=np.array(objects).reshape(len(objects), 7) if self.tracked else None,
+            objects=self.sensors.poses() if self.tracked else None,
         )
-
-    def _wrench(self) -> Array:
-        """The external wrench ``(6,)`` at the tool, tool frame."""
-        sensor = self.setting.wrench
-        return messages.in_tool_frame(
-            self._fresh(sensor.topic, time.monotonic(), self.limits.stale), sensor.pose
-        )
-
-    def _tip_force(self, effort: Array, now: float) -> Array:
-        """Forces ``(n_tips, 3)``: as felt, or of the drives' size where there are no sensors."""
-        tips = self.setting.tips
-        if tips.topics:
-            return np.array([self._fresh(topic, now, STALE)[:3] for topic in tips.topics])
-        n = len(self.robot.tips)
-        felt = np.abs(effort[len(self.robot.arm_joints) :])
-        felt = felt if len(felt) == n else np.full(n, felt.max())
-        out = np.zeros((n, 3))
-        out[:, 2] = np.where(felt >= tips.effort, felt, 0.0)
-        return out
-
-    def _fresh(self, topic: str, now: float, oldest: float) -> Array:
-        newest = self._newest.get(topic)
-        if newest is None:
-            raise MachineError(f"nothing has come on {topic}")
-        if now - newest.stamp > oldest:
-            raise MachineError(f"stale: nothing usable on {topic} for {1000 * (now - newest.stamp):.0f} ms")
-        return newest.value
 
     def _alive(self) -> Link:
         if self.link is None:

@@ -16,6 +16,7 @@ from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.ros.engine import RosRobot
 from bt_tasksim.engines.ros.messages import RefusedError
+from bt_tasksim.engines.ros.sensors import Newest
 from bt_tasksim.engines.ros.setting import load_setting
 from bt_tasksim.errors import InputError, MachineError
 from bt_tasksim.resources import asset
@@ -67,10 +68,8 @@ def feel(robot: RosRobot) -> None:
     """Everything has spoken just now."""
     now = time.monotonic()
     robot.joints.take(states(robot.setting.wire, START[np.argsort(robot.setting.order)], now), now)
-    from bt_tasksim.engines.ros.engine import Newest
-
     for topic in (robot.setting.wrench.topic, *robot.setting.tips.topics):
-        robot._newest[topic] = Newest(np.arange(6.0), now)
+        robot.sensors.newest[topic] = Newest(np.arange(6.0), now)
 
 
 def test_it_is_an_engine_of_a_real_robot() -> None:
@@ -165,102 +164,14 @@ def test_a_lost_connection_is_said_by_everything() -> None:
             act()
 
 
-class Echo(Link):
-    """A link behind which the arm is at once where it is told to be."""
-
-    def __init__(self, robot: Any) -> None:
-        super().__init__()
-        self.robot, self.times = robot, []
-
-    def publish(self, topic: str, message: dict[str, Any], within: float = 0.0) -> None:
-        super().publish(topic, message)
-        if topic == self.robot.setting.arm.command:
-            self.times.append(time.monotonic())
-            now = time.monotonic()
-            position = [*message["points"][0]["positions"], *START[7:]]
-            self.robot.joints.take(states(self.robot.setting.wire, position, now), now)
-
-
-def approaching(monkeypatch: Any) -> RosRobot:
-    """A robot on its way to where a run begins; what it feels is always fresh."""
+def test_nothing_moves_to_its_start_while_something_pushes() -> None:
     robot = engine()
-    robot.link, robot._held = Echo(robot), False
+    robot._held = False
     feel(robot)
-    monkeypatch.setattr(robot, "_fresh", lambda topic, now, oldest: robot._newest[topic].value)
-    return robot
-
-
-def test_the_way_to_the_start_does_not_make_up_for_lost_time(monkeypatch: Any) -> None:
-    robot = approaching(monkeypatch)
-    checked, calls = robot._checked, []
-
-    def stalls() -> Any:
-        calls.append(True)
-        if len(calls) == 4:
-            time.sleep(0.04)
-        return checked()
-
-    monkeypatch.setattr(robot, "_checked", stalls)
-    goal = START.copy()
-    goal[0] += 0.05
-    beats: list[float] = []
-    robot._approach(goal, lambda: beats.append(time.monotonic()))
-    assert len(robot.link.times) > 6
-    assert len(beats) > len(robot.link.times) and np.max(np.diff(beats)) < 0.1, "the watchdog watches"
-    assert np.min(np.diff(robot.link.times)) > 0.03  # of a period of 0.05 s
-
-
-def test_the_way_to_the_start_ends_where_something_pushes(monkeypatch: Any) -> None:
-    robot = approaching(monkeypatch)
-    goal = START.copy()
-    goal[0] += 0.05
-    robot._newest[robot.setting.wrench.topic].value[:3] = (0.0, 0.0, 1000.0)
+    assert robot._checked() is robot.joints.newest
+    robot.sensors.newest[robot.setting.wrench.topic].value[:3] = (0.0, 0.0, 1000.0)
     with pytest.raises(MachineError, match=r"force on the tool 1e\+03 N"):
-        robot._approach(goal, lambda: None)
-    assert not robot.link.times
-
-
-def test_the_hand_is_given_time_to_where_it_is(monkeypatch: Any) -> None:
-    """Its controller may have been told to close on something; a jump from there would be refused."""
-    robot = approaching(monkeypatch)
-    outside = START.copy()
-    outside[7:] = (0.0401, -0.0002)  # as measured, a little beyond what can be commanded
-    now = time.monotonic()
-    robot.joints.take(states(robot.setting.wire, outside, now), now)
-    robot._approach(START, lambda: None)
-    hand = [m["points"] for topic, m in robot.link.sent if topic == robot.setting.hand.command]
-    times = [p[0]["time_from_start"]["sec"] + 1e-9 * p[0]["time_from_start"]["nanosec"] for p in hand]
-    low, high = ROBOT.hand_range
-    assert times[0] == pytest.approx(1.0 / ROBOT.hand_speed, abs=0.02) and times[-1] <= 0.051
-    assert hand[0][0]["positions"] == pytest.approx([0.04, 0.0])
-    assert all(np.all(low <= p[0]["positions"]) and np.all(p[0]["positions"] <= high) for p in hand)
-    assert hand[-1][0]["positions"] == pytest.approx(ROBOT.hand_open)
-
-
-def test_a_hand_that_does_not_follow_is_noticed(monkeypatch: Any) -> None:
-    robot = approaching(monkeypatch)
-    goal = START.copy()
-    goal[7:] = ROBOT.hand_closed  # the echo's hand stays open
-    with pytest.raises(MachineError, match=r"does not come to its start: panda_finger_joint1 is 0\.040"):
-        robot._approach(goal, lambda: None)
-
-
-def test_a_way_to_the_start_that_would_take_for_ever(monkeypatch: Any) -> None:
-    robot = approaching(monkeypatch)
-    robot.setting = dataclasses.replace(robot.setting, approach=1e-3)
-    goal = START.copy()
-    goal[2] += 1.0
-    with pytest.raises(MachineError, match=r"would take more than 60 s: panda_joint3 is 1\.00 away"):
-        robot._approach(goal, lambda: None)
-
-
-def test_a_start_outside_of_the_workspace_is_refused_before_anything_moves(monkeypatch: Any) -> None:
-    robot = approaching(monkeypatch)
-    box = np.array([[0.9, -1.0, 0.0], [1.0, 1.0, 1.0]])
-    robot.limits = dataclasses.replace(robot.limits, workspace=box)
-    with pytest.raises(InputError, match=r"tool at \(.*\), outside of safety.workspace"):
-        robot._approach(START, lambda: None)
-    assert not robot.link.sent
+        robot._checked()
 
 
 def test_an_emergency_stop_tapped_while_a_run_begins(monkeypatch: Any) -> None:
@@ -284,10 +195,10 @@ def test_old_forces_and_unseen_objects_are_errors() -> None:
     state = robot.state(robot.latest())
     assert state.wrench.tolist() == [0, 1, 2, 3, 4, 5] and state.tip_force.tolist() == [[0, 1, 2]] * 2
     assert np.allclose(state.tool_pose, KINEMATICS.forward(START)) and state.objects.shape == (0, 7)
-    robot._objects = ("cup",)
+    robot.sensors.objects = ("cup",)
     with pytest.raises(MachineError, match="nothing has come on /objects/cup/pose"):
         robot.state(robot.latest())
-    robot._objects = ()
+    robot.sensors.objects = ()
     time.sleep(robot.limits.stale + 0.02)
     with pytest.raises(MachineError, match="stale: nothing usable on /wrist/wrench"):
         robot.state(robot.latest())
