@@ -1,4 +1,1 @@
-"""Objects, scenes, robots, demonstrations and trained policies, as package data.
-
-Open them with ``importlib.resources.files("assets")``: it finds them in a checkout and in an installed wheel.
-"""
+"""Objects, scenes, robots, demonstrations and policies, found by `bt_tasksim.core.resources.asset`."""

@@ -6,60 +6,163 @@ Names are imported when they are first used: ``import bt_tasksim`` loads no simu
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
+from bt_tasksim import _names
+
 if TYPE_CHECKING:
-    from bt_tasksim.concept import ConceptModel, Condition
-    from bt_tasksim.engines.registry import EngineOptions
-    from bt_tasksim.errors import BtTasksimError, InputError, MachineError
-    from bt_tasksim.launch import run
-    from bt_tasksim.runner import Result, Runner
-    from bt_tasksim.scene import Goal, HandStart, Lesson, ObjectSpec, Scene, SpotSpec
+    from bt_tasksim.concept.condition import Condition
+    from bt_tasksim.concept.context import Known, Seen
+    from bt_tasksim.concept.model import ConceptModel
+    from bt_tasksim.concept.parameters import (
+        Direction,
+        Flag,
+        Metres,
+        MetresPerSecond,
+        Newtons,
+        ObjectName,
+        PlaceName,
+        Points,
+        Position,
+        Radians,
+        Ratio,
+        Seconds,
+        Text,
+    )
+    from bt_tasksim.core import poses, units
+    from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
+    from bt_tasksim.core.outcomes import Form, Outcome, register_reason
+    from bt_tasksim.core.poses import Array, array_namespace
+    from bt_tasksim.core.registry import register
+    from bt_tasksim.core.world import Command, Hidden, Observation
+    from bt_tasksim.execution.pipelines import EngineOptions
+    from bt_tasksim.execution.result import Result
+    from bt_tasksim.execution.runner import Runner
+    from bt_tasksim.planning import reference_motion
+    from bt_tasksim.report.launch import run
+    from bt_tasksim.robot.description import RobotDescription, load_robot
+    from bt_tasksim.scene.scene import CurriculumStage, Lesson, Scene
+    from bt_tasksim.scene.scene_file import load_scene
+    from bt_tasksim.scene.specs import Goal, HandStart, ObjectSpec, SpotSpec
     from bt_tasksim.training.config import TrainConfig
-    from bt_tasksim.training.decorator import Train
-    from bt_tasksim.training.episode import EpisodeEnv
+    from bt_tasksim.training.env import EpisodeEnv
     from bt_tasksim.training.ppo import train
+    from bt_tasksim.trees.nodes.train import Train
+
+_names.install()
 
 _HOMES = {
-    "bt_tasksim.concept": ("ConceptModel", "Condition"),
-    "bt_tasksim.engines.registry": ("EngineOptions",),
-    "bt_tasksim.errors": ("BtTasksimError", "InputError", "MachineError"),
-    "bt_tasksim.launch": ("run",),
-    "bt_tasksim.runner": ("Result", "Runner"),
-    "bt_tasksim.scene": ("Goal", "HandStart", "Lesson", "ObjectSpec", "Scene", "SpotSpec"),
+    "bt_tasksim.concept.condition": ("Condition",),
+    "bt_tasksim.concept.context": ("Known", "Seen"),
+    "bt_tasksim.concept.model": ("ConceptModel",),
+    "bt_tasksim.concept.parameters": (
+        "Direction",
+        "Flag",
+        "Metres",
+        "MetresPerSecond",
+        "Newtons",
+        "ObjectName",
+        "PlaceName",
+        "Points",
+        "Position",
+        "Radians",
+        "Ratio",
+        "Seconds",
+        "Text",
+    ),
+    "bt_tasksim.core.poses": ("Array", "array_namespace"),
+    "bt_tasksim.core.registry": ("register",),
+    "bt_tasksim.core.world": ("Command", "Hidden", "Observation"),
+    "bt_tasksim.execution.pipelines": ("EngineOptions",),
+    "bt_tasksim.core.errors": ("BtTasksimError", "InputError", "MachineError"),
+    "bt_tasksim.core.outcomes": ("Form", "Outcome", "register_reason"),
+    "bt_tasksim.report.launch": ("run",),
+    "bt_tasksim.execution.result": ("Result",),
+    "bt_tasksim.execution.runner": ("Runner",),
+    "bt_tasksim.robot": ("RobotDescription", "load_robot"),
+    "bt_tasksim.scene": (
+        "CurriculumStage",
+        "Goal",
+        "HandStart",
+        "Lesson",
+        "ObjectSpec",
+        "Scene",
+        "SpotSpec",
+        "load_scene",
+    ),
     "bt_tasksim.training.config": ("TrainConfig",),
-    "bt_tasksim.training.decorator": ("Train",),
-    "bt_tasksim.training.episode": ("EpisodeEnv",),
+    "bt_tasksim.trees.nodes.train": ("Train",),
+    "bt_tasksim.training.env": ("EpisodeEnv",),
     "bt_tasksim.training.ppo": ("train",),
 }
-_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_MODULES = {
+    "poses": "bt_tasksim.core.poses",
+    "reference_motion": "bt_tasksim.planning.reference_motion",
+    "units": "bt_tasksim.core.units",
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names} | _MODULES
 
 __all__ = [
+    "Array",
     "BtTasksimError",
+    "Command",
     "ConceptModel",
     "Condition",
+    "Direction",
     "EngineOptions",
     "EpisodeEnv",
+    "Flag",
+    "Form",
     "Goal",
     "HandStart",
+    "Hidden",
     "InputError",
+    "Known",
+    "CurriculumStage",
     "Lesson",
     "MachineError",
+    "Metres",
+    "MetresPerSecond",
+    "Newtons",
+    "ObjectName",
     "ObjectSpec",
+    "Observation",
+    "Outcome",
+    "PlaceName",
+    "Points",
+    "Position",
+    "Radians",
+    "Ratio",
     "Result",
+    "RobotDescription",
     "Runner",
     "Scene",
+    "Seconds",
+    "Seen",
     "SpotSpec",
+    "Text",
     "Train",
     "TrainConfig",
+    "array_namespace",
+    "load_robot",
+    "load_scene",
+    "poses",
+    "reference_motion",
+    "register_reason",
+    "register",
     "run",
     "train",
+    "units",
 ]
 
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
-        return getattr(importlib.import_module(_HOME[name]), name)
+        if "IPython" in sys.modules:  # a notebook: trees and graphs show themselves
+            importlib.import_module("bt_tasksim.report.notebook").install()
+        home = importlib.import_module(_HOME[name])
+        return home if name in _MODULES else getattr(home, name)
     raise AttributeError(f"module 'bt_tasksim' has no attribute '{name}'")
 
 

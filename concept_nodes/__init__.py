@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from bt_tasksim.concept import ConceptModel, Condition
-from concept_nodes.bring import Bring
-from concept_nodes.conditions import AtPose, Holding, TimePassed, Upright
-from concept_nodes.grasp import Grasp
-from concept_nodes.pick import Pick
-from concept_nodes.place import Place
-from concept_nodes.release import Release
-from concept_nodes.wait import Wait
+from bt_tasksim._names import one_module
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept_nodes.bring import Bring
+from bt_tasksim.concept_nodes.conditions import AtPose, Holding, TimePassed, Upright
+from bt_tasksim.concept_nodes.grasp import Grasp
+from bt_tasksim.concept_nodes.pick import Pick
+from bt_tasksim.concept_nodes.place import Place
+from bt_tasksim.concept_nodes.release import Release
+from bt_tasksim.concept_nodes.wait import Wait
+from bt_tasksim.core.registry import parts
+
+one_module(__name__)
 
 __all__ = [
     "AtPose",
@@ -27,8 +32,5 @@ __all__ = [
 
 
 def catalogue() -> dict[str, type[ConceptModel] | type[Condition]]:
-    """All concepts and conditions by name, as trees in XML name them."""
-    leaves: list[type[ConceptModel] | type[Condition]] = [
-        Grasp, Pick, Bring, Place, Release, Wait, Holding, AtPose, Upright, TimePassed,
-    ]  # fmt: skip
-    return {leaf.__name__: leaf for leaf in leaves}
+    """All concepts and conditions by name, as trees in XML name them; those of plugins, too."""
+    return parts("concept")

@@ -3,25 +3,43 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.context import Seen
-from bt_tasksim.errors import InputError, NoWayError
-from bt_tasksim.motion import plan
-from bt_tasksim.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Points, Position
-from bt_tasksim.planning import Carried, clear_path
-from bt_tasksim.poses import Array, array_namespace
-from bt_tasksim.world import ObjectModel, PlaceModel
-from concept_nodes.carry import Carry, MoveMemory
-from concept_nodes.grasp import neutral_rotation, resting_place
-from concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.demonstrated import position_words, rounded, rounded_points
+from bt_tasksim.concept.parameters import (
+    Metres,
+    MetresPerSecond,
+    Newtons,
+    ObjectName,
+    PlaceName,
+    Points,
+    Position,
+)
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.task import Task
+from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
+from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, resting_place
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.world import ObjectModel, PlaceModel
+from bt_tasksim.planning.reference_motion import plan
+from bt_tasksim.planning.ways import Carried, clear_path
 
+HOVERS = (0.03, 0.12)
+"""Metres between which the height lies that is taken over from a demonstration."""
 LONG_TURN = 2.3
 """Radians of turn from which it matters which way round the hand goes."""
 
 
+@register("concept")
 class Bring(Carry):
     """Carry a held object to a place or a position (keeps free space: NC).
 
@@ -47,14 +65,46 @@ class Bring(Carry):
     speed: MetresPerSecond = 0.5
     force_limit: Newtons = FORCE_LIMIT
 
+    contact = ContactChange(ContactState.NC, ContactState.NC)
+    presentation = Presentation(
+        colour="#b07d22",
+        spoken=r"bring|carr(?:y|ies)|mov(?:e|ing)|transport|take .* (?:to|over)\b|over to",
+        sayings=("I carry the {} over", "bring it to the {}", "now I move it to the {}"),
+        says_destination=True,
+    )
     default_timeout = 15.0
     default_tolerance = 0.01
 
-    def initial_state(self, seen: Seen) -> str:
-        """The object must be in the hand, and one destination given."""
-        if (self.to is None) == (self.position is None):
-            raise InputError(f"leaf '{self.name}': give either 'to' or 'position'")
-        return super().initial_state(seen)
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """Where to, and over how many via-points."""
+        said = [f"to {parameters['to']}"] if "to" in parameters else []
+        if "position" in parameters:
+            said.append(f"to {position_words(parameters['position'])}")
+        if "via" in parameters:
+            count = len(parameters["via"])
+            said.append(f"{count} via-point{'' if count == 1 else 's'}" if count else "straight")
+        return ", ".join(said)
+
+    @classmethod
+    def from_task(cls, task: Task, later: Sequence[Task]) -> dict[str, Any]:
+        """Destination and via-points; it ends as high as the place after it began."""
+        given = task.parameters
+        out: dict[str, Any] = {"target": given["target"]}
+        if given.get("to"):
+            out["to"] = given["to"]
+        else:
+            out["position"] = tuple(rounded(v) for v in given["position"])
+        out["via"] = rounded_points(given.get("via", ()))
+        for other in later:
+            if other.concept == "place" and other.parameters["target"] == given["target"]:
+                out["hover"] = rounded(np.clip(other.parameters["distance"], *HOVERS))
+                break
+        return out
+
+    def contradiction(self) -> str:
+        """One destination, neither none nor two."""
+        return "give either 'to' or 'position'" if (self.to is None) == (self.position is None) else ""
 
     def begin(self, seen: Seen) -> MoveMemory:
         """Find the way."""
@@ -82,7 +132,7 @@ class Bring(Carry):
         assert self.to is not None
         frame, rim = destination(seen, self.to)
         grip = poses.quat_multiply(poses.quat_conjugate(now[3:]), seen.tool[3:])
-        approach = poses.rotate(seen.tool[3:], np.array([0.0, 0.0, 1.0]))
+        approach = poses.z_axis(seen.tool[3:])
         neutral = neutral_rotation(seen, approach, frame[:3])
         easiest = poses.quat_multiply(neutral, poses.quat_conjugate(grip))
         return standing_pose(frame, now, model, rim + self.hover, easiest), frame[:3]
@@ -119,7 +169,7 @@ def _by_neutral(seen: Seen, start: Array, goal: Array) -> Array | None:
     if float(poses.angle_between(start[3:], goal[3:])) < LONG_TURN:
         return None
     middle = poses.interpolate(start, goal, 0.5)
-    approach = poses.rotate(middle[3:], np.array([0.0, 0.0, 1.0]))
+    approach = poses.z_axis(middle[3:])
     neutral = neutral_rotation(seen, approach, middle[:3])
     if float(poses.angle_between(neutral, middle[3:])) <= np.pi / 2:
         return None

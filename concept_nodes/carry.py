@@ -5,17 +5,23 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from bt_tasksim import poses
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Known, Seen
-from bt_tasksim.motion import Path, sample
-from bt_tasksim.poses import Array, array_namespace
-from bt_tasksim.world import Command
-from concept_nodes.holding import HOLDING, holding, not_held, tool_distance
-from concept_nodes.limits import force_at_wrist, strained
+from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held, tool_distance
+from bt_tasksim.concept_nodes.limits import force_at_wrist, strained
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import Form, Outcome, Statement
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.units import METRES, NEWTONS
+from bt_tasksim.core.world import Command
+from bt_tasksim.planning.reference_motion import Path, sample
 
+CARRIED = Form(
+    "tool {tool_to_goal} from its goal, {object} {object_to_tool} from the tool, {force} at the wrist",
+    {"tool_to_goal": METRES, "object_to_tool": METRES, "force": NEWTONS},
+)
 SLIP = 0.03
-"""Metres that a carried object may slip in the hand. Source, as of `TILT`: the last lesson of the released
+"""Metres that a carried object may slip in the hand. Source, as of `TILT`: the last stage of the released
 original's grasp training, task-sequencing-robotics-simulator."""
 TILT = math.radians(10.0)
 """Radians that a carried object may turn in the hand."""
@@ -35,11 +41,9 @@ class Carry(ConceptModel):
 
     maintains = (HOLDING,)
 
-    def initial_state(self, seen: Seen) -> str:
+    def initial_state(self, seen: Seen) -> Outcome | None:
         """The object must be in the hand."""
-        if not bool(holding(seen, self.target)):
-            return not_held(seen, self.target)
-        return ""
+        return not_held(seen, self.target)
 
     def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
         """Follow the path; the hand keeps its grip."""
@@ -80,12 +84,13 @@ class Carry(ConceptModel):
         tilt = poses.angle_between(before[..., 3:], after[..., 3:]) / TILT
         return xp.maximum(cost, xp.maximum(slip, tilt))
 
-    def explain(self, seen: Seen, memory: MoveMemory) -> str:
+    def explain(self, seen: Seen, memory: MoveMemory) -> Statement:
         """How far the tool still is from its goal, and the object from the tool."""
-        return (
-            f"tool {1000 * float(miss(seen, memory.path)):.0f} mm from its goal, "
-            f"{self.target} {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool, "
-            f"{float(force_at_wrist(seen)):.0f} N at the wrist"
+        return CARRIED(
+            tool_to_goal=miss(seen, memory.path),
+            object=self.target,
+            object_to_tool=tool_distance(seen, self.target),
+            force=force_at_wrist(seen),
         )
 
 

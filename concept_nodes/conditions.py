@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-import math
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.parameters import Metres, ObjectName, PlaceName, Radians, Seconds
+from bt_tasksim.concept_nodes.bring import destination, standing_pose
+from bt_tasksim.concept_nodes.holding import holding, tool_distance
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import Form, Statement
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import METRES, RADIANS, SECONDS
 
-from bt_tasksim import poses
-from bt_tasksim.concept import Condition
-from bt_tasksim.context import Seen
-from bt_tasksim.parameters import Metres, ObjectName, PlaceName, Radians, Seconds
-from bt_tasksim.poses import Array, array_namespace
-from concept_nodes.bring import destination, standing_pose
-from concept_nodes.holding import holding, tool_distance
+FROM_TOOL = Form("{object} is {distance} from the tool", {"distance": METRES})
+OFF = Form("{object} is {distance} and {angle:.0f} off", {"distance": METRES, "angle": RADIANS})
+TILTED = Form("{object} is tilted by {angle:.0f}", {"angle": RADIANS})
+PASSED = Form("{time:.2f} have passed", {"time": SECONDS})
 
 
+@register("concept")
 class Holding(Condition):
     """Is the object in the hand?
 
@@ -26,11 +33,12 @@ class Holding(Condition):
         """See `Condition.holds`."""
         return holding(seen, self.target)
 
-    def explain(self, seen: Seen) -> str:
+    def explain(self, seen: Seen) -> Statement:
         """How far the object is from the tool."""
-        return f"{self.target} is {1000 * float(tool_distance(seen, self.target)):.0f} mm from the tool"
+        return FROM_TOOL(object=self.target, distance=tool_distance(seen, self.target))
 
 
+@register("concept")
 class AtPose(Condition):
     """Does the object stand where it should, as far as can be seen?
 
@@ -51,11 +59,10 @@ class AtPose(Condition):
         distance, angle = self._off(seen)
         return (distance < self.tolerance) & (angle < self.angle)
 
-    def explain(self, seen: Seen) -> str:
+    def explain(self, seen: Seen) -> Statement:
         """How far off it is."""
         distance, angle = self._off(seen)
-        degrees = math.degrees(float(angle))
-        return f"{self.target} is {1000 * float(distance):.0f} mm and {degrees:.0f} degrees off"
+        return OFF(object=self.target, distance=distance, angle=angle)
 
     def _off(self, seen: Seen) -> tuple[Array, Array]:
         now = seen.object(self.target)
@@ -65,6 +72,7 @@ class AtPose(Condition):
         return poses.norm(gap), poses.angle_between(now[..., 3:], goal[..., 3:])
 
 
+@register("concept")
 class Upright(Condition):
     """Does the object stand upright?
 
@@ -80,17 +88,15 @@ class Upright(Condition):
         """See `Condition.holds`."""
         return self._tilt(seen) < self.angle
 
-    def explain(self, seen: Seen) -> str:
+    def explain(self, seen: Seen) -> Statement:
         """How far it is tilted."""
-        return f"{self.target} is tilted by {math.degrees(float(self._tilt(seen))):.0f} degrees"
+        return TILTED(object=self.target, angle=self._tilt(seen))
 
     def _tilt(self, seen: Seen) -> Array:
-        pose = seen.object(self.target)
-        up = poses.rotate(pose[..., 3:], poses.constant([0.0, 0.0, 1.0], pose))
-        xp = array_namespace(up)
-        return xp.acos(xp.clip(up[..., 2], -1.0, 1.0))
+        return poses.tilt(seen.object(self.target)[..., 3:])
 
 
+@register("concept")
 class TimePassed(Condition):
     """Has so much time passed since the episode began?
 
@@ -104,6 +110,6 @@ class TimePassed(Condition):
         """See `Condition.holds`."""
         return seen.observation.time >= self.duration
 
-    def explain(self, seen: Seen) -> str:
+    def explain(self, seen: Seen) -> Statement:
         """The time."""
-        return f"{float(seen.observation.time):.2f} s have passed"
+        return PASSED(time=seen.observation.time)

@@ -3,23 +3,41 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Known, Seen
-from bt_tasksim.motion import Path, minimum_jerk, plan, sample
-from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, Ratio
-from bt_tasksim.poses import Array, array_namespace
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.world import Command, ObjectModel, PlaceModel
-from concept_nodes import grasp_features
-from concept_nodes.grasp_features import ALONG, CLOSE, HASTE
-from concept_nodes.holding import HOLDING, tool_distance
-from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.demonstrated import coming_from, snapped
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Axis, Direction, Metres, MetresPerSecond, Newtons, ObjectName, Ratio
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.task import Task
+from bt_tasksim.concept_nodes import grasp_features
+from bt_tasksim.concept_nodes.grasp_features import ALONG, CLOSE, HASTE
+from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
+from bt_tasksim.concept_nodes.grasp_pose import grasp_pose, half_extent, resting_place
+from bt_tasksim.concept_nodes.holding import HOLDING, tool_distance
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import Form, Outcome, Statement, register_reason
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import METRES, NEWTONS, SHARE
+from bt_tasksim.core.world import Command
+from bt_tasksim.planning.reference_motion import Path, minimum_jerk, plan, sample
+from bt_tasksim.robot.description import RobotDescription
 
+NOT_SEEN = register_reason("not_seen", "{object} is not seen")
+TOO_WIDE = register_reason(
+    "too_wide", "{object} is {width} wide, the hand opens {opening}", width=METRES, opening=METRES
+)
+GRASPING = Form(
+    "hand {closure} closed, {contact}, tool {distance} from {object}, {force} at the wrist",
+    {"closure": SHARE, "distance": METRES, "force": NEWTONS},
+)
 SETTLED = 3
 """Ticks for which opposing contacts and a still hand must be seen."""
 ACCELERATION = 3.0
@@ -29,7 +47,6 @@ TIGHTENING = 0.2
 """The Panda's fingers press 1 N more in each control period. Measured with the middle of the action and a
 fixed number of control periods from opposing contacts on: the Ability hand holds 143 of 150 objects, and at
 its full speed 137 to 140, since what is light tilts in it; the Panda 187 and 186 of 200."""
-DOWN = (0.0, 0.0, -1.0)
 SLANTED = 0.01
 """Metres by which the middle of an action is deeper for a horizontal approach than for one from above: where
 a slanted hand meets an object's edge first, its fingers are still before the object's middle."""
@@ -39,54 +56,7 @@ TIPPED = math.radians(10.0)
 """Radians by which a grasp may tip the object over, as it is seen."""
 
 
-class GraspMemory(NamedTuple):
-    """What a grasp remembers; batch dimensions ``(...)``.
-
-    Attributes:
-        path: Tool path to the grasp pose.
-        begins: Seconds after which the straight approach begins, and with it what is decided by a policy.
-        goal: Grasp pose ``(..., 7)`` of the reference motion.
-        delay: Seconds by which the motion is behind the reference.
-        middle: Offsets ``(..., 5)`` in units of `grasp_features.SCALE` that the middle of an action stands
-            for: the tool goes on, or stays behind, by as much as the estimate is above or below where the
-            object would stand, and goes deeper where it comes slanted.
-        offset: Offsets ``(..., 5)`` from the reference motion, see `grasp_features.SCALE`.
-        target: Tool pose ``(..., 7)`` that was last commanded.
-        closing: Seconds since the hand began to close; negative before.
-        closed: Closure that was last commanded.
-        closure: Closure at the previous tick.
-        settled: Ticks in a row with opposing contacts and a still hand.
-        preshape: Closure at which the hand comes.
-        touched: Which fingertips ``(..., n_tips)`` have touched anything since the approach began, 0 or 1.
-        first: How far before the grasp pose the tool was at the first contact, metres; 0 without one.
-        estimate: What the estimate says ``(..., 5)``: height of the grasp pose and of the object's centre
-            above what it stands on, the centre beyond the grasp pose along the approach (units of 50 mm), the
-            cosine between the approach and straight down onto the support, and how far along the approach the
-            estimate is from where an object of the known size would stand (units of 20 mm).
-        start: Estimated pose ``(..., 7)`` of the object at the start.
-        now: Estimated pose ``(..., 7)`` of the object at the previous tick.
-    """
-
-    path: Path
-    begins: Array
-    goal: Array
-    delay: Array
-    middle: Array
-    offset: Array
-    target: Array
-    closing: Array
-    closed: Array
-    closure: Array
-    settled: Array
-    preshape: Array
-    touched: Array
-    first: Array
-    estimate: Array
-    start: Array
-    now: Array
-
-
-class Motion(NamedTuple):
+class GraspMotion(NamedTuple):
     """What an action makes of the reference motion at a tick; batch dimensions ``(...)``.
 
     Attributes:
@@ -104,6 +74,7 @@ class Motion(NamedTuple):
     closed: Array
 
 
+@register("concept")
 class Grasp(ConceptModel):
     """Grasp an object (makes the hand's contacts; the object's own contact with its support is kept).
 
@@ -131,7 +102,7 @@ class Grasp(ConceptModel):
 
     target: ObjectName
     approach: Direction | None = None
-    closing: Direction | None = None
+    closing: Axis | None = None
     standoff: Metres = 0.10
     speed: MetresPerSecond = 0.5
     grip: Ratio = 1.0
@@ -141,25 +112,40 @@ class Grasp(ConceptModel):
     reaches = (HOLDING,)
     default_timeout = 12.0
     is_task_model = False
+    contact = ContactChange(ContactState.NC, ContactState.FT, to="hand")
+    presentation = Presentation(
+        colour="#3b6fb6",
+        spoken=r"grasp|grab|grip|take hold|get hold|seiz",
+        sayings=("I grasp the {}", "now I grab the {}", "take hold of the {}"),
+    )
     actions = len(grasp_features.ACTIONS)
     observables = ("hand_position", "closure", "contacts", "tool_pose", "objects", "time")
 
-    def initial_state(self, seen: Seen) -> str:
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """Where the hand comes from."""
+        return f"from {coming_from(parameters['approach'])}" if "approach" in parameters else ""
+
+    @classmethod
+    def from_task(cls, task: Task, later: Sequence[Task]) -> dict[str, Any]:
+        """The approach, where it is not from above; the closing axis is left to the robot's own build."""
+        approach = snapped(task.parameters["approach"])
+        target = {"target": task.parameters["target"]}
+        return target if approach is None else {**target, "approach": approach}
+
+    def initial_state(self, seen: Seen) -> Outcome | None:
         """The object must be seen and fit into the hand."""
         if not np.isfinite(seen.object(self.target)[0]):
-            return f"{self.target} is not seen"
-        model = seen.model(self.target)
-        if self.closing is None and min(model.grasp_widths) > seen.world.opening:
-            return (
-                f"{self.target} is {1000 * min(model.grasp_widths):.0f} mm wide, "
-                f"the hand opens {1000 * seen.world.opening:.0f} mm"
-            )
-        return ""
+            return NOT_SEEN(object=self.target)
+        width = min(seen.model(self.target).grasp_widths)
+        if self.closing is None and width > seen.world.opening:
+            return TOO_WIDE(object=self.target, width=width, opening=seen.world.opening)
+        return None
 
     def begin(self, seen: Seen) -> GraspMemory:
         """Choose the grasp pose and plan the way to it."""
         goal = grasp_pose(seen, self.target, self.approach, self.closing)
-        approach = poses.rotate(goal[3:], np.array([0.0, 0.0, 1.0]))
+        approach = poses.z_axis(goal[3:])
         back = goal.copy()
         back[:3] -= self.standoff * approach
         way = [*_way_out(seen, back), back, goal]
@@ -193,10 +179,10 @@ class Grasp(ConceptModel):
         beyond = float((centre - goal[:3]) @ approach)
         if place is None:
             return np.array([0.0, 0.0, beyond / 0.05, 1.0, 0.0])
-        up = poses.rotate(place.pose[3:], np.array([0.0, 0.0, 1.0]))
+        up = poses.z_axis(place.pose[3:])
         onto = -float(up @ approach)
         goal_height, height = (float((p - place.pose[:3]) @ up) for p in (goal[:3], centre))
-        standing = _half_extent(seen.object(self.target), seen.model(self.target), up)
+        standing = half_extent(seen.object(self.target), seen.model(self.target), up)
         above = (height - standing) / max(onto, 0.3)
         return np.array([goal_height / 0.05, height / 0.05, beyond / 0.05, onto, above / 0.02])
 
@@ -226,7 +212,7 @@ class Grasp(ConceptModel):
         motion = self._motion(action, seen, memory)
         return _commanded(motion), self._after(motion, seen, memory)
 
-    def _after(self, motion: Motion, seen: Seen, memory: GraspMemory) -> GraspMemory:
+    def _after(self, motion: GraspMotion, seen: Seen, memory: GraspMemory) -> GraspMemory:
         if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
             return self._after_one(motion, seen, memory)
         delay, target = motion.delay, motion.target
@@ -255,7 +241,7 @@ class Grasp(ConceptModel):
             first=xp.where(fresh, along, memory.first),
         )
 
-    def _after_one(self, motion: Motion, seen: Seen, memory: GraspMemory) -> GraspMemory:
+    def _after_one(self, motion: GraspMotion, seen: Seen, memory: GraspMemory) -> GraspMemory:
         """`_after` for one grasp, in plain numbers: they are quicker than arrays of one."""
         closing, closure = float(memory.closing), seen.closure
         begun, settled = closing >= 0.0, np.int64(0)
@@ -286,16 +272,16 @@ class Grasp(ConceptModel):
             first=first,
         )
 
-    def _motion(self, action: Array, seen: Seen, memory: GraspMemory) -> Motion:
+    def _motion(self, action: Array, seen: Seen, memory: GraspMemory) -> GraspMotion:
         """What an action makes of the reference motion at this tick."""
         met = grasp_features.met(action, seen, memory)
-        pace = grasp_features.pace(action, met, seen, memory)
-        delay = memory.delay + seen.world.control_period * (1.0 - pace)
+        scaling = grasp_features.time_scaling(action, met, seen, memory)
+        delay = memory.delay + seen.world.control_period * (1.0 - scaling)
         offset = grasp_features.moved_offset(action, met, seen, memory)
         middle = grasp_features.found_middle(offset, met, memory)
         target = grasp_features.displaced(sample(memory.path, seen.elapsed - delay), offset)
-        closed = grasp_features.closed(pace, self._asked(offset), self.tightening, seen, memory)
-        return Motion(delay, offset, middle, target, closed)
+        closed = grasp_features.closed(scaling, self._asked(offset), self.tightening, seen, memory)
+        return GraspMotion(delay, offset, middle, target, closed)
 
     def _asked(self, offset: Array) -> Array:
         """The closure ``(...)`` that offsets ``(..., 5)`` ask for in the end."""
@@ -304,10 +290,14 @@ class Grasp(ConceptModel):
         return poses.clip(self.grip + offset[..., CLOSE], 0.0, 1.0)
 
     def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:
-        """Where the estimate says: the programmed grasp trusts it."""
+        """The middle of an action, at the reference motion's own speed.
+
+        So it has what a learned grasp begins with: an object stands on its support, and where the estimate
+        says otherwise, the support is right (`GraspMemory.middle`).
+        """
         xp = array_namespace(memory.middle)
-        back = -xp.sign(memory.middle) * xp.sqrt(abs(memory.middle))
-        return xp.concat([back, xp.full_like(memory.middle[..., :1], HASTE)], axis=-1)
+        still = xp.zeros_like(memory.middle)
+        return xp.concat([still, xp.full_like(still[..., :1], HASTE)], axis=-1)
 
     def done(self, seen: Seen, memory: GraspMemory) -> Array:
         """Opposing contacts and a still hand, some ticks long, that presses as hard as it is to."""
@@ -320,7 +310,8 @@ class Grasp(ConceptModel):
         empty = (memory.closing > 0.8) & (seen.closure > 0.97 * self.grip)
         now = seen.object(self.target)
         pushed = poses.norm(now[..., :3] - memory.start[..., :3]) > PUSHED
-        return empty | strained(seen, self.force_limit) | pushed | (_tilt(memory.start, now) > TIPPED)
+        tipped = poses.tilt(now[..., 3:], memory.start[..., 3:]) > TIPPED
+        return empty | strained(seen, self.force_limit) | pushed | tipped
 
     def _violated_one(self, seen: Seen, memory: GraspMemory) -> bool:
         """`violated` for one grasp: what is decided first ends it."""
@@ -330,7 +321,7 @@ class Grasp(ConceptModel):
         return bool(
             strained(seen, self.force_limit)
             or poses.norm(now[:3] - memory.start[:3]) > PUSHED
-            or _tilt(memory.start, now) > TIPPED
+            or poses.tilt(now[..., 3:], memory.start[..., 3:]) > TIPPED
         )
 
     def necessary_cost(self, seen: Seen, memory: GraspMemory) -> Array:
@@ -355,36 +346,20 @@ class Grasp(ConceptModel):
         xp = array_namespace(force)
         return xp.where(force > 0.5, 0.0, 1.0)
 
-    def explain(self, seen: Seen, memory: GraspMemory) -> str:
+    def explain(self, seen: Seen, memory: GraspMemory) -> Statement:
         """Contacts, opening and how far the tool is from the object."""
         touching = [t for t, c in zip(seen.world.tips, seen.contacts, strict=True) if c]
-        return (
-            f"hand {100 * float(seen.closure):.0f} % closed, "
-            f"{'contact at ' + ', '.join(touching) if touching else 'no contact'}, "
-            f"tool {1000 * float(tool_distance(seen, self.target)):.0f} mm from {self.target}, "
-            f"{float(force_at_wrist(seen)):.0f} N at the wrist"
+        return GRASPING(
+            closure=seen.closure,
+            contact=f"contact at {', '.join(touching)}" if touching else "no contact",
+            distance=tool_distance(seen, self.target),
+            object=self.target,
+            force=force_at_wrist(seen),
         )
 
 
-def _commanded(motion: Motion) -> Command:
+def _commanded(motion: GraspMotion) -> Command:
     return Command(tool=motion.target, hand=motion.closed[..., None])
-
-
-def _tilt(before: Array, now: Array) -> Array:
-    """Angle ``(...)`` in radians between the vertical axes of two poses ``(..., 7)`` of an object."""
-    if type(now) is np.ndarray and now.ndim == 1:
-        a, b = _vertical(before), _vertical(now)
-        return np.float64(math.acos(min(max(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], -1.0), 1.0)))
-    up = poses.constant([0.0, 0.0, 1.0], now)
-    cosine = poses.dot(poses.rotate(before[..., 3:], up), poses.rotate(now[..., 3:], up))
-    xp = array_namespace(now)
-    return xp.acos(poses.clip(cosine, -1.0, 1.0))
-
-
-def _vertical(pose: Array) -> tuple[float, float, float]:
-    """The vertical axis of a pose ``(7,)``."""
-    w, x, y, z = pose[3:].tolist()
-    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
 def _approach_begins(path: Path, standoff: float) -> Array:
@@ -394,94 +369,6 @@ def _approach_begins(path: Path, standoff: float) -> Array:
     fraction = 0.0 if len(inside) == 0 else (inside[-1] + 1) / (len(path.table) - 1)
     times = np.linspace(0.0, 1.0, 101)
     return np.float64(np.interp(fraction, minimum_jerk(times), times) * float(path.duration))
-
-
-def resting_place(seen: Seen, target: str) -> PlaceModel | None:
-    """The place on which an object seems to stand, or None where it is on none."""
-    pose = seen.object(target)
-    half = seen.model(target).extent[2] / 2
-    best: tuple[float, PlaceModel] | None = None
-    for place in seen.world.places.values():
-        local = poses.transform(poses.inverse(place.pose), pose[:3])
-        inside = all(abs(float(local[i]) - place.centre[i]) <= place.extent[i] / 2 + 0.02 for i in range(2))
-        gap = abs(float(local[2]) - half)
-        if inside and gap < 0.05 and (best is None or gap < best[0] - 1e-6):
-            best = (gap, place)
-    return best[1] if best else None
-
-
-def grasp_pose(seen: Seen, target: str, approach: Array | None = None, closing: Array | None = None) -> Array:
-    """The tool pose ``(7,)`` for a grasp of an object at its estimated pose.
-
-    Of the object's grasp axes those count that lie across the approach and fit into the hand; of the tool
-    orientations that they leave, the one nearest to the hand's neutral one there is taken.
-    """
-    pose, model = seen.object(target), seen.model(target)
-    if approach is None:
-        place = resting_place(seen, target)
-        approach = DOWN if place is None else place.access
-    a = np.asarray(approach, float)
-    neutral = neutral_rotation(seen, a, pose[:3])
-    best: tuple[float, Array] | None = None
-    for rank, c in enumerate(_closing_axes(seen, pose, model, a, neutral, closing)):
-        for sign in (1.0, -1.0):
-            rotation = poses.frame_from_axes(a, sign * c)
-            cost = float(poses.angle_between(neutral, rotation)) + 0.3 * rank
-            if best is None or cost < best[0] - 1e-9:
-                best = (cost, rotation)
-    assert best is not None
-    rotation = best[1]
-    reach = _half_extent(pose, model, a)
-    position = pose[:3] - max(0.0, reach - seen.robot.depth) * a
-    return poses.pose(position, rotation)
-
-
-def neutral_rotation(seen: Seen, approach: Array, position: Array) -> Array:
-    """The tool orientation ``(4,)`` in which the arm is farthest from its joints' limits.
-
-    It is the one that the closing axis of the rest posture has when the arm's base turns to ``position``.
-
-    Args:
-        seen: What is seen.
-        approach: Unit vector ``(3,)`` along which the tool comes, robot base frame.
-        position: Where the tool is going to be, ``(3,)`` metres.
-    """
-    closing = poses.rotate(poses.yaw(math.atan2(position[1], position[0])), seen.robot.closing)
-    return poses.frame_from_axes(approach, closing)
-
-
-def _closing_axes(
-    seen: Seen, pose: Array, model: ObjectModel, approach: Array, neutral: Array, closing: Array | None
-) -> list[Array]:
-    upright = poses.rotate(pose[3:], np.array([0.0, 0.0, 1.0]))
-    if closing is not None:
-        return [poses.rotate(pose[3:], np.asarray(closing, float))]
-    if model.symmetry == 0 and abs(float(upright @ approach)) > 0.7:  # any direction across the axis
-        tool_y = poses.rotate(neutral, np.array([0.0, 1.0, 0.0]))
-        across = tool_y - (tool_y @ approach) * approach
-        if float(np.linalg.norm(across)) > 0.3:
-            return [across / np.linalg.norm(across)]
-    if model.symmetry == 0:  # from the side: across the object's axis and the approach
-        across = poses.cross(upright, approach)
-        return [across / np.linalg.norm(across)]
-    axes = []
-    for axis, width in zip(model.grasp_axes, model.grasp_widths, strict=True):
-        c = poses.rotate(pose[3:], np.asarray(axis))
-        if abs(float(c @ approach)) < 0.5 and width < seen.world.opening - 0.006:
-            axes.append(c)
-    if axes:
-        return axes
-    fallback = poses.cross(approach, upright if abs(float(upright @ approach)) < 0.9 else pose[:3])
-    return [fallback / np.linalg.norm(fallback)]
-
-
-def _half_extent(pose: Array, model: ObjectModel, direction: Array) -> float:
-    """Half the size of an object's bounding box along a direction, metres."""
-    local = poses.rotate(pose[3:] * np.array([1.0, -1.0, -1.0, -1.0]), direction)
-    if model.symmetry == 0:
-        radial, axial = float(np.hypot(local[0], local[1])), abs(float(local[2]))
-        return (radial * model.extent[0] + axial * model.extent[2]) / 2
-    return float(np.abs(local) @ np.asarray(model.extent)) / 2
 
 
 def _way_out(seen: Seen, goal: Array) -> list[Array]:

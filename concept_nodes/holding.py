@@ -6,9 +6,12 @@ import math
 
 import numpy as np
 
-from bt_tasksim.context import Seen
-from bt_tasksim.poses import Array, array_namespace, constant, inverse, transform
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.core.outcomes import Outcome, register_reason
+from bt_tasksim.core.poses import Array, array_namespace, constant, inverse, transform
+from bt_tasksim.core.units import METRES
 
+NOT_HELD = register_reason("not_held", "{object} is not held ({distance} from the tool)", distance=METRES)
 HOLDING = "holding"
 """Name of the goal that `Grasp` reaches, `Pick`, `Bring` and `Place` maintain, and `Release` ends."""
 
@@ -41,6 +44,8 @@ def holding(seen: Seen, target: str, reach: float = 0.03) -> Array:
     return seen.opposed() & (tool_distance(seen, target) < reach)
 
 
-def not_held(seen: Seen, target: str) -> str:
-    """Says that an object is not in the hand, and where it is."""
-    return f"{target} is not held ({1000 * float(tool_distance(seen, target)):.0f} mm from the tool)"
+def not_held(seen: Seen, target: str) -> Outcome | None:
+    """The outcome that an object is not in the hand; None where it is."""
+    if bool(holding(seen, target)):
+        return None
+    return NOT_HELD(object=target, distance=tool_distance(seen, target))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from bt_tasksim.context import Seen
-from bt_tasksim.poses import Array, norm
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.core.poses import Array, norm
 
 FORCE_LIMIT = 60.0
 """N at the wrist: well above what carrying and placing take, well below what breaks a cup or a finger."""

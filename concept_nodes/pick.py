@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import numpy as np
 
-from bt_tasksim.context import Known, Seen
-from bt_tasksim.motion import plan
-from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName
-from bt_tasksim.poses import Array, array_namespace
-from concept_nodes.carry import Carry, MoveMemory
-from concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.demonstrated import rounded, snapped, straight_words
+from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.task import Task
+from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+from bt_tasksim.planning.reference_motion import plan
 
 
+@register("concept")
 class Pick(Carry):
     """Take a held object off what it rests on (breaks its contact: PC to NC).
 
@@ -32,7 +41,29 @@ class Pick(Carry):
     force_limit: Newtons = FORCE_LIMIT
     squeeze: Newtons | None = None
 
+    contact = ContactChange(ContactState.PC, ContactState.NC)
+    presentation = Presentation(
+        colour="#2f8f6b",
+        spoken=r"pick|lift|rais|take .* up\b|take .* off\b",
+        sayings=("I lift the {}", "pick it up", "raise the {} a bit"),
+    )
     default_timeout = 8.0
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """How far it goes which way, and off what."""
+        said = [straight_words(parameters)] if "distance" in parameters else []
+        return ", ".join([*said, *([f"off {parameters['off']}"] if "off" in parameters else [])])
+
+    @classmethod
+    def from_task(cls, task: Task, later: Sequence[Task]) -> dict[str, Any]:
+        """Direction and distance."""
+        given = task.parameters
+        return {
+            "target": given["target"],
+            "direction": snapped(given["direction"]) or (0.0, 0.0, 1.0),
+            "distance": rounded(given["distance"]),
+        }
 
     def begin(self, seen: Seen) -> MoveMemory:
         """A straight path."""

@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Known, Seen
-from bt_tasksim.motion import Path, plan, sample
-from bt_tasksim.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
-from bt_tasksim.poses import Array, array_namespace
-from bt_tasksim.world import Command
-from concept_nodes.bring import destination, standing_pose
-from concept_nodes.holding import HOLDING, holding, not_held
-from concept_nodes.limits import FORCE_LIMIT, strained
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.demonstrated import position_words, straight_words
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.task import Task
+from bt_tasksim.concept_nodes.bring import destination, standing_pose
+from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strained
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.outcomes import Form, Outcome, Statement
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import METRES, NEWTONS
+from bt_tasksim.core.world import Command
+from bt_tasksim.planning.reference_motion import Path, plan, sample
 
+FELT_AND_MISSED = Form(
+    "{felt:.1f} felt, {object} {distance} from its spot", {"felt": NEWTONS, "distance": METRES}
+)
 FELT = 2
 """Ticks in a row for which the support must be felt."""
 
@@ -37,6 +49,7 @@ class PlaceMemory(NamedTuple):
     progress: Array
 
 
+@register("concept")
 class Place(ConceptModel):
     """Put a held object down on a place or on another object (makes contact: NC to PC).
 
@@ -64,13 +77,41 @@ class Place(ConceptModel):
     force_limit: Newtons = FORCE_LIMIT
 
     maintains = (HOLDING,)
+    contact = ContactChange(ContactState.NC, ContactState.PC)
+    presentation = Presentation(
+        colour="#8a56a8",
+        spoken=r"plac|put|set(?:ting)? .* down|stand .* on|\blay",
+        sayings=("put it down on the {}", "I place it on the {}", "set it down gently"),
+        says_destination=True,
+    )
     default_timeout = 10.0
 
-    def initial_state(self, seen: Seen) -> str:
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """Onto what, and how far which way."""
+        said = [f"onto {parameters['on']}"] if "on" in parameters else []
+        if "position" in parameters:
+            said.append(f"to {position_words(parameters['position'])}")
+        return ", ".join([*said, *([straight_words(parameters)] if "distance" in parameters else [])])
+
+    @classmethod
+    def from_task(cls, task: Task, later: Sequence[Task]) -> dict[str, Any]:
+        """What it is put on; how far it goes is felt.
+
+        Raises:
+            InputError: The log does not name what it was put on.
+        """
+        given = task.parameters
+        if not given.get("on"):
+            raise InputError(
+                f"'{given['target']}' was placed on something that the log does not name: "
+                f"name the surface in the log's 'places'"
+            )
+        return {"target": given["target"], "on": given["on"]}
+
+    def initial_state(self, seen: Seen) -> Outcome | None:
         """The object must be in the hand."""
-        if not bool(holding(seen, self.target)):
-            return not_held(seen, self.target)
-        return ""
+        return not_held(seen, self.target)
 
     def begin(self, seen: Seen) -> PlaceMemory:
         """A straight path down to the place's origin."""
@@ -120,11 +161,12 @@ class Place(ConceptModel):
         xp = array_namespace(known.hidden.objects)
         return xp.where(xp.asarray(known.supported(self.target)), 0.0, 1.0)
 
-    def explain(self, seen: Seen, memory: PlaceMemory) -> str:
+    def explain(self, seen: Seen, memory: PlaceMemory) -> Statement:
         """What is felt, and how far the object is from where it should stand."""
-        return (
-            f"{float(self._force(seen) - memory.baseline):.1f} N felt, "
-            f"{self.target} {1000 * float(self.necessary_cost(seen, memory)):.0f} mm from its spot"
+        return FELT_AND_MISSED(
+            felt=self._force(seen) - memory.baseline,
+            object=self.target,
+            distance=self.necessary_cost(seen, memory),
         )
 
     def _force(self, seen: Seen) -> Array:

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Known, Seen
-from bt_tasksim.motion import Path, plan, sample
-from bt_tasksim.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Seconds
-from bt_tasksim.poses import Array, array_namespace
-from bt_tasksim.world import Command
-from concept_nodes.holding import HOLDING
-from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Seconds
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.holding import HOLDING
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import Form, Statement
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import COUNT, NEWTONS, SHARE
+from bt_tasksim.core.world import Command
+from bt_tasksim.planning.reference_motion import Path, plan, sample
+
+OPENED = Form(
+    "hand {opening} open, {contacts} fingertips in contact, {force} at the wrist",
+    {"opening": SHARE, "contacts": COUNT, "force": NEWTONS},
+)
 
 
 class ReleaseMemory(NamedTuple):
@@ -31,6 +42,7 @@ class ReleaseMemory(NamedTuple):
     opened: Array
 
 
+@register("concept")
 class Release(ConceptModel):
     """Let an object go (breaks the hand's contacts): the hand opens, then the tool draws back.
 
@@ -51,13 +63,24 @@ class Release(ConceptModel):
     force_limit: Newtons = FORCE_LIMIT
 
     ends = (HOLDING,)
+    contact = ContactChange(ContactState.FT, ContactState.NC, to="hand")
+    presentation = Presentation(
+        colour="#c0504d",
+        spoken=r"releas|let(?:ting)? .*go|\bdrop|throw|open my hand",
+        sayings=("and let go", "release the {}", "I let it go"),
+    )
     default_timeout = 8.0
     default_tolerance = 0.01
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """Into what, where it falls."""
+        return f"into {parameters['into']}" if "into" in parameters else ""
 
     def begin(self, seen: Seen) -> ReleaseMemory:
         """A straight path back."""
         back = seen.tool.copy()
-        back[:3] -= self.retreat * poses.rotate(back[3:], np.array([0.0, 0.0, 1.0]))
+        back[:3] -= self.retreat * poses.z_axis(back[3:])
         return ReleaseMemory(plan([seen.tool, back], self.speed, samples=2), seen.closure, np.float64(-1.0))
 
     def command(self, action: Array, seen: Seen, memory: ReleaseMemory) -> Command:
@@ -102,10 +125,10 @@ class Release(ConceptModel):
         xp = array_namespace(known.hidden.objects)
         return xp.where(known.hand_force(self.target) > 0.05, 1.0, 0.0)
 
-    def explain(self, seen: Seen, memory: ReleaseMemory) -> str:
+    def explain(self, seen: Seen, memory: ReleaseMemory) -> Statement:
         """How far the hand is open and what it touches."""
-        n = int(np.count_nonzero(seen.contacts))
-        return (
-            f"hand {100 * (1 - float(seen.closure)):.0f} % open, {n} fingertips in contact, "
-            f"{float(force_at_wrist(seen)):.0f} N at the wrist"
+        return OPENED(
+            opening=1.0 - seen.closure,
+            contacts=np.count_nonzero(seen.contacts),
+            force=force_at_wrist(seen),
         )

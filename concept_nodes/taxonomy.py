@@ -18,15 +18,15 @@ plan from observation", IEEE Trans. Robotics and Automation 10(3), 1994.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bt_tasksim.errors import InputError, nearest
-
-Motion = Literal["translation", "rotation"]
+from bt_tasksim.concept.contact import Change as Change
+from bt_tasksim.concept.contact import ContactChange, Motion
+from bt_tasksim.concept.contact import ContactState as ContactState
+from bt_tasksim.core.errors import InputError, nearest
 
 
 class Dimensions(NamedTuple):
@@ -35,26 +35,6 @@ class Dimensions(NamedTuple):
     m: int
     d: int
     c: int
-
-
-class ContactState(Enum):
-    """The seven classes of contact states; the value says what the class means for translation."""
-
-    NC = "no contact"
-    PC = "rests on something, can be lifted off"
-    TR = "moves in a plane only, held from both sides"
-    OT = "as TR, and blocked on one side in the plane"
-    PR = "moves on a line only, such as a half-open drawer"
-    OP = "as PR, at an end stop, such as a closed drawer"
-    FT = "cannot move"
-
-
-class Change(Enum):
-    """What a task does to the contact state in which it finds the object."""
-
-    BREAKS = "breaks"
-    KEEPS = "keeps"
-    MAKES = "makes"
 
 
 @dataclass(frozen=True)
@@ -76,9 +56,7 @@ class ContactTask:
     @property
     def change(self) -> Change:
         """Whether the task breaks, keeps or makes the contact state."""
-        if self.before is self.after:
-            return Change.KEEPS
-        return Change.BREAKS if _FREEDOM[self.after] > _FREEDOM[self.before] else Change.MAKES
+        return ContactChange(self.before, self.after, self.motion).change
 
 
 _CLASS_OF = {
@@ -90,9 +68,6 @@ _CLASS_OF = {
     (2, True): ContactState.OP,
     (3, False): ContactState.FT,
 }
-
-_FREEDOM = {state: 6 - rank for rank, state in enumerate(_CLASS_OF.values())}
-"""Breaking a contact goes to a class of more freedom; the classes are in the order of their freedom."""
 
 TASKS: tuple[ContactTask, ...] = (
     ContactTask("pick", "translation", ContactState.PC, ContactState.NC),

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Seen
-from bt_tasksim.parameters import Seconds
-from bt_tasksim.poses import Array
-from bt_tasksim.world import Command
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Seconds
+from bt_tasksim.core.outcomes import Form, Statement
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import SECONDS
+from bt_tasksim.core.world import Command
+
+WAITED = Form("waited {waited:.2f} of {duration:g}", {"waited": SECONDS, "duration": SECONDS})
 
 
+@register("concept")
 class Wait(ConceptModel):
     """Hold still for a while, such as until what has fallen has come to rest.
 
@@ -34,6 +40,6 @@ class Wait(ConceptModel):
         """Seconds that remain."""
         return self.duration - seen.elapsed
 
-    def explain(self, seen: Seen, memory: Any) -> str:
+    def explain(self, seen: Seen, memory: Any) -> Statement:
         """How long it has waited."""
-        return f"waited {float(seen.elapsed):.2f} of {self.duration:g} s"
+        return WAITED(waited=seen.elapsed, duration=self.duration)

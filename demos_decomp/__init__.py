@@ -6,20 +6,23 @@ print(text_table(found.tasks))
 found.graph                 # networkx.DiGraph, see demos_decomp.graph
 """
 
-from demos_decomp.decompose import decompose, decompose_log
-from demos_decomp.graph import build_graph, graph_to_json, in_order
-from demos_decomp.log import Demonstration, Log, Surface, Track, Utterance, Video, surface_of
-from demos_decomp.log_file import read_log, write_log
-from demos_decomp.picture import picture, write_picture
-from demos_decomp.readers import open_log, register
-from demos_decomp.table import text_table
-from demos_decomp.tasks import Decomposition, Task
+from bt_tasksim._names import one_module
+from bt_tasksim.concept.task import Task
+from bt_tasksim.demos_decomp.decompose import Decomposition, decompose, decompose_log
+from bt_tasksim.demos_decomp.graph import build_graph, graph_to_json, in_order
+from bt_tasksim.demos_decomp.log import Demonstration, Log, Surface, Track, Utterance, Video, surface_of
+from bt_tasksim.demos_decomp.log_file import read_log, write_log
+from bt_tasksim.demos_decomp.picture import picture, write_picture
+from bt_tasksim.demos_decomp.readers import LogReader, open_log
+from bt_tasksim.demos_decomp.table import text_table
+
+one_module(__name__)
 
 __all__ = [
     "open_log",
     "read_log",
     "write_log",
-    "register",
+    "LogReader",
     "decompose",
     "decompose_log",
     "Decomposition",

@@ -2,15 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import networkx as nx
 import numpy as np
 
-from demos_decomp.graph import build_graph, in_order
-from demos_decomp.log import Demonstration, Log
-from demos_decomp.recognition import recognise
-from demos_decomp.tasks import Decomposition, Task
+from bt_tasksim.concept.task import Task
+from bt_tasksim.demos_decomp.graph import build_graph, graph_to_json, in_order
+from bt_tasksim.demos_decomp.log import Demonstration, Log
+from bt_tasksim.demos_decomp.recognition import recognise
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """What a log decomposes into.
+
+    Attributes:
+        tasks: Tasks of the one demonstration, or the merged ones where there are several.
+        graph: Concept instances and their order, see `demos_decomp.graph`.
+        demonstrations: Tasks of every demonstration by its name.
+        remarks: What was seen and not understood, for people, by demonstration.
+    """
+
+    tasks: tuple[Task, ...]
+    graph: nx.DiGraph[str]
+    demonstrations: Mapping[str, tuple[Task, ...]]
+    remarks: Mapping[str, tuple[str, ...]]
+
+    def to_json(self) -> dict[str, Any]:
+        """``tasks`` and ``graph`` as plain JSON values, and the tasks of each demonstration if several."""
+        merged = len(self.demonstrations) > 1
+        several = {name: [t.to_json() for t in tasks] for name, tasks in self.demonstrations.items()}
+        return {
+            "tasks": [task.to_json() for task in self.tasks],
+            "graph": graph_to_json(self.graph),
+            **({"demonstrations": several} if merged else {}),
+            "remarks": {name: list(said) for name, said in self.remarks.items() if said},
+        }
 
 
 def decompose(demonstration: Demonstration) -> list[Task]:

@@ -15,21 +15,14 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from demos_decomp.log import Utterance
+from bt_tasksim.demos_decomp.concepts import concepts
+from bt_tasksim.demos_decomp.log import Utterance
 
 NAMED = 4.0
 """Odds in favour of a concept that was named while it happened."""
 
 EARSHOT = 0.8
 """Seconds by which people name what they do too early or too late."""
-
-_WORDS = {
-    "grasp": r"grasp|grab|grip|take hold|get hold|seiz",
-    "pick": r"pick|lift|rais|take .* up\b|take .* off\b",
-    "bring": r"bring|carr(?:y|ies)|mov(?:e|ing)|transport|take .* (?:to|over)\b|over to",
-    "place": r"plac|put|set(?:ting)? .* down|stand .* on|\blay",
-    "release": r"releas|let(?:ting)? .*go|\bdrop|throw|open my hand",
-}
 
 
 @dataclass(frozen=True)
@@ -105,4 +98,9 @@ def spoken_odds(narration: Iterable[Utterance], concept: str, start: float, end:
 
 def spoken_concepts(text: str) -> set[str]:
     """Concepts that an English sentence names."""
-    return {concept for concept, words in _WORDS.items() if re.search(words, text.casefold())}
+    said = text.casefold()
+    return {
+        name
+        for name, concept in concepts().items()
+        if concept.presentation.spoken and re.search(concept.presentation.spoken, said)
+    }

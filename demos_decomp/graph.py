@@ -23,8 +23,9 @@ from typing import Any
 import networkx as nx
 import numpy as np
 
-from demos_decomp.merging import GOES_TO, Column, aligned, merged_parameters
-from demos_decomp.tasks import Task, plain
+from bt_tasksim.concept.task import Task, plain
+from bt_tasksim.demos_decomp.concepts import goes_to
+from bt_tasksim.demos_decomp.merging import Column, aligned, merged_parameters
 
 
 def build_graph(
@@ -111,7 +112,7 @@ def _names(columns: Sequence[Column]) -> list[str]:
     first = [next(iter(column.values())) for column in columns]
     short = [f"{task.concept} {task.parameters['target']}" for task in first]
     long = [
-        " ".join([name, *(f"{key} {task.parameters[key]}" for key in GOES_TO if key in task.parameters)])
+        " ".join([name, *(f"{key} {place}" for key, place in goes_to(task).items())])
         for name, task in zip(short, first, strict=True)
     ]
     differ = {name for name, group in _grouped(short, long).items() if len(set(group)) > 1}

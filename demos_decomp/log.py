@@ -14,13 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.world import PlaceModel
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.world import PlaceModel
 
 Floats = NDArray[np.float64]
 
 SOURCES = ("synthetic", "human", "simulation", "robot", "maniskill")
 MOST_SAMPLES = 5_000_000
+LONGEST = 86_400.0
+"""Seconds that a demonstration may last."""
+SLOWEST = 5.0
+"""Seconds from one sample to the next, half of them at most being longer, up to which a log shows motion."""
+FARTHEST = 1_000.0
+"""Metres from the robot's base up to which poses and sizes are believed."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +181,8 @@ def checked(demonstration: Demonstration, where: str) -> Demonstration:
         raise InputError(f"{where} has no objects; a demonstration needs at least one under objects/")
     count = len(time)
     opening = _array(demonstration.hand_opening, (count,), f"{where}/hand/opening")
+    if (np.abs(opening) > FARTHEST).any():
+        raise InputError(f"{where}/hand/opening is more than {FARTHEST:.0f} m; write metres")
     objects = {
         name: Track(
             _poses(track.pose, count, f"{where}/objects/{name}/pose"),
@@ -218,10 +226,10 @@ def checked_log(log: Log, where: str) -> Log:
 
 
 def _array(values: Any, shape: tuple[int, ...], where: str) -> Floats:
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{where} does not hold numbers; write floats") from error
+    array = np.asarray(values)
+    if array.dtype.kind not in "biuf":
+        raise InputError(f"{where} does not hold numbers; write floats")
+    array = array.astype(np.float64, copy=False)
     if array.shape != shape:
         if array.shape[1:] == shape[1:] and array.ndim == len(shape):
             raise InputError(
@@ -252,11 +260,34 @@ def _time(values: Any, where: str) -> Floats:
             f"{where}/time {how} at index {at + 1} ({time[at]:.6g} s, then {time[at + 1]:.6g} s); "
             "sort the samples and drop repeated ones"
         )
+    _check_unit(float(np.median(steps)), float(time[-1] - time[0]), where)
     return time
+
+
+def _check_unit(step: float, duration: float, where: str) -> None:
+    """Check that times are in seconds: what comes later takes memory for each of them."""
+    for most, unit in (
+        (SLOWEST * 1e6, "nanoseconds"),
+        (SLOWEST * 1e3, "microseconds"),
+        (SLOWEST, "milliseconds"),
+    ):
+        if step > most:
+            raise InputError(
+                f"{where}/time has {step:.4g} s from sample to sample, which looks like {unit}; write seconds"
+            )
+    if duration > LONGEST:
+        raise InputError(
+            f"{where}/time lasts {duration:.6g} s, more than {LONGEST:.0f}; split the log, or write seconds"
+        )
 
 
 def _poses(values: Any, count: int, where: str) -> Floats:
     poses = _array(values, (count, 7), where).copy()
+    far = np.flatnonzero((np.abs(poses[:, :3]) > FARTHEST).any(axis=1))
+    if far.size:
+        raise InputError(
+            f"{where} is more than {FARTHEST:.0f} m away at index {far[0]}; write metres in its base"
+        )
     lengths = np.linalg.norm(poses[:, 3:], axis=1)
     wrong = np.flatnonzero(np.abs(lengths - 1) > 0.05)
     if wrong.size:
@@ -269,8 +300,10 @@ def _poses(values: Any, count: int, where: str) -> Floats:
 
 def _size(values: Any, count: int, where: str) -> Floats:
     size = _array(values, (count,), where)
-    if (size <= 0).any():
-        raise InputError(f"{where} is {size.tolist()}; give full extents in metres, all above zero")
+    if (size <= 0).any() or (size > FARTHEST).any():
+        raise InputError(
+            f"{where} is {size.tolist()}; give full extents in metres, all above zero, up to {FARTHEST:.0f}"
+        )
     return size
 
 
@@ -279,6 +312,8 @@ def _surface(surface: Surface, where: str) -> Surface:
     extent = _size(surface.extent, 2, f"{where} attribute extent")
     centre = _array(surface.centre, (2,), f"{where} attribute centre")
     height = float(surface.height)
-    if not 0 <= height < np.inf:
-        raise InputError(f"{where} attribute height is {height}; give metres, not below zero")
+    if not 0 <= height <= FARTHEST:
+        raise InputError(f"{where} attribute height is {height}; give metres, from 0 to {FARTHEST:.0f}")
+    if (np.abs(centre) > FARTHEST).any():
+        raise InputError(f"{where} attribute centre is {centre.tolist()}; give metres")
     return Surface(pose, extent, surface.kind, surface.fixture, centre, height)

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
-from bt_tasksim.errors import InputError, MachineError, nearest
-from bt_tasksim.files import write_bytes
-from demos_decomp.log import MOST_SAMPLES, Demonstration, Log, Surface, Track, Utterance, Video, checked_log
+from bt_tasksim.core import hdf5
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.files import write_bytes
+from bt_tasksim.core.hdf5 import Attribute, Node
+from bt_tasksim.demos_decomp.log import (
+    Demonstration,
+    Log,
+    Surface,
+    Track,
+    Utterance,
+    Video,
+    checked_log,
+)
 
 FORMAT = "bt-tasksim log"
 VERSION = 1
@@ -35,13 +46,13 @@ def read_log(path: str | Path) -> Log:
             faulty; the sentence names the file, the data set and the index.
     """
     path = Path(path)
-    with opened(path) as file:
-        _check_conventions(file, path)
-        if not isinstance(file.get("demonstrations"), h5py.Group):
-            raise InputError(f"'{path}' has no group demonstrations; nothing can be learned from it")
-        names = sorted(file["demonstrations"])
-        read = tuple(_read_demonstration(_group(file["demonstrations"], n, path), n, path) for n in names)
-        log = Log(_text(file, "source"), read, _text(file, "description"), str(path))
+    file = hdf5.read(path)
+    _check_conventions(file, path)
+    shown = file.groups.get("demonstrations")
+    if shown is None:
+        raise InputError(f"'{path}' has no group demonstrations; nothing can be learned from it")
+    read = tuple(_read_demonstration(_group(shown, name, path), name, path) for name in shown.names())
+    log = Log(_text(file, "source"), read, _text(file, "description"), str(path))
     return checked_log(log, f"'{path}'")
 
 
@@ -66,110 +77,86 @@ def write_log(path: str | Path, log: Log) -> None:
     write_bytes(path, buffer.getvalue())
 
 
-@contextlib.contextmanager
-def opened(path: Path) -> Any:
-    """An HDF5 file open for reading; everything that goes wrong inside is one clear sentence.
-
-    Raises:
-        InputError: The file is missing, empty, cut off or no HDF5 file.
-    """
-    if not path.exists():
-        raise InputError(f"there is no file '{path}'; check the path")
-    if path.is_dir():
-        raise InputError(f"'{path}' is a folder; name the log file in it")
-    if path.stat().st_size == 0:
-        raise InputError(f"'{path}' is empty; record or copy it again")
-    if not h5py.is_hdf5(path):
-        raise InputError(f"'{path}' is not an HDF5 file; see docs/demonstrations.md for the log format")
-    try:
-        with h5py.File(path, "r") as file:
-            yield file
-    except (OSError, RuntimeError, KeyError) as error:
-        if isinstance(error, (InputError, MachineError)):
-            raise
-        reason = " ".join(str(error).split())
-        raise InputError(f"'{path}' is cut off or damaged ({reason}); record or copy it again") from error
-
-
-def _check_conventions(file: Any, path: Path) -> None:
+def _check_conventions(file: Node, path: Path) -> None:
     if _text(file, "format") != FORMAT:
-        raise InputError(f"'{path}' has format '{_text(file, 'format')}' instead of '{FORMAT}'")
-    version = file.attrs.get("version")
-    if version != VERSION:
-        raise InputError(f"'{path}' has version {version} of the log format; this program reads {VERSION}")
+        raise InputError(
+            f"'{path}' has format '{_short(file.attributes.get('format'))}' instead of '{FORMAT}'"
+        )
+    version = file.attributes.get("version")
+    if not isinstance(version, np.ndarray) or version.shape or version != VERSION:
+        raise InputError(
+            f"'{path}' has version {_short(version)} of the log format; this program reads {VERSION}"
+        )
     for name, expected in CONVENTIONS.items():
-        if _text(file, name) != expected:
-            raise InputError(f"'{path}' has {name} '{_text(file, name)}' instead of '{expected}'; convert it")
+        found = _short(file.attributes.get(name))
+        if found != expected:
+            raise InputError(f"'{path}' has {name} '{found}' instead of '{expected}'; convert it")
 
 
-def _read_demonstration(group: Any, name: str, path: Path) -> Demonstration:
+def _read_demonstration(group: Node, name: str, path: Path) -> Demonstration:
     where = f"'{path}': demonstrations/{name}"
-    time = _data(group, "time", where)
     objects = {}
-    for key in sorted(group["objects"]) if "objects" in group else ():
-        track = _group(group["objects"], key, path)
+    for key, track in _groups(group, "objects", path):
         at = f"{where}/objects/{key}"
-        objects[key] = Track(
-            _data(track, "pose", at), _attribute(track, "kind", at), _attribute(track, "size", at)
-        )
-    places = {}
-    for key in sorted(group["places"]) if "places" in group else ():
-        place = _group(group["places"], key, path)
-        at = f"{where}/places/{key}"
-        places[key] = Surface(
-            np.asarray(_attribute(place, "pose", at)),
-            np.asarray(_attribute(place, "extent", at)),
-            _attribute(place, "kind", at),
-            place.attrs.get("fixture"),
-            np.asarray(place.attrs.get("centre", (0.0, 0.0))),
-            float(place.attrs.get("height", 0.0)),
-        )
-    seed = group.attrs.get("seed")
+        objects[key] = Track(_data(track, "pose", at), _text(track, "kind", at), _numbers(track, "size", at))
     return Demonstration(
         name=name,
-        time=time,
+        time=_data(group, "time", where),
         hand_pose=_data(group, "hand/pose", where),
         hand_opening=_data(group, "hand/opening", where),
         objects=objects,
-        places=places,
+        places={
+            key: _surface(place, f"{where}/places/{key}") for key, place in _groups(group, "places", path)
+        },
         task=_text(group, "task"),
-        seed=None if seed is None else int(seed),
+        seed=_seed(group, where),
         narration=_narration(group, where),
         video=_video(group, where),
-        extra=_extra(group),
-        notes={k: str(v) for k, v in group.attrs.items() if k not in ("task", "seed")},
+        extra={path: values for path, values in group.walk() if path.split("/")[0] not in _OWN},
+        notes={k: _plain(v) for k, v in group.attributes.items() if k not in ("task", "seed")},
     )
 
 
-def _narration(group: Any, where: str) -> tuple[Utterance, ...]:
-    if "narration" not in group:
+def _surface(place: Node, where: str) -> Surface:
+    return Surface(
+        pose=_numbers(place, "pose", where),
+        extent=_numbers(place, "extent", where),
+        kind=_text(place, "kind", where),
+        fixture=_text(place, "fixture") or None,
+        centre=_numbers(place, "centre", where, (0.0, 0.0)),
+        height=_number(place, "height", where, 0.0),
+    )
+
+
+def _seed(group: Node, where: str) -> int | None:
+    if "seed" not in group.attributes:
+        return None
+    seed = group.attributes["seed"]
+    if not isinstance(seed, np.ndarray) or seed.shape or seed.dtype.kind not in "iu":
+        raise InputError(f"{where} attribute seed is '{_short(seed)}'; write a whole number")
+    return int(seed)
+
+
+def _narration(group: Node, where: str) -> tuple[Utterance, ...]:
+    if "narration" not in group.names():
         return ()
     times, texts = _data(group, "narration/time", where), _data(group, "narration/text", where)
     if times.shape != texts.shape or times.ndim != 1:
         raise InputError(f"{where}/narration has {times.size} times but {texts.size} texts; give one each")
+    if times.dtype.kind not in "iuf" or texts.dtype.kind not in "SO":
+        raise InputError(f"{where}/narration should hold times as numbers and texts as text")
     return tuple(
-        Utterance(float(t), s.decode("utf-8", "replace") if isinstance(s, bytes) else str(s))
-        for t, s in zip(times, texts, strict=True)
+        Utterance(float(t), s.decode("utf-8", "replace"))
+        for t, s in zip(times.tolist(), texts.tolist(), strict=True)
     )
 
 
-def _video(group: Any, where: str) -> Video | None:
-    if "video" not in group:
+def _video(group: Node, where: str) -> Video | None:
+    if "video" not in group.names():
         return None
-    video = group["video"]
+    video = group.groups.get("video", Node())
     at = f"{where}/video"
-    return Video(str(_attribute(video, "path", at)), float(_attribute(video, "fps", at)))
-
-
-def _extra(group: Any) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-
-    def keep(name: str, item: Any) -> None:
-        if name.split("/")[0] not in _OWN and isinstance(item, h5py.Dataset):
-            found[name] = item[()]
-
-    group.visititems(keep)
-    return found
+    return Video(_text(video, "path", at), _number(video, "fps", at))
 
 
 def _write_demonstration(group: Any, demonstration: Demonstration) -> None:
@@ -196,38 +183,75 @@ def _write_demonstration(group: Any, demonstration: Demonstration) -> None:
         _put(group, name, values)
 
 
-def _put(group: Any, name: str, values: Any) -> None:
+def _put(group: h5py.Group, name: str, values: NDArray[Any]) -> None:
     packed = {"compression": "gzip", "shuffle": True} if np.ndim(values) and np.size(values) > 64 else {}
+    if np.asarray(values).dtype == object:
+        packed["dtype"] = h5py.string_dtype()
     group.create_dataset(name, data=values, **packed)
 
 
-def _group(parent: Any, name: str, path: Path) -> Any:
-    if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
-        raise InputError(f"'{path}': {parent.name}/{name} points outside itself; copy the data into the file")
-    item = parent[name]
-    if not isinstance(item, h5py.Group):
-        raise InputError(f"'{path}': {parent.name}/{name} is not a group; see docs/demonstrations.md")
-    return item
+# ---- what a node should hold ------------------------------------------------------------------------------
 
 
-def _data(group: Any, name: str, where: str) -> Any:
-    item = group.get(name)
-    if not isinstance(item, h5py.Dataset):
-        raise InputError(f"{where}/{name} is missing{nearest(name.split('/')[0], group)}")
-    outside = item.is_virtual or item.external
-    if outside or not isinstance(group.get(name, getlink=True), h5py.HardLink):
-        raise InputError(f"{where}/{name} points outside itself; copy the data into the file")
-    if item.size is None or item.size > 16 * MOST_SAMPLES:
-        raise InputError(f"{where}/{name} holds {item.size} numbers; split the log")
-    return item[()]
+def _groups(parent: Node, name: str, path: Path) -> Iterator[tuple[str, Node]]:
+    """Groups in a group of groups, with their names; none where that is absent."""
+    if name in parent.names():
+        above = _group(parent, name, path)
+        yield from ((key, _group(above, key, path)) for key in above.names())
 
 
-def _attribute(group: Any, name: str, where: str) -> Any:
-    if name not in group.attrs:
-        raise InputError(f"{where} has no attribute {name}{nearest(name, group.attrs)}")
-    return group.attrs[name]
+def _group(parent: Node, name: str, path: Path) -> Node:
+    found = parent.groups.get(name)
+    if found is None:
+        raise InputError(f"'{path}': {parent.path}/{name} is not a group; see docs/demonstrations.md")
+    return found
 
 
-def _text(group: Any, name: str) -> str:
-    value = group.attrs.get(name, "")
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+def _data(group: Node, name: str, where: str) -> NDArray[Any]:
+    found = group.dataset(name)
+    if found is None:
+        raise InputError(f"{where}/{name} is missing{nearest(name.split('/')[0], group.names())}")
+    return found
+
+
+def _attribute(group: Node, name: str, where: str) -> Attribute:
+    if name not in group.attributes:
+        raise InputError(f"{where} has no attribute {name}{nearest(name, group.attributes)}")
+    return group.attributes[name]
+
+
+def _numbers(
+    group: Node, name: str, where: str, default: tuple[float, ...] | None = None
+) -> NDArray[np.float64]:
+    if default is not None and name not in group.attributes:
+        return np.array(default)
+    value = _attribute(group, name, where)
+    if not isinstance(value, np.ndarray):
+        raise InputError(f"{where} attribute {name} is '{_short(value)}'; write numbers")
+    return value.astype(np.float64)
+
+
+def _number(group: Node, name: str, where: str, default: float | None = None) -> float:
+    values = _numbers(group, name, where, None if default is None else (default,))
+    if values.size != 1:
+        raise InputError(f"{where} attribute {name} holds {values.size} numbers; write one")
+    return float(values.item())
+
+
+def _text(group: Node, name: str, where: str | None = None) -> str:
+    """An attribute as text; without ``where``, empty where it is absent."""
+    value = group.attributes.get(name, "") if where is None else _attribute(group, name, where)
+    return _plain(value)
+
+
+def _plain(value: Attribute) -> str:
+    """An attribute in words; numbers as they are written."""
+    if isinstance(value, str):
+        return value
+    return str(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+def _short(value: Attribute | None) -> str:
+    """An attribute for a message."""
+    text = "".join(c if c.isprintable() else "?" for c in _plain("" if value is None else value))
+    return text if len(text) <= 60 else f"{text[:57]}..."

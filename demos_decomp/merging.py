@@ -12,12 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from demos_decomp.log import Floats
-from demos_decomp.parameters import PATH_POINTS, simplified_path, unit
-from demos_decomp.tasks import Task
-
-GOES_TO = ("to", "on", "into")
-"""Parameters in which two tasks of one concept must agree to be the same task."""
+from bt_tasksim.concept.task import Task
+from bt_tasksim.demos_decomp.concepts import goes_to, quantity_of
+from bt_tasksim.demos_decomp.log import Floats
+from bt_tasksim.demos_decomp.parameters import PATH_POINTS, simplified_path, unit
 
 Column = dict[str, Task]
 """One task as it was seen in the demonstrations that have it, by their names."""
@@ -46,7 +44,7 @@ def aligned(demonstrations: Mapping[str, Sequence[Task]]) -> list[Column]:
 
 def identity(task: Task) -> Hashable:
     """What two tasks must have in common to be the same one."""
-    return (task.concept, task.parameters["target"], *(task.parameters.get(name) for name in GOES_TO))
+    return (task.concept, task.parameters["target"], *goes_to(task).items())
 
 
 def _aligned_chains(chains: Mapping[str, Sequence[Task]]) -> list[Column]:
@@ -106,22 +104,23 @@ def merged_parameters(tasks: Sequence[Task]) -> tuple[dict[str, Any], dict[str, 
     spread: dict[str, Any] = {}
     for name in dict.fromkeys(name for task in tasks for name in task.parameters):
         seen = [task.parameters[name] for task in tasks if name in task.parameters]
+        quantity = quantity_of(tasks[0].concept, name)
         if isinstance(seen[0], str):
             count = Counter(seen)
             values[name] = count.most_common(1)[0][0]
             if len(count) > 1:
                 spread[name] = {key: number / len(seen) for key, number in count.items()}
-        elif name == "via":
-            values[name], deviation = _merged_via(tasks)
+        elif quantity is not None and quantity.kind == "points":
+            values[name], deviation = _merged_points(name, tasks)
             if len(tasks) > 1:
                 spread[name] = deviation
         else:
             stack = np.array(seen, dtype=float)
-            if name == "closing":
+            if quantity is not None and quantity.two_sided:
                 values[name], stack = _mean_axis(stack)
             else:
                 mean = stack.mean(axis=0)
-                values[name] = unit(mean) if name in ("approach", "direction") else mean
+                values[name] = unit(mean) if quantity is not None and quantity.unit_vector else mean
             if len(seen) > 1:
                 spread[name] = stack.std(axis=0, ddof=1)
     return values, spread
@@ -134,11 +133,11 @@ def _mean_axis(axes: Floats) -> tuple[Floats, Floats]:
     return first, axes * np.where(axes @ first < 0, -1.0, 1.0)[:, None]
 
 
-def _merged_via(tasks: Sequence[Task]) -> tuple[list[Floats], list[Floats]]:
-    """Via-points and their standard deviations ``(3,)``, from paths of which the most typical one leads."""
+def _merged_points(name: str, tasks: Sequence[Task]) -> tuple[list[Floats], list[Floats]]:
+    """Points on a way and their standard deviations ``(3,)``; the most typical of the paths leads."""
     paths = [task.path for task in tasks if task.path is not None]
     if len(paths) < 2:
-        return list(tasks[0].parameters.get("via", [])), []
+        return list(tasks[0].parameters.get(name, [])), []
     matches = [[_correspondence(a, b) for b in paths] for a in paths]
     misfit = [
         sum(float(np.linalg.norm(a - b[m], axis=1).mean()) for b, m in zip(paths, row, strict=True))

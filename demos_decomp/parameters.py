@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim import poses
-from demos_decomp.log import Floats
-from demos_decomp.segmentation import Hold
-from demos_decomp.signals import RATE, Motion, simplified
-from demos_decomp.support import Support
+from bt_tasksim.core import poses
+from bt_tasksim.demos_decomp.log import Floats
+from bt_tasksim.demos_decomp.segmentation import Hold
+from bt_tasksim.demos_decomp.signals import RATE, Motion, simplified
+from bt_tasksim.demos_decomp.support import Support
 
 VIA_TOLERANCE = 0.02
 """Metres by which the polyline through the via-points may leave the path that was shown."""

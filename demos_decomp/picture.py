@@ -10,18 +10,12 @@ from typing import Any
 import networkx as nx
 import numpy as np
 
-from bt_tasksim.files import write_text
-from demos_decomp.graph import in_order
-from demos_decomp.tasks import plain
+from bt_tasksim.concept.presentation import GREY
+from bt_tasksim.concept.task import plain
+from bt_tasksim.core.files import write_text
+from bt_tasksim.demos_decomp.concepts import concept_of, quantity_of
+from bt_tasksim.demos_decomp.graph import in_order
 
-COLOURS = {
-    "grasp": "#3b6fb6",
-    "pick": "#2f8f6b",
-    "bring": "#b07d22",
-    "place": "#8a56a8",
-    "release": "#c0504d",
-}
-OTHER = "#5f6b78"
 INK, FAINT, LINE = "#1d232b", "#5b6672", "#cfd6dd"
 
 CARD, GAP_X, GAP_Y, ROW = 330, 36, 34, 17
@@ -135,7 +129,7 @@ def _lanes(graph: nx.DiGraph[str], parts: list[str], y: float, width: float) -> 
         for start, end, concept in sorted(lanes[name]):
             span = max((end - start) * scale, 1.5)
             x = left + start * scale
-            colour = COLOURS.get(concept, OTHER)
+            colour = _colour(concept)
             parts.append(_box(x, at + 3, span - 1, LANE - 6, colour, radius=2, stroke=None))
             if span > len(concept) * _LETTER[11] + 6:
                 parts.append(_text(x + span / 2, at + 15, concept, 11, "#ffffff", anchor="middle"))
@@ -156,8 +150,8 @@ def _lane_label(name: str) -> str:
 def _card(graph: nx.DiGraph[str], name: str, parts: list[str], x: float, y: float) -> float:
     """Draws one task; returns the card's height."""
     node = graph.nodes[name]
-    colour = COLOURS.get(node["concept"], OTHER)
-    lines = _parameter_lines(node["parameters"], node["uncertainty"])
+    colour = _colour(node["concept"])
+    lines = _parameter_lines(node["concept"], node["parameters"], node["uncertainty"])
     height = 62 + ROW * len(lines)
     parts.append(_box(x, y, CARD, height, "#fbfcfd"))
     parts.append(_box(x, y, 6, height, colour, radius=2, stroke=None))
@@ -178,23 +172,31 @@ def _card(graph: nx.DiGraph[str], name: str, parts: list[str], x: float, y: floa
     return height
 
 
-def _parameter_lines(parameters: Mapping[str, Any], uncertainty: Mapping[str, Any]) -> list[str]:
+def _colour(concept: str) -> str:
+    known = concept_of(concept)
+    return GREY if known is None else known.presentation.colour
+
+
+def _parameter_lines(
+    concept: str, parameters: Mapping[str, Any], uncertainty: Mapping[str, Any]
+) -> list[str]:
     lines = []
     for name, value in parameters.items():
         if name == "target":
             continue
+        quantity = quantity_of(concept, name)
+        unit = "" if quantity is None or quantity.unit == "1" else quantity.unit
         spread = plain(uncertainty.get(name))
         value = plain(value)
-        if name == "via":
-            lines.append(f"via: {'straight' if not value else ''}".rstrip())
+        if quantity is not None and quantity.kind == "points":
+            lines.append(f"{name}: {'straight' if not value else ''}".rstrip())
             for i, point in enumerate(value):
                 around = spread[i] if isinstance(spread, list) and i < len(spread) else None
-                lines.append(f"   {_number(point, around, 'm')}")
+                lines.append(f"   {_number(point, around, unit)}")
         elif isinstance(value, str):
             often = f" ({spread[value]:.0%})" if isinstance(spread, Mapping) and value in spread else ""
             lines.append(f"{name}: {value}{often}")
         else:
-            unit = "m" if name in ("distance", "position") else ""
             lines.append(f"{name}: {_number(value, spread, unit)}")
     return lines
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from concept_nodes.taxonomy import Change, ContactState, tasks_between
-from demos_decomp.evidence import Check, confidence, spoken_odds
-from demos_decomp.log import Demonstration, Floats
-from demos_decomp.parameters import bring_parameters, grasp_parameters, straight_parameters
-from demos_decomp.segmentation import DROP, Flight, Hold, find_flights, find_holds
-from demos_decomp.signals import Motion, evenly_sampled
-from demos_decomp.support import Support, bin_under, resting_on
-from demos_decomp.tasks import Task
+from bt_tasksim.concept.task import Task
+from bt_tasksim.demos_decomp.concepts import CARRIES, GRASPS, LANDS, LIFTS, RELEASES, concepts, name_of
+from bt_tasksim.demos_decomp.evidence import Check, confidence, spoken_odds
+from bt_tasksim.demos_decomp.log import Demonstration, Floats
+from bt_tasksim.demos_decomp.parameters import bring_parameters, grasp_parameters, straight_parameters
+from bt_tasksim.demos_decomp.segmentation import DROP, Flight, Hold, find_flights, find_holds
+from bt_tasksim.demos_decomp.signals import Motion, evenly_sampled
+from bt_tasksim.demos_decomp.support import Support, bin_under, resting_on
 
 SIDEWAYS = 0.015
 """Metres sideways from the detaching direction after which motion in the air is bring and no longer pick."""
@@ -26,16 +26,6 @@ CLEARANCE = 0.03
 
 LONGEST_GAP = 0.6
 """Seconds without data in which a whole task could pass unseen."""
-
-PICK, PLACE, BRING = (
-    tasks_between(before, after)[0]
-    for before, after in (
-        (ContactState.PC, ContactState.NC),
-        (ContactState.NC, ContactState.PC),
-        (ContactState.NC, ContactState.NC),
-    )
-)
-assert (PICK.change, PLACE.change, BRING.change) == (Change.BREAKS, Change.MAKES, Change.KEEPS)
 
 
 def recognise(shown: Demonstration) -> tuple[list[Task], list[str]]:
@@ -64,13 +54,15 @@ def recognise(shown: Demonstration) -> tuple[list[Task], list[str]]:
         if hold.opening is not None:
             tasks.append(_release(shown, motion, hold, flights, since))
             free = hold.opening.last
+    for concept in concepts().values():
+        tasks = list(concept.recognise(shown, tasks))
     return tasks, remarks
 
 
 def _grasp(shown: Demonstration, motion: Motion, hold: Hold, since: int) -> Task:
     checks = list(hold.checks)
     parameters = grasp_parameters(motion, hold)
-    return _task(motion, "grasp", since, hold.first, checks, parameters)
+    return _task(motion, name_of(GRASPS), since, hold.first, checks, parameters)
 
 
 def _release(shown: Demonstration, motion: Motion, hold: Hold, flights: list[Flight], since: int) -> Task:
@@ -82,7 +74,7 @@ def _release(shown: Demonstration, motion: Motion, hold: Hold, flights: list[Fli
     if inside is not None:
         parameters["into"] = inside.name
     spread = 0.002 + motion.opening_noise
-    said = spoken_odds(shown.narration, "release", motion.time[since], motion.time[end])
+    said = spoken_odds(shown.narration, name_of(RELEASES), motion.time[since], motion.time[end])
     checks = [Check("hand opens, m", hold.opening.change, 0.006, spread, odds=said)]
     landed = flights[-1].landed if flights else None
     falls = landed is not None and not landed
@@ -94,7 +86,7 @@ def _release(shown: Demonstration, motion: Motion, hold: Hold, flights: list[Fli
         checks.append(
             Check(f"{name} stays as the hand leaves, m", float(stays), float(leaves), 0.01, below=True)
         )
-    return _task(motion, "release", since, end, checks, parameters)
+    return _task(motion, name_of(RELEASES), since, end, checks, parameters)
 
 
 def _flight_tasks(shown: Demonstration, motion: Motion, hold: Hold, flight: Flight, since: int) -> list[Task]:
@@ -112,14 +104,21 @@ def _flight_tasks(shown: Demonstration, motion: Motion, hold: Hold, flight: Flig
         if off is not None:
             parameters["off"] = off.name
         tasks.append(
-            _task(motion, PICK.name, since, flight.first + up, [*_gap_check(off), flight.lifted], parameters)
+            _task(
+                motion,
+                name_of(LIFTS),
+                since,
+                flight.first + up,
+                [*_gap_check(off), flight.lifted],
+                parameters,
+            )
         )
         since = flight.first + up
     target = _destination(shown, motion, hold, flight, lands)
     if carried:
         until = flight.first + down
         moved, way = bring_parameters(path[up : down + 1], target)
-        tasks.append(_task(motion, BRING.name, since, until, [carried], {"target": name, **moved}, way))
+        tasks.append(_task(motion, name_of(CARRIES), since, until, [carried], {"target": name, **moved}, way))
         since = until
     if lands and flight.landed is not None:
         parameters = {"target": name, **straight_parameters(path[down], flight.rest_after)}
@@ -128,7 +127,7 @@ def _flight_tasks(shown: Demonstration, motion: Motion, hold: Hold, flight: Flig
         else:
             parameters["position"] = flight.rest_after
         checks = [*_gap_check(target), flight.landed]
-        tasks.append(_task(motion, PLACE.name, since, flight.last, checks, parameters))
+        tasks.append(_task(motion, name_of(LANDS), since, flight.last, checks, parameters))
     return tasks
 
 
@@ -154,7 +153,7 @@ def _phases(
             up = down = max(1, (up + down) // 2)
     down = max(down, up)
     start, stop = motion.time[flight.first + up], motion.time[flight.first + down]
-    said = spoken_odds(shown.narration, "bring", start, stop) if stop > start else 1.0
+    said = spoken_odds(shown.narration, name_of(CARRIES), start, stop) if stop > start else 1.0
     travel = _length(path[up : down + 1]) if stop > start else 0.0
     if lands or flight.lifted is None:
         what, value, limit = "carried, m", travel, SIDEWAYS

@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bt_tasksim import poses
-from demos_decomp.evidence import NAMED, Check, spoken_odds
-from demos_decomp.log import Demonstration, Floats
-from demos_decomp.signals import RATE, Motion, Swing, speed, swings
-from demos_decomp.support import bin_under, half_height, resting_on
+from bt_tasksim.core import poses
+from bt_tasksim.demos_decomp.concepts import GRASPS, LANDS, LIFTS, RELEASES, name_of
+from bt_tasksim.demos_decomp.evidence import NAMED, Check, spoken_odds
+from bt_tasksim.demos_decomp.log import Demonstration, Floats
+from bt_tasksim.demos_decomp.signals import RATE, Motion, Swing, speed, swings
+from bt_tasksim.demos_decomp.support import bin_under, half_height, resting_on
 
 LEAST_SWING = 0.006
 """Smallest change of the hand's opening, metres, that counts as closing or opening."""
@@ -140,7 +141,7 @@ def find_flights(shown: Demonstration, motion: Motion, hold: Hold) -> tuple[list
         final = pause[0] == hold.last
         rest = after if final else np.median(track[pause[0] : pause[1] + 1, :3], axis=0)
         height = np.abs(piece[:, 2] - stood[2])
-        odds = spoken_odds(shown.narration, "pick", motion.time[start], motion.time[pause[0]])
+        odds = spoken_odds(shown.narration, name_of(LIFTS), motion.time[start], motion.time[pause[0]])
         lifted: Check | None = Check(f"{name} lifted, m", float(height.max()), LIFT, 0.002 + noise, odds=odds)
         broken = start
         if starts_in_air and not flights:
@@ -195,7 +196,7 @@ def _held(
         slip = float(np.linalg.norm(grip - np.median(grip, axis=0), axis=1).max())
         distance = float(np.linalg.norm(np.maximum(np.abs(grip[0]) - shown.objects[name].size / 2, 0)))
         noise = motion.noise[name]
-        odds = spoken_odds(shown.narration, "grasp", motion.time[first] - 1, motion.time[first])
+        odds = spoken_odds(shown.narration, name_of(GRASPS), motion.time[first] - 1, motion.time[first])
         checks = [
             Check(f"{name} follows the hand, m", travel, 0.007 + 3 * noise, 0.002 + noise, odds=odds),
             Check(
@@ -292,8 +293,9 @@ def _landing(shown: Demonstration, motion: Motion, hold: Hold, after: Floats) ->
     if len(track) - 1 - released < 0.1 * RATE:  # the log ends here: only what is below can tell
         support = resting_on(shown, motion, hold.target, released)
         drop = abs(support.gap) if support else 2 * DROP
-    odds = spoken_odds(shown.narration, "place", motion.time[hold.last] - 0.5, motion.time[hold.last])
-    if spoken_odds(shown.narration, "release", motion.time[hold.last], motion.time[hold.last]) == NAMED:
+    last = motion.time[hold.last]
+    odds = spoken_odds(shown.narration, name_of(LANDS), last - 0.5, last)
+    if spoken_odds(shown.narration, name_of(RELEASES), last, last) == NAMED:
         odds = 1.0
     if bin_under(shown, motion, hold.target, released) is None:
         odds = max(odds, PLACED)

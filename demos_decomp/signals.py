@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bt_tasksim import poses
-from demos_decomp.log import Demonstration, Floats
+from bt_tasksim.core import poses
+from bt_tasksim.demos_decomp.log import Demonstration, Floats
 
 RATE = 50.0
 """Samples per second to which every demonstration is brought."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bt_tasksim import poses
-from demos_decomp.log import Demonstration, Floats, Surface
-from demos_decomp.signals import Motion
+from bt_tasksim.core import poses
+from bt_tasksim.demos_decomp.log import Demonstration, Floats, Surface
+from bt_tasksim.demos_decomp.signals import Motion
 
 REACH = 0.03
 """Metres by which tracking and calibration may misjudge the height of a surface under a resting object."""

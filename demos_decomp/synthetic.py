@@ -15,27 +15,22 @@ from pathlib import Path
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.errors import BtTasksimError, InputError, nearest
-from demos_decomp.log import Demonstration, Floats, Log, Track, Utterance
-from demos_decomp.log_file import write_log
-from demos_decomp.synthetic_motion import Sensing, kept_samples, noisy_poses, tremor
-from demos_decomp.synthetic_scenes import SCRIPTS, Performance
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import BtTasksimError, InputError, nearest
+from bt_tasksim.demos_decomp.concepts import concepts
+from bt_tasksim.demos_decomp.log import Demonstration, Floats, Log, Track, Utterance
+from bt_tasksim.demos_decomp.log_file import write_log
+from bt_tasksim.demos_decomp.synthetic_motion import Sensing, kept_samples, noisy_poses, tremor
+from bt_tasksim.demos_decomp.synthetic_scenes import SCRIPTS, Performance
 
 SHIPPED = 10
 
-SAYINGS = {
-    "grasp": ("I grasp the {}", "now I grab the {}", "take hold of the {}"),
-    "pick": ("I lift the {}", "pick it up", "raise the {} a bit"),
-    "bring": ("I carry the {} over", "bring it to the {}", "now I move it to the {}"),
-    "place": ("put it down on the {}", "I place it on the {}", "set it down gently"),
-    "release": ("and let go", "release the {}", "I let it go"),
-    "": ("like this", "let's see", "okay", "this is easy"),
-}
+CHATTER = ("like this", "let's see", "okay", "this is easy")
+"""What people say besides."""
 
 
 @dataclass(frozen=True)
-class Label:
+class TaskLabel:
     """What the script did: a concept, and its first and last second."""
 
     concept: str
@@ -45,7 +40,7 @@ class Label:
 
 def make(
     scenario: str, seed: int, sensing: Sensing | None = None, name: str = "000", talk: bool | None = None
-) -> tuple[Demonstration, list[Label]]:
+) -> tuple[Demonstration, list[TaskLabel]]:
     """Makes a demonstration.
 
     Args:
@@ -80,7 +75,7 @@ def make(
         objects[key] = Track(seen, thing.kind, thing.size)
     width = np.maximum(opening[at] + rng.normal(0, sensing.opening, len(at)), 0.0)
     says = rng.random() < 0.7 if talk is None else talk
-    labels = [Label(*label) for label in shown.labels]
+    labels = [TaskLabel(*label) for label in shown.labels]
     demonstration = Demonstration(
         name=name,
         time=ticks,
@@ -118,22 +113,24 @@ def _object_track(time: Floats, hand: Floats, shown: Performance) -> Floats:
 
 
 def _narration(
-    labels: Sequence[Label], shown: Performance, rng: np.random.Generator
+    labels: Sequence[TaskLabel], shown: Performance, rng: np.random.Generator
 ) -> tuple[Utterance, ...]:
     said = []
+    known = concepts()
     for label in labels:
         if rng.random() < 0.75:
-            word = shown.destination if label.concept in ("bring", "place") else shown.target
-            text = str(rng.choice(SAYINGS[label.concept])).format(word.replace("_", " "))
+            presentation = known[label.concept].presentation
+            word = shown.destination if presentation.says_destination else shown.target
+            text = str(rng.choice(presentation.sayings)).format(word.replace("_", " "))
             when = rng.uniform(label.start - 0.3, max(label.start, label.end - 0.2))
             said.append(Utterance(round(float(max(when, 0.0)), 2), text))
     if rng.random() < 0.5:
         when = float(rng.uniform(0.2, labels[-1].end))
-        said.append(Utterance(round(when, 2), str(rng.choice(SAYINGS[""]))))
+        said.append(Utterance(round(when, 2), str(rng.choice(CHATTER))))
     return tuple(sorted(said, key=lambda utterance: utterance.time))
 
 
-def shipped(scenario: str) -> list[tuple[Demonstration, list[Label]]]:
+def shipped(scenario: str) -> list[tuple[Demonstration, list[TaskLabel]]]:
     """The demonstrations that are shipped, one to a file."""
     return [make(scenario, 1000 + number) for number in range(SHIPPED)]
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bt_tasksim import poses
-from demos_decomp.log import Floats
+from bt_tasksim.core import poses
+from bt_tasksim.demos_decomp.log import Floats
 
 FINE_RATE = 240.0
 """Samples per second at which motion is computed before sensors sample it."""
@@ -75,12 +75,12 @@ class Hand:
         pose: ``(7,)`` where the hand is or will be after the strokes planned so far.
         opening: The same of its opening, metres.
         clock: Second at which the next stroke may begin.
-        pace: Factor on all durations; 1 is a calm person.
+        time_scaling: Factor on all durations; 1 is a calm person.
     """
 
     pose: Floats
     opening: float
-    pace: float
+    time_scaling: float
     clock: float = 0.3
     strokes: list[Stroke] = field(default_factory=list)
     start_pose: Floats = field(init=False)
@@ -99,7 +99,7 @@ class Hand:
         """
         distance = float(np.linalg.norm(pose[:3] - self.pose[:3]))
         turn = float(poses.angle_between(self.pose[3:], pose[3:]))
-        duration = self.pace * hurry * (0.45 + 1.6 * distance + 0.2 * turn)
+        duration = self.time_scaling * hurry * (0.45 + 1.6 * distance + 0.2 * turn)
         moves = any(stroke.pose is not None for stroke in self.strokes)
         start = self.clock - (overlap * duration if moves else 0.0)
         self.strokes.append(Stroke(start, duration, pose=pose))

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.fixtures import load_fixture
-from demos_decomp.log import Floats, Surface, surface_of
-from demos_decomp.synthetic_motion import Hand
+from bt_tasksim.core import poses
+from bt_tasksim.demos_decomp.log import Floats, Surface, surface_of
+from bt_tasksim.demos_decomp.synthetic_motion import Hand
+from bt_tasksim.scene.fixtures import load_fixture
 
 DOWN = np.array([0.0, 0, -1])
 CUP = np.array([0.07, 0.07, 0.10])
@@ -152,7 +152,7 @@ def _perform(
     home = np.array([rng.uniform(0.25, 0.35), rng.uniform(-0.1, 0.2), rng.uniform(0.25, 0.4), 0, 0, 0, 0])
     at_target = poses.multiply(thing.pose, grip)
     home[3:] = poses.quat_multiply(at_target[3:], poses.from_rotation_vector(rng.normal(0, 0.25, 3)))
-    hand = Hand(home, relaxed, pace=float(rng.uniform(0.75, 1.4)))
+    hand = Hand(home, relaxed, time_scaling=float(rng.uniform(0.75, 1.4)))
 
     back = poses.rotate(at_target[3:], np.array([0.0, 0, -rng.uniform(0.07, 0.12)]))
     reach = hand.clock

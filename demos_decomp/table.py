@@ -2,29 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
-
-from demos_decomp.tasks import Task
-
-_WAYS = {
-    "up": (0, 0, 1),
-    "down": (0, 0, -1),
-    "forward": (1, 0, 0),
-    "back": (-1, 0, 0),
-    "left": (0, 1, 0),
-    "right": (0, -1, 0),
-}
-_FROM = {
-    "up": "below",
-    "down": "above",
-    "forward": "the front",
-    "back": "behind",
-    "left": "the right",
-    "right": "the left",
-}
+from bt_tasksim.concept.demonstrated import plain_words
+from bt_tasksim.concept.task import Task
+from bt_tasksim.demos_decomp.concepts import concept_of
 
 
 def text_table(tasks: Iterable[Task]) -> str:
@@ -55,32 +38,7 @@ def text_table(tasks: Iterable[Task]) -> str:
     )
 
 
-def described(concept: str, parameters: Any) -> str:
+def described(concept: str, parameters: Mapping[str, Any]) -> str:
     """What a task does, in words with numbers and units, without its concept and target."""
-    parts: list[str] = []
-    if "approach" in parameters:
-        parts.append(f"from {_FROM[nearest_way(parameters['approach'])]}")
-    if "distance" in parameters and concept != "place":
-        parts.append(f"{nearest_way(parameters['direction'])} {float(parameters['distance']):.2f} m")
-    if "off" in parameters:
-        parts.append(f"off {parameters['off']}")
-    if "on" in parameters:
-        parts.append(f"onto {parameters['on']}")
-    if "to" in parameters:
-        parts.append(f"to {parameters['to']}")
-    if "position" in parameters:
-        parts.append("to ({:.2f}, {:.2f}, {:.2f}) m".format(*(np.round(parameters["position"], 2) + 0.0)))
-    if "into" in parameters:
-        parts.append(f"into {parameters['into']}")
-    if "via" in parameters:
-        count = len(parameters["via"])
-        parts.append(f"{count} via-point{'' if count == 1 else 's'}" if count else "straight")
-    if concept == "place" and "distance" in parameters:
-        parts.append(f"{nearest_way(parameters['direction'])} {float(parameters['distance']):.2f} m")
-    return ", ".join(parts)
-
-
-def nearest_way(direction: Any) -> str:
-    """The word for the axis of the robot base frame that a direction ``(3,)`` is nearest to."""
-    vector = np.asarray(direction, dtype=float)
-    return max(_WAYS, key=lambda name: float(vector @ np.array(_WAYS[name])))
+    known = concept_of(concept)
+    return plain_words(parameters, {}) if known is None else known.describe_task(parameters)

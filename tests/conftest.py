@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import signal
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,13 +15,29 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim import poses
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Seen
-from bt_tasksim.robot import load_robot
-from bt_tasksim.runner import Runner
-from bt_tasksim.scene import Goal, ObjectSpec, Scene, SpotSpec
-from bt_tasksim.world import Command, Hidden, Observation
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core import poses
+from bt_tasksim.core.world import Command, Hidden, Observation
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import Goal, ObjectSpec, SpotSpec
+
+sys.path.insert(0, str(Path(__file__).parent / "perturbation"))
+import perturbation
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Perturbations of physics (see `perturbation`)."""
+    group = parser.getgroup("perturbations")
+    group.addoption("--nudge", type=float, default=0.0, metavar="RAD", help="add RAD to all drive targets")
+    group.addoption("--shift-seeds", type=int, default=0, metavar="N", help="draw worlds with seed + N")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Perturb physics here, and in all processes that tests start."""
+    perturbation.install(config.getoption("--nudge"), config.getoption("--shift-seeds"), os.environ)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -91,7 +110,7 @@ class ToyWorld:
         objects[self.model.object_index(name), :3] = self.now.tool_pose[:3]
         self.put(objects=objects, contacts=np.ones(len(self.robot.tips), bool), closure=np.float64(0.5))
 
-    def step(self, command: Command, *, look: bool = False) -> Observation:
+    def step(self, command: Command) -> Observation:
         self.steps.append(command)
         before = self.now
         closure = before.closure if command.hand is None else np.float64(command.hand[0])
@@ -186,7 +205,7 @@ def act() -> type[Act]:
 def recorded_run():
     """Every decision of every concept in a real run: ``recorded_run(scenario, seed)``."""
     from bt_tasksim.checking.recording import record
-    from trees.load import load_source
+    from bt_tasksim.trees.load import load_source
 
     kept: dict[tuple[str, int], list[Any]] = {}
 

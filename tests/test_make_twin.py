@@ -12,8 +12,8 @@ sys.path.insert(0, str(PROJECT / "tools"))
 import make_twin  # noqa: E402
 from private_apt import UnavailableError  # noqa: E402
 
-from bt_tasksim.errors import MachineError  # noqa: E402
-from bt_tasksim.twin import environment  # noqa: E402
+from bt_tasksim.core.errors import MachineError  # noqa: E402
+from bt_tasksim.hardware.twin import environment  # noqa: E402
 
 VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
 LIBRARY = f"libpython{VERSION}.so.1.0"

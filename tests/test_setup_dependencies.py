@@ -33,11 +33,13 @@ def imported(tree: ast.AST) -> set[str]:
             names |= {alias.name.partition(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             names.add(node.module.partition(".")[0])
-    return names - set(sys.stdlib_module_names) - set(PACKAGES)
+    return (
+        names - set(sys.stdlib_module_names) - set(PACKAGES) - {"_typeshed"}
+    )  # known to type checkers alone
 
 
-BROUGHT = {"pinocchio": {"pin"}, "eigenpy": {"pin"}}
-"""Modules that a distribution brings from a place of its own, where its metadata does not name them."""
+BROUGHT = {"pinocchio": {"pin"}, "eigenpy": {"pin"}, "pydantic_core": {"pydantic"}}
+"""Modules that a distribution brings from a place of its own, or from one that it pins itself."""
 
 
 TWIN = declared(
@@ -50,10 +52,13 @@ TWIN = declared(
 """Packages of the twin's own environment, where only its node runs."""
 
 
+INSTALLED = packages_distributions()
+
+
 def distributions(module: str) -> set[str]:
     if module in BROUGHT:
         return BROUGHT[module]
-    return {normalised(name) for name in packages_distributions().get(module, [module])}
+    return {normalised(name) for name in INSTALLED.get(module, [module])}
 
 
 @pytest.mark.parametrize("package", PACKAGES)

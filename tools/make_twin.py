@@ -11,6 +11,7 @@ environment, and nothing on the machine changes. Only the standard library is ne
 from __future__ import annotations
 
 import os
+import platform
 import shutil
 import stat
 import subprocess
@@ -24,8 +25,8 @@ from private_apt import Apt, UnavailableError, own_sources, release
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-from bt_tasksim.errors import MachineError  # noqa: E402
-from bt_tasksim.twin.environment import python_library  # noqa: E402
+from bt_tasksim.core.errors import MachineError  # noqa: E402
+from bt_tasksim.hardware.twin.environment import python_library  # noqa: E402
 
 
 def put_right(folder: Path) -> None:
@@ -91,6 +92,14 @@ def provide_library(folder: Path) -> None:
         raise UnavailableError(f"{error}; package {package} does not hold it") from None
 
 
+def packages() -> list[str]:
+    """What pip is told to install: by hashes where they are known for this kind of machine."""
+    if sys.version_info[:2] == (3, 11) and (sys.platform, platform.machine()) == ("linux", "x86_64"):
+        return ["--require-hashes", "--no-deps", "-r", str(HERE / "twin_packages.lock.txt")]
+    print("No hashes are known for this Python or machine: packages are taken by version.", file=sys.stderr)
+    return ["-c", str(HERE.parent / "constraints.txt"), "-r", str(HERE / "twin_packages.txt")]
+
+
 def main(arguments: list[str]) -> int:
     """Make the environment named by the only argument. Returns the exit status."""
     folder = Path(arguments[0])
@@ -99,10 +108,7 @@ def main(arguments: list[str]) -> int:
         return status
     pip = [str(folder / "bin" / "python"), "-m", "pip", "--disable-pip-version-check", "-qq", "install"]
     try:
-        subprocess.run(
-            [*pip, "-c", str(HERE.parent / "constraints.txt"), "-r", str(HERE / "twin_packages.txt")],
-            check=True,
-        )
+        subprocess.run([*pip, *packages()], check=True)
         put_right(folder)
         provide_library(folder)
         (folder / "made").touch()

@@ -8,45 +8,34 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from bt_tasksim._names import one_module
+
 if TYPE_CHECKING:
-    from trees.authoring import (
-        check_tree,
-        fallback,
-        force_failure,
-        force_success,
-        invert,
-        parallel,
-        reactive_fallback,
-        reactive_sequence,
-        repeat,
-        retry,
-        sequence,
-        subtree,
-        timeout,
-    )
-    from trees.equality import same_tree
-    from trees.xml_reader import load_tree, scene_of_tree, tree_from_xml
-    from trees.xml_writer import node_models, save_tree, tree_to_xml
+    from bt_tasksim.trees.check import check_tree
+    from bt_tasksim.trees.equality import same_tree
+    from bt_tasksim.trees.nodes.fallback import fallback
+    from bt_tasksim.trees.nodes.force_failure import force_failure
+    from bt_tasksim.trees.nodes.force_success import force_success
+    from bt_tasksim.trees.nodes.inverter import invert
+    from bt_tasksim.trees.nodes.parallel import parallel
+    from bt_tasksim.trees.nodes.reactive_fallback import reactive_fallback
+    from bt_tasksim.trees.nodes.reactive_sequence import reactive_sequence
+    from bt_tasksim.trees.nodes.repeat import repeat
+    from bt_tasksim.trees.nodes.retry import retry
+    from bt_tasksim.trees.nodes.sequence import sequence
+    from bt_tasksim.trees.nodes.subtree import subtree
+    from bt_tasksim.trees.nodes.timeout import timeout
+    from bt_tasksim.trees.xml_reader import load_tree, scene_of_tree, tree_from_xml
+    from bt_tasksim.trees.xml_writer import node_models, save_tree, tree_to_xml
+
+one_module(__name__)
 
 _HOMES = {
-    "trees.authoring": (
-        "sequence",
-        "fallback",
-        "reactive_sequence",
-        "reactive_fallback",
-        "parallel",
-        "retry",
-        "repeat",
-        "timeout",
-        "invert",
-        "force_success",
-        "force_failure",
-        "subtree",
-        "check_tree",
-    ),
-    "trees.xml_reader": ("load_tree", "tree_from_xml", "scene_of_tree"),
-    "trees.xml_writer": ("save_tree", "tree_to_xml", "node_models"),
-    "trees.equality": ("same_tree",),
+    "bt_tasksim.trees.check": ("check_tree",),
+    "bt_tasksim.trees.nodes.subtree": ("subtree",),
+    "bt_tasksim.trees.xml_reader": ("load_tree", "tree_from_xml", "scene_of_tree"),
+    "bt_tasksim.trees.xml_writer": ("save_tree", "tree_to_xml", "node_models"),
+    "bt_tasksim.trees.equality": ("same_tree",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -77,6 +66,12 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(importlib.import_module(_HOME[name]), name)
+    if not name.startswith("_"):
+        from bt_tasksim.trees.vocabulary import helpers
+
+        helper = helpers().get(name)
+        if helper is not None:
+            return helper
     raise AttributeError(f"module 'trees' has no attribute '{name}'")
 
 

@@ -6,7 +6,10 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from trees.vocabulary import kind_of
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.trees.leaf_ports import SETTING_DOCS
+from bt_tasksim.trees.vocabulary import kind_of
 
 
 def same_tree(a: Behaviour, b: Behaviour) -> bool:
@@ -34,8 +37,8 @@ def _arguments(node: Behaviour) -> dict[str, Any]:
     kind = kind_of(node)
     if kind is not None:
         return {"tag": kind.tag, **kind.read(node)}
-    out = dict(getattr(node, "values", {}))
-    for setting in ("policy", "timeout", "tolerance", "uncertainty"):
-        if out or hasattr(node, "arguments"):
-            out[f"setting {setting}"] = getattr(node, setting, None)
-    return out
+    if isinstance(node, Condition):
+        return dict(node.values)
+    if isinstance(node, ConceptModel):
+        return {**node.values, **{setting: getattr(node, setting) for setting in SETTING_DOCS}}
+    return {}

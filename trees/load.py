@@ -14,14 +14,21 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept import ConceptModel, Condition
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.policy import concept_name
-from bt_tasksim.scene import Scene
-from trees.authoring import check_tree
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.former import advice
+from bt_tasksim.core.plugins import line_in
+from bt_tasksim.policy.policy import concept_name
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.trees.check import check_tree
 
 Leaves = dict[str, type[ConceptModel] | type[Condition]]
 """Concepts and conditions by name."""
+
+
+class NoSceneError(InputError):
+    """A tree says nothing of its scene, and none was named."""
 
 
 @dataclass(frozen=True)
@@ -41,16 +48,15 @@ class TreeSource:
 
 def scenarios() -> list[str]:
     """Names of the ready-made scenarios."""
-    import trees.scenarios
+    from bt_tasksim.trees import scenarios
 
-    return sorted(m.name for m in pkgutil.iter_modules(trees.scenarios.__path__))
+    return sorted(m.name for m in pkgutil.iter_modules(scenarios.__path__))
 
 
 def load_source(
     tree: str,
     robot: str | None = None,
     scene: str | None = None,
-    nodes: str | None = None,
     policies: Iterable[tuple[str, str]] = (),
 ) -> TreeSource:
     """The tree and scene that a name stands for.
@@ -59,11 +65,11 @@ def load_source(
         tree: Name of a scenario, or path of a ``.py`` or ``.xml`` file.
         robot: Name or file of the robot; by default the scene's own.
         scene: Name of a scenario whose scene is taken, or path of a scene file; by default the tree's own.
-        nodes: Path of a ``.py`` file with concepts and conditions of one's own, for an ``.xml`` file.
         policies: Concepts and the policies that their leaves take, see `with_policies`.
 
     Raises:
         InputError: There is no such tree or scene, or the file is no good.
+        NoSceneError: The tree says nothing of its scene, and none is named.
     """
     path = Path(tree)
     if path.suffix == ".py":
@@ -75,7 +81,7 @@ def load_source(
             path.stem, build, _scene(scene, robot) if scene or own is None else _made(own, robot, path)
         )
     elif path.suffix == ".xml":
-        source = _from_xml(path, robot, scene, own_nodes(nodes) if nodes else {})
+        source = _from_xml(path, robot, scene)
     elif path.suffix in (".h5", ".hdf5"):
         raise InputError(
             f"'{tree}' is a log: make a tree of it with 'bt-tasksim decompose {tree} --xml tree.xml'"
@@ -84,7 +90,7 @@ def load_source(
         if tree not in scenarios():
             hint = nearest(tree, scenarios())
             raise InputError(f"no scenario '{tree}'{hint} (or give a .py or .xml file)")
-        module = importlib.import_module(f"trees.scenarios.{tree}")
+        module = importlib.import_module(f"bt_tasksim.trees.scenarios.{tree}")
         source = TreeSource(tree, module.build, _scene(scene or tree, robot))
     root = source.build()
     if not isinstance(root, Behaviour):
@@ -94,6 +100,25 @@ def load_source(
     source = replace(source, build=with_policies(source.build, policies))
     source.build()
     return source
+
+
+def load_root(file: str) -> Behaviour:
+    """The tree in a file, whatever its scene.
+
+    Args:
+        file: Path of a ``.py`` or ``.xml`` file.
+
+    Raises:
+        InputError: There is no such file, or it is no good.
+    """
+    from bt_tasksim.trees.xml_reader import load_tree
+
+    path = Path(file)
+    if path.suffix == ".xml":
+        return load_tree(path)
+    root: Behaviour = _called(_function(_module(path), "build", path), path)
+    check_tree(root)
+    return root
 
 
 def with_policies(
@@ -140,7 +165,7 @@ def check_names(root: Behaviour, scene: Scene) -> None:
     Raises:
         InputError: One is not; says which leaf names it and what there is.
     """
-    from bt_tasksim.fixtures import load_fixture
+    from bt_tasksim.scene.fixtures import load_fixture
 
     objects = set(scene.objects)
     places = {p.name for f in scene.fixtures for p in load_fixture(f).places} | {s.name for s in scene.spots}
@@ -196,23 +221,23 @@ def names_in(root: Behaviour) -> tuple[set[str], set[str]]:
     return objects, places
 
 
-def _from_xml(path: Path, robot: str | None, scene: str | None, nodes: Leaves) -> TreeSource:
-    from trees.xml_reader import load_tree, scene_of_tree
+def _from_xml(path: Path, robot: str | None, scene: str | None) -> TreeSource:
+    from bt_tasksim.trees.xml_reader import load_tree, scene_of_tree
 
-    root = load_tree(path, nodes)
+    root = load_tree(path)
     named = scene or scene_of_tree(path)
     if named is None:
         fitting = [name for name in scenarios() if _fits(root, _scene(name, robot))]
         if not fitting:
             objects, places = names_in(root)
-            raise InputError(
+            raise NoSceneError(
                 f"'{path}' does not say in which scene it runs, and no ready-made one has "
                 f"{', '.join(sorted(objects | places))}: name one with --scene"
             )
         named = fitting[0]
     elif named.endswith((".yaml", ".yml")) and scene is None:
         named = str(path.parent / named)
-    return TreeSource(path.stem, lambda: load_tree(path, nodes), _scene(named, robot))
+    return TreeSource(path.stem, lambda: load_tree(path), _scene(named, robot))
 
 
 def _fits(root: Behaviour, scene: Scene) -> bool:
@@ -225,15 +250,15 @@ def _fits(root: Behaviour, scene: Scene) -> bool:
 
 def _scene(name: str | None, robot: str | None) -> Scene:
     if name is None:
-        raise InputError("the tree's file has no scene() and none was named: add one, or use --scene")
+        raise NoSceneError("the tree's file has no scene() and none was named: add one, or use --scene")
     if name.endswith((".yaml", ".yml")):
-        from bt_tasksim.scene_file import load_scene
+        from bt_tasksim.scene.scene_file import load_scene
 
         scene = load_scene(name)
         return scene if robot is None else scene.with_robot(robot)
     if name not in scenarios():
         raise InputError(f"no scene '{name}'{nearest(name, scenarios())} (or give a .yaml file)")
-    module = importlib.import_module(f"trees.scenarios.{name}")
+    module = importlib.import_module(f"bt_tasksim.trees.scenarios.{name}")
     made: Scene = module.scene() if robot is None else module.scene(robot)
     return made
 
@@ -267,18 +292,8 @@ def _called(function: Callable[..., Any], path: Path, *arguments: Any) -> Any:
         raise
     except (Exception, SystemExit) as error:
         text = (error.msg if isinstance(error, SyntaxError) else str(error)) or "no reason given"
-        raise InputError(f"'{path}'{_line_in(error, path)}: {type(error).__name__}: {text}") from error
-
-
-def _line_in(error: BaseException, path: Path) -> str:
-    if isinstance(error, SyntaxError):
-        return f", line {error.lineno}"
-    trace, line = error.__traceback__, ""
-    while trace is not None:
-        if Path(trace.tb_frame.f_code.co_filename).absolute() == path.absolute():
-            line = f", line {trace.tb_lineno}"
-        trace = trace.tb_next
-    return line
+        where = f"'{path}'{line_in(error, path)}"
+        raise InputError(f"{where}: {type(error).__name__}: {text}{advice(error)}") from error
 
 
 def _function(module: Any, name: str, path: Path) -> Any:

@@ -13,20 +13,13 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.errors import InputError, MachineError, nearest
-from trees.authoring import DEEPEST, find_problem, subtree
-from trees.vocabulary import (
-    CATEGORIES,
-    KINDS,
-    OUTSIDE,
-    Kind,
-    Leaf,
-    Nodes,
-    is_concept,
-    is_reference,
-    port_from_text,
-)
-from trees.xml_source import LARGEST, Element, parse
+from bt_tasksim.core.errors import InputError, MachineError, nearest
+from bt_tasksim.trees.check import DEEPEST, find_problem
+from bt_tasksim.trees.leaf_ports import Leaf, Nodes, is_concept, is_reference, port_from_text
+from bt_tasksim.trees.nodes.base import NodeKind
+from bt_tasksim.trees.nodes.subtree import subtree
+from bt_tasksim.trees.vocabulary import CATEGORIES, OUTSIDE, node_kinds
+from bt_tasksim.trees.xml_source import LARGEST, Element, parse
 
 MOST_NODES = 10_000
 """Nodes that a tree may have once its subtrees are put in place."""
@@ -73,7 +66,7 @@ def tree_from_xml(text: str | bytes, nodes: Nodes | None = None, *, source: str 
     Raises:
         InputError: Something in it is not read; the sentence says what and on which line.
     """
-    from concept_nodes import catalogue
+    from bt_tasksim.concept_nodes import catalogue
 
     return _Reader(parse(text, source), {**catalogue(), **(nodes or {})}, source).tree()
 
@@ -108,6 +101,7 @@ class _Scope:
 class _Reader:
     def __init__(self, root: Element, nodes: Nodes, source: str) -> None:
         self.nodes = nodes
+        self.kinds = node_kinds()
         self.source = source
         self.lines: dict[int, int] = {}
         self.trees: dict[str, Element] = {}
@@ -160,7 +154,7 @@ class _Reader:
             raise self._wrong(
                 element, f"a second <BehaviorTree> has the ID '{name}', the first is on line {first}"
             )
-        if name in KINDS:
+        if name in self.kinds:
             raise self._wrong(
                 element, f"a <BehaviorTree> may not have the ID '{name}', which is a node's name"
             )
@@ -211,14 +205,14 @@ class _Reader:
             return self._made(element, subtree(label, body))
         if category in ("Action", "Condition"):
             return self._made(element, self._leaf(element, self.nodes[name], scope))
-        kind = KINDS[name]
+        kind = self.kinds[name]
         self._check_children(element, kind)
         ports = self._ports(element, kind, scope)
         children = []
         for child in element.children:  # a loop, so that a level costs one stack frame
             children.append(self._node(child, scope, depth + 1))  # noqa: PERF401
         try:
-            node = kind.make(element.attributes.get("name") or kind.tag, children, ports)
+            node: Behaviour = kind.make(element.attributes.get("name") or kind.tag, children, ports)
         except InputError as error:
             raise self._wrong(element, str(error)) from None
         return self._made(element, node)
@@ -244,17 +238,17 @@ class _Reader:
         if category is None:
             if name in OUTSIDE:
                 raise self._wrong(element, f"<{name}> of BehaviorTree.CPP is outside the subset that is read")
-            known = (*KINDS, *self.nodes, "SubTree")
+            known = (*self.kinds, *self.nodes, "SubTree")
             hint = f'; to use the tree, write <SubTree ID="{name}"/>' if name in self.trees else None
-            own = "; a node of your own comes with --nodes FILE.py"
+            own = "; a node of your own comes with --plugin FILE.py"
             raise self._wrong(element, f"unknown node '{name}'{hint or nearest(name, known) + own}")
         if explicit and tag != category:
             raise self._wrong(element, f"'{name}' is no {tag}; write <{category} ID=\"{name}\"> or <{name}>")
         return name, category
 
     def _category(self, name: str) -> str | None:
-        if name in KINDS:
-            return KINDS[name].category
+        if name in self.kinds:
+            return self.kinds[name].category
         if name in self.nodes:
             return "Action" if is_concept(self.nodes[name]) else "Condition"
         return None
@@ -294,7 +288,7 @@ class _Reader:
         except InputError as error:
             raise self._wrong(element, str(error)) from None
 
-    def _ports(self, element: Element, kind: Kind, scope: _Scope) -> dict[str, int]:
+    def _ports(self, element: Element, kind: NodeKind[Any], scope: _Scope) -> dict[str, int]:
         known = [port.name for port in kind.ports]
         values = {port.name: port.default for port in kind.ports}
         for key, text in self._given(element):
@@ -333,7 +327,7 @@ class _Reader:
             f"{nearest(wanted, scope.values) if scope.values else ''}",
         )
 
-    def _check_children(self, element: Element, kind: Kind) -> None:
+    def _check_children(self, element: Element, kind: NodeKind[Any]) -> None:
         count = len(element.children)
         if kind.category == "Decorator" and count != 1:
             raise self._wrong(element, f"<{kind.tag}> should have one child, found {count}")

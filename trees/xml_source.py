@@ -10,7 +10,7 @@ from xml.sax.xmlreader import AttributesImpl
 from defusedxml.common import DefusedXmlException, DTDForbidden
 from defusedxml.expatreader import DefusedExpatParser
 
-from bt_tasksim.errors import InputError
+from bt_tasksim.core.errors import InputError
 
 LARGEST = 2_000_000
 """Bytes that a file may have."""

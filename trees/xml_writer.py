@@ -10,25 +10,24 @@ from xml.sax.saxutils import escape, quoteattr
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept import ConceptModel, Condition
-from bt_tasksim.errors import InputError
-from bt_tasksim.files import write_text
-from bt_tasksim.parameters import Parameter
-from trees.authoring import check_tree
-from trees.decorators import SubTree
-from trees.vocabulary import (
-    CATEGORIES,
-    KINDS,
-    OUTSIDE,
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Parameter
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.files import write_text
+from bt_tasksim.trees.check import check_tree
+from bt_tasksim.trees.leaf_ports import (
     SETTING_DOCS,
     SETTINGS,
     Leaf,
     default_text,
     is_concept,
-    kind_of,
     leaf_ports,
     port_to_text,
 )
+from bt_tasksim.trees.nodes.base import NodeKind, Port
+from bt_tasksim.trees.nodes.subtree import SubTree
+from bt_tasksim.trees.vocabulary import CATEGORIES, OUTSIDE, kind_of, node_kinds
 
 INDENT = "  "
 PORT_TYPES = {
@@ -43,9 +42,6 @@ PORT_DOCS = {
     "vector": "three numbers",
     "points": "three numbers a point",
 }
-OWN = tuple(tag for tag, kind in KINDS.items() if kind.own)
-"""Decorators that BehaviorTree.CPP does not have."""
-TAKEN = {*KINDS, *OUTSIDE, *CATEGORIES}
 FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -79,47 +75,53 @@ def tree_to_xml(root: Behaviour, *, scene: str | None = None) -> str:
     return _Writer(root).document(scene)
 
 
-def node_models(leaves: Mapping[str, Leaf], decorators: Iterable[str] = OWN) -> str:
+def node_models(leaves: Mapping[str, Leaf], own: Iterable[NodeKind[Any]] | None = None) -> str:
     """The ``TreeNodesModel`` of concepts and conditions, for Groot2's palette and for BehaviorTree.CPP.
 
     Args:
         leaves: The classes, by name.
-        decorators: Decorators that BehaviorTree.CPP does not have.
+        own: Control nodes and decorators that BehaviorTree.CPP does not have; None: all that are known.
 
     Raises:
         InputError: A parameter has a name that BehaviorTree.CPP keeps for itself.
     """
-    lines = ["<TreeNodesModel>", *(f'{INDENT}<Decorator ID="{name}"/>' for name in sorted(decorators))]
+    kinds = [kind for kind in node_kinds().values() if kind.own] if own is None else own
+    lines = ["<TreeNodesModel>"]
+    for kind in sorted(kinds, key=lambda kind: kind.tag):
+        ports = [_attribute_model(kind.tag, port) for port in kind.ports]
+        lines += _model(kind.category, kind.tag, ports)
     for name in sorted(leaves):
         leaf = leaves[name]
         tag = "Action" if is_concept(leaf) else "Condition"
-        ports = [_port_model(leaf, port) for port in leaf_ports(leaf)]
-        if ports:
-            lines += [f"{INDENT}<{tag} ID={_quote(name, name)}>", *ports, f"{INDENT}</{tag}>"]
-        else:
-            lines.append(f"{INDENT}<{tag} ID={_quote(name, name)}/>")
+        lines += _model(tag, name, [_port_model(leaf, port) for port in leaf_ports(leaf)])
     return "\n".join([*lines, "</TreeNodesModel>"])
+
+
+def _model(category: str, name: str, ports: list[str]) -> list[str]:
+    start = f"{INDENT}<{category} ID={_quote(name, name)}"
+    return [f"{start}>", *ports, f"{INDENT}</{category}>"] if ports else [f"{start}/>"]
 
 
 class _Writer:
     """Writes each subtree once, and gives it an ID of its own."""
 
     def __init__(self, root: Behaviour) -> None:
-        from concept_nodes import catalogue
+        from bt_tasksim.concept_nodes import catalogue
 
         self.root = root
         self.leaves: dict[str, Leaf] = {}
-        self.own: set[str] = set()
+        self.own: dict[str, NodeKind[Any]] = {}
+        taken = {*node_kinds(), *OUTSIDE, *CATEGORIES}
         for node in root.iterate():
             if isinstance(node, ConceptModel | Condition):
                 name = type(node).__name__
                 if self.leaves.setdefault(name, type(node)) is not type(node):
                     raise InputError(f"two different leaves are called {name}: rename one of the classes")
-                if name in TAKEN:
+                if name in taken:
                     raise InputError(f"leaf {name} has the name of a node of BehaviorTree.CPP: rename it")
             elif (kind := kind_of(node)) is not None and kind.own:
-                self.own.add(kind.tag)
-        reserved = {*TAKEN, *self.leaves, *catalogue()}
+                self.own[kind.tag] = kind
+        reserved = {*taken, *self.leaves, *catalogue()}
         self.taken = {name.casefold() for name in reserved} | {"root", "undefined"}
         self.trees: dict[str, str] = {}
         self.ids: dict[tuple[str, str], str] = {}
@@ -135,7 +137,7 @@ class _Writer:
             *(_tree(name, text) for name, text in self.trees.items()),
         ]
         if self.leaves or self.own:
-            parts.append(_shift(node_models(self.leaves, self.own), 1))
+            parts.append(_shift(node_models(self.leaves, self.own.values()), 1))
         return "\n".join([*parts, "</root>\n"])
 
     def _body(self, root: Behaviour) -> str:
@@ -169,7 +171,7 @@ class _Writer:
             cls = type(node)
             raise InputError(
                 f"'{node.name}' is a {cls.__module__}.{cls.__name__}, which cannot be written as XML; "
-                f"XML holds concepts, conditions and {', '.join(KINDS)} as made by the helpers of trees"
+                f"XML holds concepts, conditions and {', '.join(node_kinds())}"
             )
         attributes = {} if node.name == kind.tag else {"name": node.name}
         values = kind.read(node)
@@ -230,6 +232,13 @@ def _quote(text: str, owner: str) -> str:
     return quoteattr(text, {'"': "&quot;"})
 
 
+def _attribute_model(tag: str, port: Port) -> str:
+    attributes = {"name": port.name, "type": "int"}
+    if port.default is not None:
+        attributes["default"] = str(port.default)
+    return _input_port(tag, attributes, port.doc)
+
+
 def _port_model(leaf: Leaf, port: str) -> str:
     own = leaf.parameters().get(port)
     if own is not None:
@@ -244,7 +253,11 @@ def _port_model(leaf: Leaf, port: str) -> str:
         kind = "double" if is_number else "std::string"
         default = repr(float(getattr(leaf, f"default_{port}"))) if is_number else None
     attributes = {"name": port, "type": kind} | ({} if default is None else {"default": default})
-    start = "<input_port" + "".join(f" {k}={_quote(v, leaf.__name__)}" for k, v in attributes.items())
+    return _input_port(leaf.__name__, attributes, doc)
+
+
+def _input_port(owner: str, attributes: Mapping[str, str], doc: str) -> str:
+    start = "<input_port" + "".join(f" {k}={_quote(v, owner)}" for k, v in attributes.items())
     return INDENT * 2 + (f"{start}>{escape(doc)}</input_port>" if doc else f"{start}/>")
 
 

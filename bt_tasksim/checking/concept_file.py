@@ -13,14 +13,14 @@ import numpy as np
 
 from bt_tasksim.checking.declaration import check_declaration
 from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case, Finding
-from bt_tasksim.checking.purity import check_batches, check_purity
+from bt_tasksim.checking.purity import check_batches, check_beginning, check_purity
 from bt_tasksim.checking.recording import Recording, record
-from bt_tasksim.checking.situations import Decision, Situations, numbers
+from bt_tasksim.checking.situations import RecordedDecision, Situations, alike, numbers
 from bt_tasksim.checking.values import check_values
 from bt_tasksim.checking.watching import check_observables, check_watching
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.errors import InputError
-from bt_tasksim.training.decorator import concepts_in, follower_of, train_nodes
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.trees.nodes.train import concepts_in, follower_of, train_nodes
 
 RUNS = 3
 """Runs from which situations are taken; from the second on, actions explore."""
@@ -68,7 +68,7 @@ def check(file: str | Path, tree: str | None = None) -> Report:
     Raises:
         InputError: The file is missing, fails or defines no concept; or the tree is no good.
     """
-    from trees.load import own_nodes
+    from bt_tasksim.trees.load import own_nodes
 
     path = Path(file)
     found = own_nodes(str(path)).values()
@@ -115,12 +115,11 @@ def check_concept(concept: type[ConceptModel], name: str, root: Any, runs: Recor
         _never_acted(case, name, leaves, runs)
         check_observables(case)
         return case, f"{concept.__name__}, its declaration alone"
-    chosen = spread(decisions, MOST)
-    situations = Situations(chosen, leaf=case.leaf)
+    situations = Situations(spread(decisions, MOST), leaf=case.leaf)
     compared = ""
-    for part in (check_watching, check_values, check_purity):
+    for part in (check_watching, check_values, check_beginning, check_purity):
         part(case, situations)
-    if check_batches(case, situations):
+    if check_batches(case, Situations(spread(alike(decisions), MOST), leaf=case.leaf)):
         compared = ", torch"
     if case.leaf is not None and case.leaf.is_programmed and "done" in case.functions:
         _check_done(case, runs)
@@ -128,7 +127,7 @@ def check_concept(concept: type[ConceptModel], name: str, root: Any, runs: Recor
     return case, f"{concept.__name__}, {programmed} of {Path(name).name}, one by one, in batches{compared}"
 
 
-def spread(decisions: Sequence[Decision], n: int) -> list[Decision]:
+def spread(decisions: Sequence[RecordedDecision], n: int) -> list[RecordedDecision]:
     """At most about ``n`` decisions, spread evenly, the first and last ones among them."""
     step = max(1, len(decisions) // n)
     chosen = list(decisions[::step])
@@ -144,7 +143,7 @@ def _own_tree(path: Path, concept: type[ConceptModel]) -> str | None:
 
 def _scenario_with(concept: type[ConceptModel]) -> str:
     """A scenario that uses a concept, one that trains it first; empty where none does."""
-    from trees.load import load_source, scenarios
+    from bt_tasksim.trees.load import load_source, scenarios
 
     found = ""
     for name in scenarios():
@@ -157,7 +156,7 @@ def _scenario_with(concept: type[ConceptModel]) -> str:
 
 
 def _record(name: str, concepts: Sequence[type[ConceptModel]]) -> tuple[Any, Recording]:
-    from trees.load import load_source
+    from bt_tasksim.trees.load import load_source
 
     source = load_source(name)
     root = source.build()
@@ -166,7 +165,7 @@ def _record(name: str, concepts: Sequence[type[ConceptModel]]) -> tuple[Any, Rec
         known = ", ".join(sorted({type(leaf).__name__ for leaf in concepts_in(root)})) or "none"
         wanted = " or ".join(c.__name__ for c in concepts)
         raise InputError(f"the tree '{name}' has no leaf of {wanted}; its concepts: {known}")
-    stream = "training" if source.scene.lessons else "evaluation"
+    stream = "training" if source.scene.stages else "evaluation"
     return root, record(root, source.scene, watched, range(1, RUNS + 1), explore=True, stream=stream)
 
 

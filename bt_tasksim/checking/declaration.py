@@ -8,7 +8,7 @@ from typing import Any
 
 from bt_tasksim.checking.findings import ERROR, WARNING, Case
 from bt_tasksim.checking.values import degrees_like
-from bt_tasksim.concept import ConceptModel
+from bt_tasksim.concept.model import ConceptModel
 
 UNITS = re.compile(
     r"\b(metres?|m|mm|millimetres?|N|Nm|newtons?|rad|radians?|degrees?|s|seconds?|ticks?|share|ratio|over|"

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from bt_tasksim.checking.situations import Decision, Situation, Situations
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Known, Seen
+from bt_tasksim.checking.situations import RecordedDecision, Situation, Situations
+from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.model import ConceptModel
 
 ERROR, WARNING = "ERROR", "WARNING"
 FAILED: Any = object()
@@ -76,7 +76,7 @@ class Case:
     """
 
     def __init__(
-        self, concept: type[ConceptModel], decisions: Sequence[Decision] = (), followed: bool = False
+        self, concept: type[ConceptModel], decisions: Sequence[RecordedDecision] = (), followed: bool = False
     ) -> None:
         self.concept, self.followed = concept, followed
         self.decisions = list(decisions)

@@ -7,43 +7,53 @@ import keyword
 import re
 from pathlib import Path
 
-from bt_tasksim.errors import InputError
-from bt_tasksim.files import write_text
-from bt_tasksim.policy import concept_name
-from bt_tasksim.resources import asset
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.files import write_text
+from bt_tasksim.core.resources import asset
+from bt_tasksim.policy.policy import concept_name
 
 FILES = {"concept.py.txt": "{}.py", "train.py.txt": "train_{}.py", "test.py.txt": "test_{}.py"}
 """Templates, and what they become."""
+PLAIN = "plain"
+"""The folder of the frame to fill in; the other folders are worked examples."""
 TAKEN = ("train_", "test_")
 """How the names of the other files begin."""
 
 
-def write_concept(name: str, folder: str | Path = ".") -> str:
+def examples() -> list[str]:
+    """Names of the worked examples that a new concept may begin as."""
+    return sorted(p.name for p in asset("new_concept").iterdir() if p.is_dir() and p.name != PLAIN)
+
+
+def write_concept(name: str, folder: str | Path = ".", like: str | None = None) -> str:
     """Write a concept that runs as it is, with its training tree and its test.
 
     Args:
         name: Its name, lower-case words joined by underscores.
         folder: Where to.
+        like: The worked example that it begins as; by default a frame to fill in.
 
     Returns:
         What was written, and what to do next.
 
     Raises:
-        InputError: The name is no good or taken, the folder is missing, or a file is there already; then
-            nothing is written.
+        InputError: The name is no good or taken, there is no such example or folder, or a file is there
+            already; then nothing is written.
         MachineError: The disk is full or not writable; what was written is removed.
     """
     folder = Path(folder)
     class_name = "".join(word.capitalize() for word in name.split("_"))
     paths = {template: folder / file.format(name) for template, file in FILES.items()}
     _check_name(name, class_name)
+    if like is not None and like not in examples():
+        raise InputError(f"there is no example '{like}' to begin with{nearest(like, examples())}")
     if not folder.is_dir():
         raise InputError(f"there is no folder '{folder}': make it first, or name another one with --out")
     for path in paths.values():
         if path.exists() or path.is_symlink():
             raise InputError(f"'{path}' is there already: remove it, or choose another name or --out")
     _check_free(name)
-    texts = {template: _filled(template, name, class_name) for template in paths}
+    texts = {template: _filled(template, like or PLAIN, name, class_name) for template in paths}
     written: list[Path] = []
     try:
         for template, path in paths.items():
@@ -61,8 +71,8 @@ def write_concept(name: str, folder: str | Path = ".") -> str:
 
 
 def _check_name(name: str, class_name: str) -> None:
-    from bt_tasksim.concept import ConceptModel
-    from concept_nodes import catalogue
+    from bt_tasksim.concept.model import ConceptModel
+    from bt_tasksim.concept_nodes import catalogue
 
     good = re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name) and not keyword.iskeyword(name)
     if not good or name.startswith(TAKEN):
@@ -85,8 +95,9 @@ def _check_free(name: str) -> None:
         raise InputError(f"a Python module '{name}' is installed already: choose another name")
 
 
-def _filled(template: str, name: str, class_name: str) -> str:
-    text = asset("new_concept", template).read_text(encoding="utf-8")
+def _filled(template: str, kind: str, name: str, class_name: str) -> str:
+    own = asset("new_concept", kind, template)
+    text = (own if own.is_file() else asset("new_concept", template)).read_text(encoding="utf-8")
     return (
         text.replace("@name@", name).replace("@Class@", class_name).replace("@words@", name.replace("_", " "))
     )

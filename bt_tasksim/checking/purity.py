@@ -12,6 +12,7 @@ import numpy as np
 
 from bt_tasksim.checking.findings import ERROR, FAILED, Case
 from bt_tasksim.checking.situations import Situation, Situations, different, frozen, mapped, numbers, parts
+from bt_tasksim.concept.context import Seen
 
 DATA = (bool, int, float, str, list, dict, set, np.ndarray)
 
@@ -24,16 +25,34 @@ def check_purity(case: Case, situations: Situations) -> None:
             before = _surroundings(case, situations, situation)
             answer = case.ask(name, situation, situations)
             again = case.ask(name, situation, situations)
-            after = _surroundings(case, situations, situation)
-            for what, value in before.items():
-                if value != after[what]:
-                    case.add(ERROR, name, _CHANGES[what][0], _CHANGES[what][1], f"changes {what}")
+            _compare(case, name, before, _surroundings(case, situations, situation))
             answers.append(frozen(answer))
             if frozen(again) != answers[-1]:
                 _unsteady(case, name)
         for situation, answer in zip(reversed(situations.single), reversed(answers), strict=True):
             if frozen(case.ask(name, situation, situations)) != answer:
                 _unsteady(case, name)
+
+
+def check_beginning(case: Case, situations: Situations) -> None:
+    """What runs once at the start may plan and search, and leaves what it was given as it is."""
+    leaf = case.leaf
+    assert leaf is not None
+    firsts = [s for s, d in zip(situations.single, case.decisions, strict=False) if d.first]
+    for name in ("initial_state", "begin"):
+        if not case.overrides(name):
+            continue
+        for situation in firsts or situations.single[:1]:
+            before = _surroundings(case, situations, situation)
+            seen = Seen(situation.observation, situations.world, situations.robot, situation.elapsed)
+            case.call(name, lambda n=name, s=seen: getattr(leaf, n)(s))  # type: ignore[misc]
+            _compare(case, name, before, _surroundings(case, situations, situation))
+
+
+def _compare(case: Case, name: str, before: dict[str, Any], after: dict[str, Any]) -> None:
+    for what, value in before.items():
+        if value != after[what]:
+            case.add(ERROR, name, _CHANGES[what][0], _CHANGES[what][1], f"changes {what}")
 
 
 KEEP = "what is to be remembered goes into the memory"

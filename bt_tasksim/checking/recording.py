@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.checking.situations import Decision
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Seen
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import BtTasksimError
-from bt_tasksim.policy import Action, Policy, ProgrammedPolicy
-from bt_tasksim.poses import Array
-from bt_tasksim.runner import Runner
-from bt_tasksim.scene import Scene
-from bt_tasksim.world import Hidden
+from bt_tasksim.checking.situations import RecordedDecision
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core.errors import BtTasksimError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Hidden
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.policy.policy import Action, Decidable, Policy, ProgrammedPolicy, ViewT
+from bt_tasksim.scene.scene import Scene
 
 LONGEST = 60.0
 """Seconds of a run, at most."""
@@ -36,7 +36,7 @@ class Recording:
         errors: What a run raised.
     """
 
-    decisions: dict[ConceptModel, list[Decision]]
+    decisions: dict[ConceptModel, list[RecordedDecision]]
     ends: list[str]
     errors: list[BaseException]
 
@@ -45,6 +45,7 @@ class Spy:
     """A policy that notes what it is asked, and decides as another one does, or with other motions.
 
     Args:
+        leaf: The leaf that it decides for.
         policy: The other one; None: nothing but exploring, with a completion signal now and then.
         runner: The runner of the tree.
         notes: Where it writes.
@@ -54,8 +55,14 @@ class Spy:
     name = "spy"
 
     def __init__(
-        self, policy: Policy | None, runner: Runner, notes: list[Decision], explore: int | None = None
+        self,
+        leaf: ConceptModel,
+        policy: Policy | None,
+        runner: Runner,
+        notes: list[RecordedDecision],
+        explore: int | None = None,
     ) -> None:
+        self.leaf = leaf
         self.policy, self.runner, self.notes = policy, runner, notes
         self.run = 0
         self._rng = None if explore is None else np.random.default_rng(explore)
@@ -64,14 +71,17 @@ class Spy:
         self._activation = -1
         self._began: Hidden | None = None
 
-    def act(self, model: ConceptModel, seen: Seen, memory: Any) -> Action:
-        """See `bt_tasksim.policy.Policy.act`."""
+    def act(self, model: Decidable[ViewT], seen: ViewT, memory: Any) -> Action:
+        """See `bt_tasksim.policy.policy.Policy.act`."""
+        if not isinstance(seen, Seen):
+            raise TypeError(f"the spy on leaf '{self.leaf.name}' was asked outside of a tree")
+        leaf = self.leaf
         hidden = self.runner.context.hidden()
-        first = self._activation != model.activations
+        first = self._activation != leaf.activations
         if first:
-            self._activation, self._began = model.activations, hidden
+            self._activation, self._began = leaf.activations, hidden
         if hidden is not None and self._began is not None:
-            self.notes.append(Decision(model, seen, memory, hidden, self._began, first, self.run))
+            self.notes.append(RecordedDecision(leaf, seen, memory, hidden, self._began, first, self.run))
         if self.policy is not None and self._rng is None:
             return self.policy.act(model, seen, memory)
         rng = self._rng or np.random.default_rng(0)
@@ -103,7 +113,7 @@ def record(
             policies that they have.
         seeds: A run for each.
         explore: From the second run on, leaves that can learn make random motions.
-        stream: Stream of the draws; those of ``training`` are from the scene's last lesson, where it has any.
+        stream: Stream of the draws; those of ``training`` are from the scene's last stage, where it has any.
         options: Which engines.
     """
     runner = Runner(tree, scene, options or EngineOptions(), longest=LONGEST)
@@ -121,16 +131,16 @@ def record(
         else:
             policy = ProgrammedPolicy() if leaf.is_programmed else None
         notes = out.decisions.setdefault(leaf, [])
-        spies.append(Spy(policy, runner, notes))
+        spies.append(Spy(leaf, policy, runner, notes))
         leaf.use(spies[-1])
-    lesson = len(scene.lessons) - 1 if stream == "training" and scene.lessons else None
+    stage = len(scene.stages) - 1 if stream == "training" and scene.stages else None
     for number, seed in enumerate(seeds):
         for spy in spies:
             spy.run = number
             if explore and number > 0:
                 spy._rng = np.random.default_rng(seed)
         try:
-            configuration = scene.sample(seed, stream, lesson)
+            configuration = scene.sample(seed, stream, stage)
             result = runner.finish(configuration, runner.reset(configuration))
             out.ends.append(result.why)
         except BtTasksimError as error:

@@ -10,18 +10,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.concept import ConceptModel, Condition
-from bt_tasksim.context import Known, Seen
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.world import Hidden, Observation, WorldModel
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Hidden, Observation, WorldModel
+from bt_tasksim.robot.description import RobotDescription
 
 TOLERANCE = 1e-6
 """Difference of two numbers, in double precision, up to which they count as the same."""
 
 
-class Decision(NamedTuple):
+class RecordedDecision(NamedTuple):
     """A leaf that is about to act in a real run.
 
     Attributes:
@@ -124,6 +125,29 @@ def frozen(value: Any) -> Any:
     return id(value)
 
 
+def alike(decisions: Sequence[RecordedDecision]) -> list[RecordedDecision]:
+    """The most of them whose arrays have the same shapes.
+
+    What a concept remembers may differ in size from run to run, such as a path's number of poses.
+    """
+    groups: dict[object, list[RecordedDecision]] = {}
+    for decision in decisions:
+        groups.setdefault(_shapes(_situation(decision)), []).append(decision)
+    return max(groups.values(), key=len, default=[])
+
+
+def _situation(decision: RecordedDecision) -> Situation:
+    seen = decision.seen
+    return Situation(seen.observation, decision.hidden, decision.began, seen.elapsed, decision.memory)
+
+
+def _shapes(bundle: Any) -> object:
+    inner = parts(bundle)
+    if inner is not None:
+        return tuple((k, _shapes(v)) for k, v in inner.items())
+    return None if bundle is None or isinstance(bundle, str) else np.shape(numbers(bundle))
+
+
 class Situations:
     """Situations of one leaf, one by one and in batches.
 
@@ -136,7 +160,7 @@ class Situations:
 
     def __init__(
         self,
-        decisions: Sequence[Decision],
+        decisions: Sequence[RecordedDecision],
         seed: int = 0,
         copies: int = 2,
         leaf: ConceptModel | Condition | None = None,
@@ -146,9 +170,7 @@ class Situations:
         self.leaf: Any = first.leaf if leaf is None else leaf
         self.world: WorldModel = first.seen.world
         self.robot: RobotDescription = first.seen.robot
-        self.single = [
-            Situation(d.seen.observation, d.hidden, d.began, d.seen.elapsed, d.memory) for d in decisions
-        ]
+        self.single = [_situation(d) for d in decisions]
         self.real = len(self.single)
         """So many are as they were; those after them are changed."""
         self.single += [perturbed(s, rng) for s in self.single for _ in range(copies)]

@@ -9,9 +9,10 @@ import numpy as np
 
 from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
 from bt_tasksim.checking.situations import Situation, Situations, numbers, parts, perturbed
-from bt_tasksim.context import Seen
-from bt_tasksim.poses import Array
-from bt_tasksim.world import Command
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.core.outcomes import Outcome, Statement
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Command
 
 FAR = 3.0
 """Metres from the robot's base beyond which no arm reaches."""
@@ -227,13 +228,13 @@ def _check_begin(case: Case) -> None:
     for decision in [d for d in case.decisions if d.first][:3]:
         seen = decision.seen
         why = case.call("initial_state", lambda seen=seen: leaf.initial_state(seen))  # type: ignore[misc]
-        if why is not FAILED and not isinstance(why, str):
+        if why is not FAILED and not isinstance(why, Outcome | str | None):
             what = f"gives {why!r}"
             case.add(
                 ERROR,
                 "initial_state",
                 what,
-                "give the reason why it cannot start, and '' where it can",
+                "give a registered reason, or words, why it cannot start, and None where it can",
                 "text",
             )
         case.call("begin", lambda seen=seen: leaf.begin(seen))  # type: ignore[misc]
@@ -245,12 +246,12 @@ def _check_words(case: Case, situations: Situations) -> None:
     for situation in situations.single[: situations.real]:
         seen = Seen(situation.observation, situations.world, situations.robot, situation.elapsed)
         said = case.call("explain", lambda seen=seen, m=situation.memory: leaf.explain(seen, m))  # type: ignore[misc]
-        if said is not FAILED and not isinstance(said, str):
+        if said is not FAILED and not isinstance(said, Statement | str | None):
             case.add(
                 ERROR,
                 "explain",
                 f"gives a {type(said).__name__}",
-                "give a sentence with numbers and units",
+                "give a Form with its numbers, or a sentence with numbers and units",
                 "text",
             )
 

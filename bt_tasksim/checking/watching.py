@@ -9,11 +9,12 @@ import numpy as np
 
 from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
 from bt_tasksim.checking.situations import Situation, Situations, numbers
-from bt_tasksim.context import Seen
-from bt_tasksim.errors import nearest
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.world import GAPS, LARGE, Observation, WorldModel
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.core.errors import nearest
+from bt_tasksim.core.observables import FIELDS, observable, observables
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Observation, WorldModel
+from bt_tasksim.robot.description import RobotDescription
 
 WITHOUT_HIDDEN = (
     "features",
@@ -33,14 +34,14 @@ class WatchedObservation:
     """An observation that notes what is read of it."""
 
     def __init__(self, observation: Observation) -> None:
-        self._observation = observation
+        self.plain = observation
         self.read: set[str] = set()
         self.missed: set[str] = set()
 
     def __getattr__(self, name: str) -> Any:
-        if name in GAPS:
+        if name in FIELDS:
             self.read.add(name)
-            return getattr(self._observation, name)
+            return getattr(self.plain, name)
         if not name.startswith("__"):
             self.missed.add(name)
         raise AttributeError(f"an observation has no '{name}'")
@@ -58,6 +59,12 @@ class WatchedSeen(Seen):
         self._elapsed = elapsed
         self.observation = self.watched  # type: ignore[assignment]  # quacks like one
         self.world, self.robot = world, robot
+        self._derived = None
+
+    def observable(self, name: str) -> Array:
+        """See `Seen.observable`."""
+        self.watched.read.add(name)
+        return observable(name).read(self.watched.plain, self.world)
 
     @property
     def elapsed(self) -> Array:
@@ -68,11 +75,11 @@ class WatchedSeen(Seen):
 
 def check_observables(case: Case) -> None:
     """Observables are some, and ones with a small gap."""
-    concept = case.concept
-    for name in concept.observables:
-        if name not in GAPS:
-            case.add(ERROR, "", f"observables names '{name}', which is none", f"{nearest(name, GAPS)[2:]}")
-        elif GAPS[name].startswith(LARGE):
+    known = observables()
+    for name in case.concept.observables:
+        if name not in known:
+            case.add(ERROR, "", f"observables names '{name}', which is none", f"{nearest(name, known)[2:]}")
+        elif known[name].gap == "large":
             case.add(
                 ERROR,
                 "",
@@ -88,18 +95,18 @@ def check_watching(case: Case, situations: Situations) -> None:
     read = _read(case, situations)
     for name in sorted(n for n in read - set(concept.observables) if _depends(case, situations, n)):
         what = f"reads '{name}', which is not declared"
-        if GAPS[name].startswith(LARGE):
+        if observable(name).gap == "large":
             why = f"{what}, and of which simulation and reality differ ({_why(name)})"
             case.add(ERROR, "features", why, "leave it out; in violated, against a limit, it is allowed")
         else:
             case.add(ERROR, "features", what, f"add it: observables = (..., {name!r}), or leave it out")
     if case.overrides("features"):
         for name in concept.observables:
-            if name in GAPS and name not in read and name not in _through_memory(case, situations, [name]):
+            if name in observables() and name not in read and not _kept(case, situations, name):
                 case.add(
                     WARNING, "", f"observables declares '{name}', which features never uses", "take it out"
                 )
-    large = [n for n, gap in GAPS.items() if gap.startswith(LARGE)]
+    large = [n for n in FIELDS if observable(n).gap == "large"]
     for name in _through_memory(case, situations, large) if not concept.is_task_model else []:
         case.add(
             WARNING,
@@ -110,7 +117,11 @@ def check_watching(case: Case, situations: Situations) -> None:
 
 
 def _why(name: str) -> str:
-    return GAPS[name].split(": ", 1)[-1]
+    return observable(name).why
+
+
+def _kept(case: Case, situations: Situations, name: str) -> bool:
+    return name in FIELDS and name in _through_memory(case, situations, [name])
 
 
 def _read(case: Case, situations: Situations) -> set[str]:
@@ -137,6 +148,8 @@ def _read(case: Case, situations: Situations) -> set[str]:
 
 def _depends(case: Case, situations: Situations, name: str) -> bool:
     """The answer of features is another one where an observable is; it may be read for its type alone."""
+    if name not in FIELDS:  # it is computed from others: there is nothing to change
+        return True
     real = situations.single[: situations.real]
     for k, situation in enumerate(real):
         usual = _features(case, situation, situations)

@@ -1,47 +1,90 @@
-"""What words of the command line may be: argparse turns a wrong one into its own sentence."""
+"""What words of the command line may be; a wrong one is one sentence."""
 
 from __future__ import annotations
 
-import argparse
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bt_tasksim.core.errors import InputError
+
+MOST_EPISODES = 1_000_000
+MOST_WORKERS = 1024
+MOST_STEPS = 10**12
+SEEDS = 2**64
+"""How many seeds there are: logs hold them as 64 bits."""
+SHOWN = 40
+"""Characters of a wrong word that a sentence repeats."""
 
 
-def policy(text: str) -> tuple[str, str]:
-    """A concept's name and a policy, as in ``grasp=programmed``."""
-    concept, _, policy = text.partition("=")
-    if not concept or not policy:
-        raise argparse.ArgumentTypeError(
-            f"should be CONCEPT=POLICY, such as grasp=programmed, found '{text}'"
-        )
-    return concept, policy
+def whole(text: str | int, least: int, most: int) -> int:
+    """A whole number within bounds.
 
-
-def count(text: str) -> int:
-    """A positive whole number."""
-    value = whole(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"should be a positive whole number, found '{text}'")
-    return value
-
-
-def seed(text: str) -> int:
-    """Zero or a positive whole number."""
-    value = whole(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"should be zero or a positive whole number, found '{text}'")
-    return value
-
-
-def port(text: str) -> int:
-    """A TCP port; 0 for a free one."""
-    value = whole(text)
-    if not 0 <= value <= 65535:
-        raise argparse.ArgumentTypeError(f"should be a port from 0 to 65535, found '{text}'")
-    return value
-
-
-def whole(text: str) -> int:
-    """A whole number."""
+    Raises:
+        BadParameter: It is none.
+    """
     try:
-        return int(text)
+        value = int(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"should be a whole number, found '{text}'") from None
+        raise typer.BadParameter(f"should be a whole number, found {_shown(text)}") from None
+    if value < least:
+        kind = "a positive whole number" if least == 1 else "zero or a positive whole number"
+        raise typer.BadParameter(f"should be {kind}, found {_shown(text)}")
+    if value > most:
+        raise typer.BadParameter(f"should be at most {most}, found {_shown(text)}")
+    return value
+
+
+def seed(text: str | int) -> int:
+    """A seed that 64 bits can hold."""
+    return whole(text, 0, SEEDS - 1)
+
+
+def episodes(text: str | int) -> int:
+    """How many episodes."""
+    return whole(text, 1, MOST_EPISODES)
+
+
+def workers(text: str | int) -> int:
+    """How many processes."""
+    return whole(text, 1, MOST_WORKERS)
+
+
+def steps(text: str | int) -> int:
+    """How many decisions."""
+    return whole(text, 1, MOST_STEPS)
+
+
+def port(text: str | int) -> int:
+    """A TCP port; 0 for a free one."""
+    return whole(text, 0, 65535)
+
+
+def domain(text: str | int) -> int:
+    """A ROS domain."""
+    return whole(text, 0, 101)
+
+
+def picture(path: Path) -> Path:
+    """A file for a picture, which is SVG.
+
+    Raises:
+        InputError: Its suffix says something else.
+    """
+    if path.suffix.lower() not in ("", ".svg"):
+        raise InputError(f"pictures are SVG: give a name that ends with .svg, found '{path}'")
+    return path
+
+
+def _shown(text: str | int) -> str:
+    said = str(text)
+    return repr(said if len(said) <= SHOWN else f"{said[:SHOWN]}...")
+
+
+Seed = Annotated[
+    int,
+    typer.Option(
+        parser=seed, metavar="S", help="Seed of the draw; of the first one, where there are several."
+    ),
+]

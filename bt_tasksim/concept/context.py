@@ -13,10 +13,14 @@ from math import isfinite
 import numpy as np
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.errors import CommandConflictError, LeafError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.world import Command, Hidden, ObjectModel, Observation, PlaceModel, WorldModel
+from bt_tasksim.core.errors import CommandConflictError, LeafError
+from bt_tasksim.core.observables import observable
+from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Command, Hidden, ObjectModel, Observation, PlaceModel, WorldModel
+from bt_tasksim.robot.description import RobotDescription
+
+NO_EPISODE = "no episode has begun: a tree with concepts is ticked by a Runner"
 
 
 class Seen:
@@ -29,7 +33,7 @@ class Seen:
         elapsed: ``(...)`` seconds since the concept became active.
     """
 
-    __slots__ = ("elapsed", "observation", "robot", "world")
+    __slots__ = ("_derived", "elapsed", "observation", "robot", "world")
 
     def __init__(
         self, observation: Observation, world: WorldModel, robot: RobotDescription, elapsed: Array
@@ -38,6 +42,19 @@ class Seen:
         self.world = world
         self.robot = robot
         self.elapsed = elapsed
+        self._derived: dict[str, Array] | None = None
+
+    def observable(self, name: str) -> Array:
+        """An observable by its name, computed when it is first asked for.
+
+        Raises:
+            InputError: There is none of this name.
+        """
+        if self._derived is None:
+            self._derived = {}
+        if name not in self._derived:
+            self._derived[name] = observable(name).read(self.observation, self.world)
+        return self._derived[name]
 
     @property
     def tool(self) -> Array:
@@ -139,10 +156,9 @@ class Context:
         self._world: WorldModel | None = None
         self._observation: Observation | None = None
         self.hidden: typing.Callable[[], Hidden | None] = lambda: None
-        self.look = False
         self.now = 0.0
         """Seconds since the episode began."""
-        self.refused: tuple[Behaviour | None, str] | None = None
+        self.refused: tuple[Behaviour | None, Outcome] | None = None
         """The leaf whose command of the last tick an engine could not carry out, and why."""
         self._tool: tuple[Array, Behaviour] | None = None
         self._hand: tuple[Array, Behaviour] | None = None
@@ -156,7 +172,7 @@ class Context:
             RuntimeError: The tree is ticked outside an episode.
         """
         if self._world is None:
-            raise RuntimeError("no episode has begun: a tree with concepts is ticked by a Runner")
+            raise RuntimeError(NO_EPISODE)
         return self._world
 
     @property
@@ -167,7 +183,7 @@ class Context:
             RuntimeError: The tree is ticked outside an episode.
         """
         if self._observation is None:
-            raise RuntimeError("no episode has begun: a tree with concepts is ticked by a Runner")
+            raise RuntimeError(NO_EPISODE)
         return self._observation
 
     def begin(self, world: WorldModel, observation: Observation) -> None:
@@ -181,7 +197,6 @@ class Context:
         self._observation = observation
         self.now = float(observation.time)
         self._tool = self._hand = None
-        self.look = False
         self.refused = None
 
     def write(self, command: Command, leaf: Behaviour) -> None:
@@ -241,7 +256,7 @@ class Context:
     def seen(self, elapsed: float) -> Seen:
         """The view of this tick's observation."""
         if self._world is None or self._observation is None:
-            raise RuntimeError("no episode has begun: a tree with concepts is ticked by a Runner")
+            raise RuntimeError(NO_EPISODE)
         return Seen(self._observation, self._world, self.robot, np.float64(elapsed))
 
 

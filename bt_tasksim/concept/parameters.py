@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from bt_tasksim.errors import InputError, nearest
+from bt_tasksim.core.errors import InputError, nearest
 
 MISSING: Any = object()
 
@@ -35,6 +35,7 @@ class Quantity:
         kind: ``number``, ``vector`` (three numbers), ``points`` (any count of vectors), ``object``,
             ``place`` (or an object to put something on), ``text`` or ``flag``.
         unit_vector: A direction; scaled to length one.
+        two_sided: A direction that means the same as its opposite.
         low: Smallest allowed value of a number.
         high: Largest allowed value of a number.
     """
@@ -42,19 +43,22 @@ class Quantity:
     unit: str
     kind: str = "number"
     unit_vector: bool = False
+    two_sided: bool = False
     low: float = -math.inf
     high: float = math.inf
 
 
 Vector = tuple[float, float, float]
 
-Metres = Annotated[float, Quantity("m")]
+Metres = Annotated[float, Quantity("m", low=0.0)]
+Offset = Annotated[float, Quantity("m")]
 Radians = Annotated[float, Quantity("rad")]
 Seconds = Annotated[float, Quantity("s", low=0.0)]
 Newtons = Annotated[float, Quantity("N", low=0.0)]
 MetresPerSecond = Annotated[float, Quantity("m/s", low=0.0)]
 Ratio = Annotated[float, Quantity("1", low=0.0, high=1.0)]
 Direction = Annotated[Vector, Quantity("1", "vector", unit_vector=True)]
+Axis = Annotated[Vector, Quantity("1", "vector", unit_vector=True, two_sided=True)]
 Position = Annotated[Vector, Quantity("m", "vector")]
 Points = Annotated[tuple[Vector, ...], Quantity("m", "points")]
 ObjectName = Annotated[str, Quantity("", "object")]
@@ -198,6 +202,8 @@ def _number(value: Any, quantity: Quantity) -> float:
     number = float(value)
     if not math.isfinite(number):
         raise ValueError("it is not finite")
+    if number < quantity.low and math.isinf(quantity.high):
+        raise ValueError(f"it should not be below {quantity.low:g}")
     if not quantity.low <= number <= quantity.high:
         raise ValueError(f"it should lie between {quantity.low:g} and {quantity.high:g}")
     return number

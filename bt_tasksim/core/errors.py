@@ -7,7 +7,8 @@ The command line turns :class:`InputError` into exit code 2 (the user can put it
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class BtTasksimError(Exception):
@@ -18,25 +19,36 @@ class InputError(BtTasksimError, ValueError):
     """Bad input: one clear sentence that says what is wrong, where, and what to do."""
 
 
+class FieldError(InputError):
+    """Bad input in a field; a loader of files adds the file and the line.
+
+    Args:
+        message: The sentence.
+        where: Keys and indices that lead to the field.
+    """
+
+    def __init__(self, message: str, *where: str | int) -> None:
+        super().__init__(message)
+        self.where = where
+
+
+@contextmanager
+def within(*where: str | int) -> Iterator[None]:
+    """Errors raised in here are about this field (`FieldError`)."""
+    try:
+        yield
+    except FieldError as error:
+        raise FieldError(str(error), *where, *error.where) from error
+    except InputError as error:
+        raise FieldError(str(error), *where) from error
+
+
 class MachineError(BtTasksimError, RuntimeError):
     """The machine failed: a full disk, a lost connection, an engine that stopped."""
 
 
-class LostEngine(MachineError):  # noqa: N818  # as `SafetyStop`: it says what happened
+class LostEngine(MachineError):  # noqa: N818  # it says what happened
     """An engine in another process is not there any more, or another client has it."""
-
-
-class SafetyStop(MachineError):  # noqa: N818  # a robot that stops in time has made no error
-    """The robot was stopped, and stays so until a new run.
-
-    Args:
-        message: The sentence: what was exceeded, where and by how much.
-        limit: Name of the limit or the fault, such as ``joint_velocity``.
-    """
-
-    def __init__(self, message: str, limit: str) -> None:
-        super().__init__(message)
-        self.limit = limit
 
 
 class UnreachableError(InputError):

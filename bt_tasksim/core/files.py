@@ -1,19 +1,28 @@
 """Files and folders that appear whole or not at all.
 
 Everything is written beside its place under a hidden name and renamed when complete. After an error, a full
-disk or an interrupt, what was there before is still there, and nothing else.
+disk, an interrupt or SIGTERM, what was there before is still there, and nothing else. What a killed process
+has left under a hidden name is cleared away when its place is written the next time.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
+import platform
+import re
 import secrets
 import shutil
+import zlib
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.interrupts import terminable
+
+_NEW, _OLD = "new", "old"
+"""Kinds of hidden names: what is being written, and what was there before."""
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
@@ -51,16 +60,14 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         MachineError: The disk is full or not writable, or the block wrote nothing.
     """
     path = Path(path)
-    _check_parent(path)
-    if path.is_dir():
-        raise InputError(f"cannot write '{path}': it is a folder; name a file in it")
-    if path.exists() and not path.is_file():
-        raise InputError(f"cannot write '{path}': it is a device or a pipe; name a file")
-    unfinished = _beside(path)
+    _check_file(path)
+    clear_away(path)
+    unfinished = _beside(path, _NEW)
     try:
-        yield unfinished
-        _flush(unfinished)
-        os.replace(unfinished, path)
+        with terminable():
+            yield unfinished
+            _flush(unfinished)
+            os.replace(unfinished, path)
     except OSError as error:
         raise _cannot_write(path, error) from error
     finally:
@@ -85,19 +92,21 @@ def whole_folder(path: str | Path, names: Collection[str] = ()) -> Iterator[Path
         MachineError: The disk is full or not writable.
     """
     path = Path(os.path.abspath(path))
+    clear_away(path)
     check_folder(path, names)
-    unfinished, before = _beside(path), _beside(path)
+    unfinished, before = _beside(path, _NEW), _beside(path, _OLD)
     made = [folder for folder in path.parents if not folder.exists()]
     try:
-        unfinished.mkdir(parents=True)
-        yield unfinished
-        check_folder(path, names)
-        for file in unfinished.rglob("*"):
-            if file.is_file():
-                _flush(file)
-        if path.exists():
-            os.rename(path, before)
-        os.rename(unfinished, path)
+        with terminable():
+            unfinished.mkdir(parents=True)
+            yield unfinished
+            check_folder(path, names)
+            for file in unfinished.rglob("*"):
+                if file.is_file():
+                    _flush(file)
+            if path.exists():
+                os.rename(path, before)
+            os.rename(unfinished, path)
     except (ConnectionError, TimeoutError):
         raise
     except MachineError as error:
@@ -137,7 +146,9 @@ def check_folder(path: str | Path, names: Collection[str] = ()) -> None:
         raise InputError(f"cannot write a folder '{path}': '{above}' is a file; choose another name")
     if path.is_symlink() or (path.exists() and not path.is_dir()):
         raise InputError(f"cannot write a folder '{path}': there is a file of this name; choose another name")
-    others = sorted(p.name for p in path.iterdir() if p.name not in names) if path.is_dir() else []
+    within = sorted(path.iterdir()) if path.is_dir() else []
+    others = [p.name for p in within if p.name not in names]
+    others += [f"a folder named {p.name}" for p in within if p.name in names and not p.is_file()]
     if others:
         raise InputError(
             f"cannot write a folder '{path}': it holds other things, such as '{others[0]}'; "
@@ -145,14 +156,71 @@ def check_folder(path: str | Path, names: Collection[str] = ()) -> None:
         )
 
 
-def _check_parent(path: Path) -> None:
-    parent = path.parent
-    if not parent.is_dir():
-        raise InputError(f"cannot write '{path}': the folder '{parent}' does not exist; make it first")
+def check_writable(path: str | Path) -> None:
+    """Check that `whole_file` may write here, before there is anything to write.
+
+    Raises:
+        InputError: The folder does not exist, or the path is a folder or a device.
+        MachineError: The folder is not writable.
+    """
+    path = Path(path)
+    _check_file(path)
+    trial = _beside(path, _NEW)
+    try:
+        trial.touch(exist_ok=False)
+        trial.unlink()
+    except OSError as error:
+        raise _cannot_write(path, error) from error
 
 
-def _beside(path: Path) -> Path:
-    return path.with_name(f".{path.stem}.{secrets.token_hex(6)}{path.suffix}")
+def clear_away(path: Path) -> None:
+    """Clear away what processes that were killed have left beside a path; what they had moved comes back."""
+    pattern = re.compile(
+        rf"\.{re.escape(path.stem)}\.({_NEW}|{_OLD})-{_host()}-([0-9]+)-[0-9a-f]+{re.escape(path.suffix)}"
+    )
+    try:
+        left = [(found, p) for p in path.parent.iterdir() if (found := pattern.fullmatch(p.name))]
+    except OSError:
+        return
+    for found, rest in left:
+        if _runs(int(found[2])):
+            continue
+        with contextlib.suppress(OSError):
+            if found[1] == _OLD and not path.exists():
+                os.rename(rest, path)
+            elif rest.is_dir():
+                shutil.rmtree(rest, ignore_errors=True)
+            else:
+                rest.unlink()
+
+
+def _check_file(path: Path) -> None:
+    if not path.parent.is_dir():
+        raise InputError(f"cannot write '{path}': the folder '{path.parent}' does not exist; make it first")
+    if path.is_dir():
+        raise InputError(f"cannot write '{path}': it is a folder; name a file in it")
+    if path.exists() and not path.is_file():
+        raise InputError(f"cannot write '{path}': it is a device or a pipe; name a file")
+
+
+def _beside(path: Path, kind: str) -> Path:
+    """A hidden name beside a path that says which process of which machine it is of."""
+    return path.with_name(f".{path.stem}.{kind}-{_host()}-{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")
+
+
+@functools.cache
+def _host() -> str:
+    return f"{zlib.crc32(platform.node().encode()):08x}"
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def _flush(path: Path) -> None:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from typing import Any
 
-from bt_tasksim.errors import Terminated
+from bt_tasksim.core.errors import Terminated
 
 
 @contextmanager

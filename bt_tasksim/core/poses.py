@@ -22,6 +22,7 @@ Array = Any
 """An array of the Python array API standard, such as ``numpy.ndarray`` or ``torch.Tensor``."""
 
 _EPS = 1e-12
+_UP = [0.0, 0.0, 1.0]
 
 
 def array_namespace(*arrays: Array) -> Any:
@@ -187,6 +188,33 @@ def normalise(q: Array) -> Array:
     """Quaternions ``(..., 4)`` scaled to unit length."""
     xp = array_namespace(q)
     return q / xp.sqrt(xp.sum(q * q, axis=-1, keepdims=True))
+
+
+def unit_pose(pose: Any) -> Array:
+    """A pose ``(7,)`` with its quaternion scaled to unit length, as files give a few digits only."""
+    out = np.array(pose, float)
+    out[3:] /= float(np.linalg.norm(out[3:]))
+    return out
+
+
+def z_axis(q: Array) -> Array:
+    """Where the z axis points: unit vectors ``(..., 3)`` of rotations ``(..., 4)``."""
+    return rotate(q, constant([0.0, 0.0, 1.0], q))
+
+
+def tilt(q: Array, before: Array | None = None) -> Array:
+    """Angle ``(...)`` in radians between the z axis of rotations ``(..., 4)`` and the vertical.
+
+    Args:
+        q: The rotations.
+        before: Other ones, whose z axes count instead of the vertical.
+    """
+    if _single(q) and (before is None or _single(before)):
+        a, b = _rot(q.tolist(), _UP), _UP if before is None else _rot(before.tolist(), _UP)
+        return np.float64(math.acos(min(max(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], -1.0), 1.0)))
+    up = z_axis(q)
+    cosine = up[..., 2] if before is None else dot(z_axis(before), up)
+    return array_namespace(q).acos(clip(cosine, -1.0, 1.0))
 
 
 def rotation_vector(q: Array) -> Array:

@@ -12,8 +12,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.poses import Array
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.poses import Array
 
 
 @dataclass(frozen=True)
@@ -178,33 +178,6 @@ class Observation:
     objects: Array
     contact_points: Array
     motion: Array
-
-
-SMALL, LARGE = "small", "large"
-
-GAPS: Mapping[str, str] = {
-    "time": "small: both count control periods",
-    "arm_position": "small: encoders",
-    "arm_velocity": "large: encoders give it noisy and late, and drives differ in damping and friction",
-    "hand_position": "small: encoders",
-    "hand_effort": "large: a drive's law knows no gear friction; real motor currents do",
-    "closure": "small: encoders of the hand",
-    "tool_pose": "small: encoders and a calibrated arm",
-    "tips": "small: encoders and a calibrated hand",
-    "contacts": "small: yes or no, whatever the sensor's gain",
-    "contact_force": "large: simulated contacts are stiffer than pads, and tactile sensors drift",
-    "wrench": "large: simulated contacts are stiffer than real ones",
-    "objects": "small: an estimate with a stated error in both",
-    "contact_points": "small: from the estimate",
-    "motion": "small: from the estimate",
-}
-"""How much each field of `Observation` differs between simulation and reality, and why.
-
-A learned policy looks at those with a small gap. Those with a large one serve as limits, where only being far
-above matters. Sources: K. Sasabuchi et al., arXiv 2301.01382, and its released code, where a grasp sees
-contacts as yes or no, and a door the direction of the force and not its size; J. Tan et al., "Sim-to-real:
-learning agile locomotion for quadruped robots", RSS 2018, on drives and latency.
-"""
 
 
 @dataclass(frozen=True, slots=True)

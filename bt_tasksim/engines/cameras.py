@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.pipeline import CameraModel
-from bt_tasksim.errors import InputError
-from bt_tasksim.poses import Array
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.images import CameraModel
 
 
 @dataclass(frozen=True)
@@ -99,16 +99,7 @@ def project(camera: CameraModel, point: Array) -> tuple[Array, Array]:
     return pixel, depth
 
 
-def unproject(camera: CameraModel, depth: Array) -> Array:
-    """Points ``(height, width, 3)``, robot base frame, of a depth image ``(height, width)`` in metres.
-
-    Pixels in which nothing was seen (depth 0) give the camera's own position.
-    """
-    rows, columns = np.mgrid[0 : camera.height, 0 : camera.width]
-    return unproject_pixels(camera, rows, columns, depth)
-
-
-def unproject_pixels(camera: CameraModel, rows: Array, columns: Array, depth: Array) -> Array:
+def unproject(camera: CameraModel, rows: Array, columns: Array, depth: Array) -> Array:
     """Points ``(..., 3)``, base frame, of pixels ``rows``, ``columns (...)`` with ``depth (...)`` metres."""
     x = (columns + 0.5 - camera.matrix[0, 2]) / camera.matrix[0, 0]
     y = (rows + 0.5 - camera.matrix[1, 2]) / camera.matrix[1, 1]

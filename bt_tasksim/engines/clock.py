@@ -9,14 +9,9 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Protocol
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from bt_tasksim.engines.pipeline import PhysicsEngine
-    from bt_tasksim.scene import ActorConfiguration
-    from bt_tasksim.world import Hidden, JointTarget, WorldState
 
 PUNCTUAL = 0.002
 """Seconds by which a tick may be late and still counts as punctual."""
@@ -170,43 +165,3 @@ def next_tick(last: int, ready: float, period: float) -> int:
         return due
     reached = math.floor(ready / period)
     return reached if ready <= (reached + GRACE) * period else reached + 1
-
-
-class PacedPhysics:
-    """A simulation in real time: each step takes one control period.
-
-    Args:
-        inner: The physics engine.
-        clock: The clock.
-    """
-
-    def __init__(self, inner: PhysicsEngine, clock: Clock) -> None:
-        self.inner, self.clock = inner, clock
-
-    def reset(self, configuration: ActorConfiguration) -> WorldState:
-        """See `PhysicsEngine.reset`."""
-        state = self.inner.reset(configuration)
-        self.clock.start(1.0 / configuration.control_frequency)
-        return state
-
-    def step(self, target: JointTarget) -> WorldState:
-        """See `PhysicsEngine.step`."""
-        state = self.inner.step(target)
-        self.clock.wait()
-        return state
-
-    def hidden(self) -> Hidden | None:
-        """See `PhysicsEngine.hidden`."""
-        return self.inner.hidden()
-
-    def hold(self, why: str) -> None:
-        """Pass a hold on."""
-        hold: Any = getattr(self.inner, "hold", None)
-        if hold is not None:
-            hold(why)
-
-    def close(self) -> None:
-        """Close the engine."""
-        close: Any = getattr(self.inner, "close", None)
-        if close is not None:
-            close()

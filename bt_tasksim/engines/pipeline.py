@@ -1,109 +1,36 @@
 """The environment engine pipeline: four roles in a fixed order, each engine replaceable.
 
-An engine is any object with the methods of its role below. The pipeline is all that the runner knows: a
-robot, a simulator, or parts of both in other processes.
+The pipeline is all that the runner knows: a robot, a simulator, or parts of both in other processes. What an
+engine is stands in `bt_tasksim.engines.base`.
+
+What was asked last has one owner at each level: `EnginePipeline.commanded` is what leaves have asked of tool
+and hand; the kinematics engine has the joints that this comes to, and how far they are on their way; the
+guard has what it let through; a simulator has what its drives are told. Nobody reads another one's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Protocol, runtime_checkable
+import math
+from dataclasses import replace
 
-from bt_tasksim.pacing import Clock, FreeClock, Timing
-from bt_tasksim.poses import Array
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.world import Command, Hidden, JointTarget, Observation, WorldModel, WorldState
+import numpy as np
 
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel, WorldState
+from bt_tasksim.engines.base import (
+    Engine,
+    KinematicsEngine,
+    PhysicsEngine,
+    PostProcessEngine,
+    RenderingEngine,
+)
+from bt_tasksim.engines.clock import Clock, FreeClock, Timing
+from bt_tasksim.engines.images import Image
+from bt_tasksim.scene.configuration import ActorConfiguration
 
-@dataclass(frozen=True)
-class CameraModel:
-    """A calibrated camera.
-
-    Attributes:
-        name: Its name.
-        width: Pixels.
-        height: Pixels.
-        matrix: Intrinsic matrix ``(3, 3)``, pixels (OpenCV convention: x right, y down, z forward).
-        pose: Pose ``(7,)`` of the camera's optical frame (OpenCV convention) in the robot base frame.
-    """
-
-    name: str
-    width: int
-    height: int
-    matrix: Array
-    pose: Array
-
-
-@dataclass(frozen=True)
-class Image:
-    """What one camera saw.
-
-    Attributes:
-        camera: The camera.
-        colour: ``(height, width, 3)`` uint8, RGB.
-        depth: ``(height, width)`` float32 metres along the optical axis; 0 where nothing was seen.
-        taken: When, in seconds of `WorldState.time`; None where it shows the state it came with.
-    """
-
-    camera: CameraModel
-    colour: Array
-    depth: Array | None
-    taken: float | None = None
-
-
-@runtime_checkable
-class KinematicsEngine(Protocol):
-    """Turns commands into joint targets; the only one that knows arm joints."""
-
-    def reset(self, configuration: ActorConfiguration) -> None:
-        """Prepare for an episode."""
-
-    def solve(self, command: Command, state: WorldState) -> JointTarget:
-        """Joint target that brings the tool to ``command.tool`` in one control period.
-
-        Raises:
-            UnreachableError: The arm cannot be there; says by how much it misses.
-        """
-
-
-@runtime_checkable
-class PhysicsEngine(Protocol):
-    """Moves the world on by one control period."""
-
-    def reset(self, configuration: ActorConfiguration) -> WorldState:
-        """A fresh scene, at rest, and its state."""
-
-    def step(self, target: JointTarget) -> WorldState:
-        """The state one control period later."""
-
-    def hidden(self) -> Hidden | None:
-        """What only a simulator knows; None on a real robot."""
-
-
-@runtime_checkable
-class RenderingEngine(Protocol):
-    """Draws the world, or fetches the pictures of real cameras."""
-
-    def reset(self, configuration: ActorConfiguration) -> None:
-        """Prepare for an episode."""
-
-    def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
-        """What the named camera sees now."""
-
-
-@runtime_checkable
-class PostProcessEngine(Protocol):
-    """Turns states and images into observations."""
-
-    def reset(self, configuration: ActorConfiguration, model: WorldModel) -> None:
-        """Prepare for an episode."""
-
-    def cameras(self, needed: bool) -> tuple[str, ...]:
-        """Cameras whose images `observe` wants at this instant; ``needed``: a concept asked for a look."""
-
-    def observe(self, state: WorldState, images: Mapping[str, Image]) -> Observation:
-        """The observation of this instant."""
+SAME_PLACE = (2e-3, 2e-2)
+"""m and rad by which the tool's poses of kinematics and physics may differ at a reset."""
 
 
 class EnginePipeline:
@@ -115,9 +42,6 @@ class EnginePipeline:
         postprocess: See `PostProcessEngine`.
         rendering: See `RenderingEngine`; None where nothing is ever drawn.
         clock: The clock that the physics role waits for; by default none, as fast as possible.
-
-    Attributes:
-        served: Names of those engines that are in other processes, as their servers say them, by role.
     """
 
     def __init__(
@@ -134,45 +58,40 @@ class EnginePipeline:
         self.rendering = rendering
         self.clock = clock or FreeClock()
         self.state: WorldState | None = None
-        self.last: Command = Command()
-        self.served: dict[str, str] = {}
+        self.commanded: Command = Command()
 
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> Observation:
         """Begin an episode; returns its first observation."""
         self.kinematics.reset(configuration)
         if configuration is not None and configuration.hand_start:
-            posture: Any = self.kinematics
-            joints = posture.joints_of_hand_start(configuration.hand_start)
+            joints = self.kinematics.joints_of_hand_start(configuration.hand_start)
             configuration = replace(configuration, joint_position=joints)
         self.state = self.physics.reset(configuration)
+        self._check_tool(self.state)
         if self.rendering is not None:
             self.rendering.reset(configuration)
         self.postprocess.reset(configuration, model)
-        self.last = Command()
-        observation = self._observe(needed=True)
-        begin: Any = getattr(self.physics, "begin", None)
-        if begin is None:
+        self.commanded = Command()
+        observation = self._observe(first=True)
+        now = self.physics.begin()
+        if now is None:
             return observation
-        self.state = begin()  # pictures and the first look have taken their time
-        return self._observe(needed=False)
+        self.state = now  # pictures and the first look have taken their time
+        return self._observe(first=False)
 
-    def step(self, command: Command, *, look: bool = False) -> Observation:
+    def step(self, command: Command) -> Observation:
         """One control period: a part of the command that nobody wrote keeps its last target.
-
-        Args:
-            command: What the tree asks for.
-            look: A concept wants fresh images for the next observation.
 
         Raises:
             UnreachableError: The tool target is out of reach; nothing has moved, and the last targets stay.
         """
         if self.state is None:
             raise RuntimeError("the pipeline was stepped before it was reset")
-        wanted = command.over(self.last)
+        wanted = command.over(self.commanded)
         target = self.kinematics.solve(wanted, self.state)
-        self.last = wanted
+        self.commanded = wanted
         self.state = self.physics.step(target)
-        return self._observe(needed=look)
+        return self._observe(first=False)
 
     def hidden(self) -> Hidden | None:
         """The physics state, in simulation."""
@@ -180,8 +99,7 @@ class EnginePipeline:
 
     def unseen(self) -> dict[str, str]:
         """Why perception has never seen an object, one sentence each, by the object's name."""
-        say: Any = getattr(self.postprocess, "unseen", dict)
-        return dict(say())
+        return dict(self.postprocess.unseen())
 
     def render(self, camera: str, *, depth: bool = False) -> Image:
         """A picture for a recording.
@@ -196,18 +114,27 @@ class EnginePipeline:
     @property
     def real(self) -> bool:
         """What it moves is a real robot."""
-        return bool(getattr(self.physics, "real", False))
+        return self.physics.real
 
     @property
-    def told(self) -> bool:
+    def hold_delivered(self) -> bool:
         """A robot that had to hold was told so, in one way or another."""
-        return bool(getattr(self.physics, "told", True))
+        return self.physics.hold_delivered
+
+    @property
+    def served(self) -> dict[str, str]:
+        """Names of those engines that are in other processes, as their servers say them, by role."""
+        return {engine.role: engine.served_name for engine in self.engines if engine.served_name}
+
+    @property
+    def engines(self) -> tuple[Engine, ...]:
+        """Its engines, in their order."""
+        found = (self.kinematics, self.physics, self.rendering, self.postprocess)
+        return tuple(engine for engine in found if engine is not None)
 
     def stop(self, why: str) -> None:
         """The run is over, or has to be: a robot holds until the next `reset`; a simulation need not."""
-        hold: Any = getattr(self.physics, "hold", None)
-        if hold is not None:
-            hold(why)
+        self.physics.hold(why)
 
     def timing(self) -> Timing | None:
         """How well the rate was kept; None where there is none to keep."""
@@ -215,14 +142,26 @@ class EnginePipeline:
 
     def close(self) -> None:
         """Let go of what the engines hold."""
-        for engine in (self.kinematics, self.physics, self.rendering, self.postprocess):
-            close: Any = getattr(engine, "close", None)
-            if close is not None:
-                close()
+        for engine in self.engines:
+            engine.close()
 
-    def _observe(self, needed: bool) -> Observation:
+    def _check_tool(self, state: WorldState) -> None:
+        """Kinematics and physics have the same robot: with the same joints the tool is at the same place."""
+        expected = self.kinematics.tool_pose(state)
+        if expected is None:
+            return
+        apart = float(np.linalg.norm(expected[:3] - state.tool_pose[:3]))
+        turned = float(poses.angle_between(expected[3:], state.tool_pose[3:]))
+        if apart > SAME_PLACE[0] or turned > SAME_PLACE[1]:
+            raise InputError(
+                f"kinematics and physics do not have the same robot: for the same joints their tool poses "
+                f"are {1000 * apart:.1f} mm and {math.degrees(turned):.1f} degrees apart; do both read the "
+                f"same URDF, with the same base_link and tool?"
+            )
+
+    def _observe(self, first: bool) -> Observation:
         state = self.state
         assert state is not None
-        cameras = self.postprocess.cameras(needed)
+        cameras = self.postprocess.cameras(first)
         images = {name: self.render(name, depth=True) for name in cameras}
         return self.postprocess.observe(state, images)

@@ -1,37 +1,35 @@
-"""Engines by name, as the command line and `Runner` name them."""
+"""The pipeline of a run: engines by the names that the command line and `Runner` take."""
 
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.engines.noise import noise_model
-from bt_tasksim.engines.pipeline import EnginePipeline, PostProcessEngine, RenderingEngine
-from bt_tasksim.engines.remote.address import is_remote, parse_remote
-from bt_tasksim.engines.ros.address import is_ros, parse_ros
-from bt_tasksim.errors import InputError, MachineError, nearest
-from bt_tasksim.pacing import Clock, FreeClock, PacedPhysics, RealTimeClock
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.safety.engine import RealEngine
-from bt_tasksim.safety.guard import Guard
-from bt_tasksim.safety.guarded_robot import GuardedRobot
-from bt_tasksim.safety.guarded_simulation import GuardedSimulation
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.registry import parts
+from bt_tasksim.engines.base import (
+    ROLES,
+    Engine,
+    EngineSetup,
+    KinematicsEngine,
+    PhysicsEngine,
+    PostProcessEngine,
+    RenderingEngine,
+    engine_class,
+)
+from bt_tasksim.engines.clock import Clock, FreeClock, RealTimeClock
+from bt_tasksim.engines.kinematics.pinocchio import PATIENCE, PinocchioKinematics
+from bt_tasksim.engines.pacing import PacedPhysics
+from bt_tasksim.engines.perception.noise import noise_model
+from bt_tasksim.engines.pipeline import EnginePipeline
+from bt_tasksim.hardware.safety.engine import RealEngine
+from bt_tasksim.hardware.safety.guard import Guard
+from bt_tasksim.hardware.safety.guarded_robot import GuardedRobot
+from bt_tasksim.hardware.safety.guarded_simulation import GuardedSimulation
+from bt_tasksim.robot.description import RobotDescription
 
-KINEMATICS = ("pinocchio",)
-ENGINES = ("sapien", "mujoco")
-RENDERERS = ("sapien",)
-PERCEPTIONS = ("state", "camera")
-PATIENCE = 0.03
-"""Seconds for which the inverse kinematics of a real robot looks for another posture."""
-ROLES = {
-    "kinematics": KINEMATICS,
-    "physics": ENGINES,
-    "rendering": RENDERERS,
-    "postprocess": PERCEPTIONS,
-}
-"""Names of the engines by role; ``remote:HOST:PORT`` is one in another process, for each role."""
+_E = TypeVar("_E", bound=Engine)
 
 
 @dataclass(frozen=True)
@@ -67,49 +65,75 @@ class EngineOptions:
     ros: str = ""
 
     def __post_init__(self) -> None:
-        for what, name, known in (
-            ("engines", self.engines, ENGINES),
-            ("perception", self.perception, PERCEPTIONS),
-            ("kinematics", self.kinematics, KINEMATICS),
-            ("rendering", self.renderer, RENDERERS),
-        ):
-            if is_remote(name):
-                parse_remote(name)
-            elif what == "engines" and is_ros(name):
-                parse_ros(name)
-            elif name not in known:
-                raise InputError(f"unknown {what} '{name}'{nearest(name, known)}")
+        for role in ROLES:
+            engine_class(role, self.name_of(role))
         noise_model(self.noise)
         for limit in (self.timeout, self.connect_timeout):
             if not 0.0 < limit < 3600.0:
                 raise InputError(f"a time-out is a positive number of seconds below 3600, found {limit:g}")
 
+    def name_of(self, role: str) -> str:
+        """Name of the engine of a role."""
+        names = {
+            "kinematics": self.kinematics,
+            "physics": self.engines,
+            "rendering": self.renderer,
+            "postprocess": self.perception,
+        }
+        return names[role]
+
+    @property
+    def real(self) -> bool:
+        """The physics engine is a real robot."""
+        return engine_class("physics", self.engines).real
+
     @property
     def remote(self) -> bool:
-        """Some engine is in another process, which serves one client at a time; a robot does, too."""
-        return is_ros(self.engines) or any(
-            map(is_remote, (self.engines, self.perception, self.kinematics, self.renderer))
-        )
+        """Some engine is outside of this process and serves one client at a time; a robot does, too."""
+        return self.real or any(engine_class(role, self.name_of(role)).takes_address for role in ROLES)
 
     @property
     def label(self) -> str:
         """How results name the perception."""
-        if is_ros(self.engines) and self.perception == "state":
-            return "tracked"
-        return _told(self.perception, self.noise)
+        return engine_class("postprocess", self.perception).label(self.setup("postprocess"))
+
+    def setup(self, role: str, images: bool = False) -> EngineSetup:
+        """What the engine of a role is built from.
+
+        Args:
+            role: One of `ROLES`.
+            images: Perception works on images.
+        """
+        return EngineSetup(
+            self.name_of(role),
+            noise=self.noise,
+            images=images,
+            real=self.real,
+            key=self.key,
+            timeout=self.timeout,
+            connect_timeout=self.connect_timeout,
+            ros=self.ros,
+        )
 
 
-def _told(perception: str, noise: str) -> str:
-    return f"state, noise {noise}" if perception == "state" else perception
+def local_engines(role: str) -> tuple[str, ...]:
+    """Names of the engines of a role that are simulated in this process: no address, and no robot."""
+    found: dict[str, type[Engine]] = parts(f"engine/{role}")
+    return tuple(name for name, engine in found.items() if not engine.takes_address and not engine.real)
 
 
 def result_names(options: EngineOptions, pipeline: EnginePipeline) -> tuple[str, str]:
     """How results name physics and perception: an address says nothing of the engine behind it."""
     engines, perception = options.engines, options.label
-    if "physics" in pipeline.served:
-        engines = f"{engines} ({pipeline.served['physics']})"
-    if "postprocess" in pipeline.served:
-        perception = f"{perception} ({_told(pipeline.served['postprocess'], options.noise)})"
+    if served := pipeline.served.get("physics"):
+        engines = f"{engines} ({served})"
+    if served := pipeline.served.get("postprocess"):
+        known, setup = (
+            served in parts("engine/postprocess"),
+            replace(options.setup("postprocess"), name=served),
+        )
+        behind = engine_class("postprocess", served).label(setup) if known else served
+        perception = f"{perception} ({behind})"
     return engines, perception
 
 
@@ -117,39 +141,41 @@ def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePip
     """The pipeline for a robot.
 
     Raises:
-        InputError: An engine in another process is not one for this robot and version, or its key is no good.
+        InputError: An engine is not one for this robot, or an option makes no sense for it.
         MachineError: An engine cannot start on this machine, or does not answer from another process.
     """
-    if is_ros(options.engines):
-        return ros_pipeline(robot, options)
-    served: dict[str, str] = {}
+    if options.real:
+        _check_real(options)
     with ExitStack() as built:
 
-        def engine(role: str, name: str) -> Any:
-            if is_remote(name):
-                made = connect(role, name, robot, options)
-                served[role] = made.connection.engine
-            else:
-                made = build_engine(role, name, robot, options.noise)
-            if hasattr(made, "close"):
-                built.callback(made.close)
-            return made
+        def keep(engine: _E) -> _E:
+            built.callback(engine.close)
+            return engine
 
-        kinematics = engine("kinematics", options.kinematics)
-        physics = engine("physics", options.engines)
-        postprocess = engine("postprocess", options.perception)
-        rendering = None
-        if options.rendering or getattr(postprocess, "perception", "") == "camera":
-            rendering = engine("rendering", options.renderer)
-        clock: Clock = FreeClock()
-        if options.safety:
-            physics = GuardedSimulation(physics, Guard(robot, PinocchioKinematics(robot).forward))
-        if options.real_time:
-            clock = RealTimeClock()
-            physics = PacedPhysics(physics, clock)
+        kinematics = keep(KinematicsEngine.named(robot, options.setup("kinematics")))
+        postprocess = keep(PostProcessEngine.named(robot, options.setup("postprocess")))
+        images = postprocess.wants_images
+        if options.real:
+            real = keep(RealEngine.named(robot, options.setup("physics", images)))
+            pictures = real.rendering() if images else None
+            if images and pictures is None:
+                raise InputError(
+                    f"'{options.engines}' has no cameras, and perception '{options.perception}' needs some"
+                )
+            pipeline = robot_pipeline(robot, real, postprocess, pictures, kinematics)
+        else:
+            physics = keep(PhysicsEngine.named(robot, options.setup("physics", images)))
+            rendering = None
+            if options.rendering or images:
+                rendering = keep(RenderingEngine.named(robot, options.setup("rendering")))
+            clock: Clock = FreeClock()
+            if options.safety:
+                physics = GuardedSimulation(physics, _guard(robot))
+            if options.real_time:
+                clock = RealTimeClock()
+                physics = PacedPhysics(physics, clock)
+            pipeline = EnginePipeline(kinematics, physics, postprocess, rendering, clock)
         built.pop_all()  # all of them are there: they stay
-    pipeline = EnginePipeline(kinematics, physics, postprocess, rendering, clock)
-    pipeline.served = served
     return pipeline
 
 
@@ -158,108 +184,44 @@ def robot_pipeline(
     engine: RealEngine,
     postprocess: PostProcessEngine,
     rendering: RenderingEngine | None = None,
+    kinematics: KinematicsEngine | None = None,
 ) -> EnginePipeline:
     """The pipeline for a real robot: behind the guard, in real time, with a watchdog.
 
     Raises:
         InputError: The robot's file does not say its safety limits.
     """
-    kinematics, clock = PinocchioKinematics(robot, patience=PATIENCE), RealTimeClock()
-    physics = GuardedRobot(engine, Guard(robot, kinematics.forward), clock)
+    clock = RealTimeClock()
+    physics = GuardedRobot(engine, _guard(robot), clock)
+    kinematics = kinematics or PinocchioKinematics(robot, patience=PATIENCE)
     return EnginePipeline(kinematics, physics, postprocess, rendering, clock)
 
 
-def ros_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePipeline:
-    """The pipeline for a robot behind rosbridge; what perception adds in simulation, reality has already.
-
-    Raises:
-        InputError: The robot's files are no good, or an option makes no sense for a robot.
-    """
-    from bt_tasksim.engines.ros.cameras import RosCameras
-    from bt_tasksim.engines.ros.engine import RosRobot
-    from bt_tasksim.engines.ros.setting import load_setting
-
-    for what, name in (("kinematics", options.kinematics), ("perception", options.perception)):
-        if is_remote(name):
-            raise InputError(f"a robot's {what} runs in this process, not at '{name}'")
-    if options.rendering:
-        raise InputError("the run of a robot cannot be drawn: leave --video away, and film it")
-    setting, tracked = load_setting(robot, options.ros), options.perception == "state"
-    kinematics = PinocchioKinematics(robot)
-    engine = RosRobot(robot, setting, parse_ros(options.engines), kinematics, tracked)
-    postprocess: PostProcessEngine
-    if tracked:
-        from bt_tasksim.engines.postprocess_state import StatePostProcess
-
-        postprocess = StatePostProcess(robot, noise_model("none"))
-    else:
-        from bt_tasksim.engines.camera_errors import PERFECT
-        from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
-
-        postprocess = CameraPostProcess(robot, PERFECT, background=True)
-    rendering = RosCameras(engine) if not tracked else None
-    return robot_pipeline(robot, engine, postprocess, rendering)
-
-
-def build_engine(role: str, name: str, robot: RobotDescription, noise: str = "fine") -> Any:
-    """One engine in this process.
+def build_engine(role: str, name: str, robot: RobotDescription, noise: str = "fine") -> Engine:
+    """One engine.
 
     Args:
         role: One of `ROLES`.
         name: Its name.
         robot: The robot.
-        noise: Name of the noise model, for post-process ``state``.
+        noise: Name of the noise model of estimated poses.
 
     Raises:
         InputError: There is no such role or engine.
         MachineError: The engine cannot start on this machine.
     """
-    if role not in ROLES:
-        raise InputError(f"unknown role of an engine '{role}'{nearest(role, ROLES)}")
-    match role, name:
-        case "kinematics", "pinocchio":
-            return PinocchioKinematics(robot)
-        case "physics", "sapien":
-            from bt_tasksim.engines.physics_sapien import SapienPhysics
-
-            return SapienPhysics(robot)
-        case "physics", "mujoco":
-            from bt_tasksim.engines.physics_mujoco import MujocoPhysics
-
-            return MujocoPhysics(robot)
-        case "rendering", "sapien":
-            from bt_tasksim.engines.rendering_sapien import SapienRendering
-
-            return SapienRendering()
-        case "postprocess", "camera":
-            from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
-
-            return CameraPostProcess(robot)
-        case "postprocess", "state":
-            from bt_tasksim.engines.postprocess_state import StatePostProcess
-
-            return StatePostProcess(robot, noise_model(noise))
-        case _:
-            raise InputError(f"unknown {role} engine '{name}'{nearest(name, ROLES[role])}")
+    return engine_class(role, name).create(robot, EngineSetup(name, noise=noise))
 
 
-def connect(role: str, name: str, robot: RobotDescription, options: EngineOptions) -> Any:
-    """One engine in another process, see `bt_tasksim.engines.remote`.
+def _guard(robot: RobotDescription) -> Guard:
+    return Guard(robot, PinocchioKinematics(robot).forward)
 
-    Raises:
-        InputError: It is not one for this robot and version, or the key is no good.
-        MachineError: It does not answer.
-    """
-    try:
-        from bt_tasksim.engines.remote.client import Connection, Limits
-        from bt_tasksim.engines.remote.engines import ENGINES as REMOTE
-        from bt_tasksim.engines.remote.engines import RemotePostProcess
-        from bt_tasksim.engines.remote.keys import CLIENT, load_key
-    except ImportError as error:
-        raise MachineError(
-            f"engines in other processes need the extra 'remote' ({error}): pip install 'bt-tasksim[remote]'"
-        ) from error
-    key = load_key(options.key, CLIENT) if options.key else None
-    limits = Limits(connect=options.connect_timeout, step=options.timeout)
-    connection = Connection(parse_remote(name), role, robot, key, limits)
-    return RemotePostProcess(connection, options.noise) if role == "postprocess" else REMOTE[role](connection)
+
+def _check_real(options: EngineOptions) -> None:
+    """What perception adds in simulation, reality has already; and nobody waits for other processes."""
+    for role, what in (("kinematics", "kinematics"), ("postprocess", "perception")):
+        name = options.name_of(role)
+        if engine_class(role, name).takes_address:
+            raise InputError(f"a robot's {what} runs in this process, not at '{name}'")
+    if options.rendering:
+        raise InputError("the run of a robot cannot be drawn: leave --video away, and film it")

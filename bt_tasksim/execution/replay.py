@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import InputError
-from bt_tasksim.report.run_log import RunRecorder, nodes_of, read_text, versions
-from bt_tasksim.runner import Result, Runner
-from bt_tasksim.scene import ActorConfiguration, Scene
-from demos_decomp.log import Demonstration
-from demos_decomp.log_file import read_log
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.demos_decomp.log import Demonstration
+from bt_tasksim.demos_decomp.log_file import read_log
+from bt_tasksim.execution.recorded import Given, comparable, recorded_run, take_policies
+from bt_tasksim.execution.result import Result
+from bt_tasksim.execution.run_log import RunRecorder, versions
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.trees.load import Leaves
 
 COMPARED = {
     "state/joint_position": ("joint positions", "rad or m"),
@@ -58,105 +58,84 @@ class ReplayResult:
     result: Result
 
 
-def replay(run: str | Path, tree: Behaviour | None = None) -> ReplayResult:
+def replay(
+    run: str | Path,
+    tree: Behaviour | None = None,
+    *,
+    robot: str | None = None,
+    policies: Sequence[tuple[str, str]] = (),
+    objects: str | Path | None = None,
+    nodes: Leaves | None = None,
+) -> ReplayResult:
     """Run a recorded run again with everything as it was, and compare.
+
+    A log is believed in numbers and names only (see `bt_tasksim.execution.recorded`): it runs in this
+    machine's own simulation, with bundled robots, meshes and policies, and with what is named here.
 
     Args:
         run: A run's folder, or its log.
         tree: Its tree, where it has leaves that XML cannot hold or that are not found by name.
+        robot: Its robot, where that is not a bundled one.
+        policies: Concepts and their policies, where those are not bundled ones.
+        objects: Folder of its mesh files, where those are not bundled ones.
+        nodes: Concepts and conditions of one's own by name, for a tree from the log.
 
     Raises:
-        InputError: There is no such log, it is none of a run in simulation, or its tree cannot be built.
+        InputError: There is no such log, it is none of a run in simulation, its tree cannot be built, or it
+            wants a file or robot that has to be named here.
         MachineError: An engine cannot start.
     """
     path = Path(run) / "run.h5" if Path(run).is_dir() else Path(run)
+    where, given = f"'{path}'", Given(robot, policies, objects, nodes or {})
     log = read_log(path)
-    recorded = log.demonstrations[0]
-    parts = _parts(recorded, path)
-    if log.source != "simulation":
-        raise InputError(f"'{path}' was recorded on a robot; only runs in simulation can be replayed")
-    about = json.loads(parts["run/about"])
-    configuration = ActorConfiguration.from_json(parts["run/configuration"])
-    root = tree if tree is not None else _tree(parts["run/tree"], path)
-    _take_policies(root, recorded, path)
-    runner = Runner(
-        root,
-        Scene(configuration.robot),
-        _options(about, path),
-        longest=float(about["longest"]),
-    )
-    assert runner.pipeline is not None
-    recorder = RunRecorder(runner, str(about["scenario"]))
+    if log.source != "simulation" and "run/about" in log.demonstrations[0].extra:
+        raise InputError(f"{where} was recorded on a robot; only runs in simulation can be replayed")
+    recorded = recorded_run(log.demonstrations[0], given, where)
+    compared = comparable(recorded.demonstration, tuple(COMPARED), where)
+    root = tree if tree is not None else _tree(recorded.tree, given, where)
+    take_policies(root, recorded, given, where, trusted=tree is not None)
+    runner = Runner(root, Scene(recorded.configuration.robot), recorded.options, longest=recorded.longest)
+    recorder = RunRecorder(runner, recorded.scenario)
     try:
-        result = runner.finish(configuration, runner.reset(configuration), record=recorder)
+        world = runner.reset(recorded.configuration)
+        result = runner.finish(recorded.configuration, world, record=recorder)
     finally:
         runner.pipeline.close()
     repeated = recorder.demonstration(result)
-    before, now = about["versions"], versions(runner.robot)
-    before |= _policies(about["policies"])
-    now |= _policies(result.policies)
+    before, now = recorded.versions, versions(runner.robot)
+    now |= {f"policy of '{leaf}'": name for leaf, name in result.policies.items()}
     changed = {
         name: (before.get(name, "none"), now.get(name, "none"))
         for name in sorted({*before, *now})
         if before.get(name) != now.get(name)
     }
-    return _compared(recorded, repeated, result, changed)
+    return _compared(recorded.demonstration, compared, repeated, result, changed)
 
 
-def _parts(recorded: Demonstration, path: Path) -> dict[str, str]:
-    names = ("run/about", "run/configuration", "run/tree")
-    if any(name not in recorded.extra for name in (*names, "tree/status")):
-        raise InputError(f"'{path}' is a demonstration, not the log of a run; only a run can be replayed")
-    return {name: read_text(recorded.extra[name]) for name in names}
-
-
-def _options(about: Mapping[str, Any], path: Path) -> EngineOptions:
-    known = {field.name for field in fields(EngineOptions)}
-    unknown = set(about["options"]) - known
-    if unknown:
-        raise InputError(
-            f"'{path}' was run with the option '{min(unknown)}', which this version does not have"
-        )
-    return EngineOptions(**{**about["options"], "rendering": False, "real_time": False})
-
-
-def _tree(text: str, path: Path) -> Behaviour:
-    from trees.xml_reader import tree_from_xml
+def _tree(text: str, given: Given, where: str) -> Behaviour:
+    from bt_tasksim.trees.xml_reader import tree_from_xml
 
     if not text:
-        raise InputError(f"'{path}' does not hold its tree, which XML could not; replay it from Python")
-    return tree_from_xml(text, source=f"{path}: run/tree")
-
-
-def _take_policies(root: Behaviour, recorded: Demonstration, path: Path) -> None:
-    """Have each leaf take the policy that it had, whatever is pinned by now."""
-    if "run/policies" not in recorded.extra:  # an older log: all were programmed
-        return
-    nodes = nodes_of(root)
-    for entry in json.loads(read_text(recorded.extra["run/policies"])):
-        leaf = nodes[entry["node"]] if entry["node"] < len(nodes) else None
-        if not isinstance(leaf, ConceptModel):
-            raise InputError(f"'{path}' was recorded with another tree; give that one")
-        if entry["source"]:
-            leaf.policy = entry["source"]
-
-
-def _policies(names: Mapping[str, str]) -> dict[str, str]:
-    return {f"policy of '{leaf}'": name for leaf, name in names.items()}
+        raise InputError(f"{where} does not hold its tree, which XML could not; replay it from Python")
+    return tree_from_xml(text, given.nodes, source=f"{where}: run/tree")
 
 
 def _compared(
-    recorded: Demonstration, repeated: Demonstration, result: Result, changed: dict[str, tuple[str, str]]
+    recorded: Demonstration,
+    compared: Mapping[str, NDArray[Any]],
+    repeated: Demonstration,
+    result: Result,
+    changed: dict[str, tuple[str, str]],
 ) -> ReplayResult:
     count = min(len(recorded.time), len(repeated.time))
     first, differences = count, {}
     for name in COMPARED:
-        if name not in recorded.extra and name not in repeated.extra:
+        if name not in compared and name not in repeated.extra:
             continue
-        if name not in recorded.extra or name not in repeated.extra:
+        if name not in compared or name not in repeated.extra:
             first, differences[name] = 0, float("inf")
             continue
-        gap = _gap(recorded.extra[name], repeated.extra[name], count)
+        gap = _gap(compared[name], repeated.extra[name], count)
         if (gap > 0).any():
             first = min(first, int(np.argmax(gap > 0)))
             differences[name] = float(gap.max())

@@ -30,14 +30,16 @@ from numpy.typing import NDArray
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept import ConceptNode
-from bt_tasksim.engines.registry import result_names
-from bt_tasksim.errors import InputError
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.runner import Result, Runner, Step
-from bt_tasksim.world import Observation, WorldModel
-from demos_decomp.log import Demonstration, Log, Surface, Track, Video
-from demos_decomp.log_file import write_log
+from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.world import Observation, WorldModel
+from bt_tasksim.demos_decomp.log import Demonstration, Log, Surface, Track, Video
+from bt_tasksim.demos_decomp.log_file import write_log
+from bt_tasksim.execution.pipelines import result_names
+from bt_tasksim.execution.result import Result
+from bt_tasksim.execution.runner import Runner, Step
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.trees.walk import nodes_of
 
 STATUSES = {Status.INVALID: 0, Status.RUNNING: 1, Status.SUCCESS: 2, Status.FAILURE: 3}
 """Numbers in ``tree/status``."""
@@ -52,6 +54,12 @@ PACKAGES = (
     "opencv-python-headless",
 )
 """Packages whose versions a log names, where they are installed."""
+ABOUT = frozenset((
+    "status", "success", "reason", "why", "leaf", "outcome", "scenario", "seed", "stream", "robot", "engines",
+    "perception", "options", "longest", "policies", "control_steps", "control_frequency", "sim_time",
+    "wall_time", "timing", "verdict", "versions",
+))  # fmt: skip
+"""What a log says about a run, see `about`."""
 STATE = ("joint_position", "joint_velocity", "joint_effort", "objects", "velocities")
 """Fields of `WorldState` that are kept as they are."""
 
@@ -152,7 +160,7 @@ class RunRecorder:
         said = list(self._said)
         if result.status == Status.INVALID and self._times:  # stopped from outside the tree
             time = min(result.sim_time, self._times[-1])
-            said.append((time, 0, f"stopped: {result.reason}: {result.why}"))
+            said.append((time, 0, f"stopped: {result.why}"))
             said.sort(key=lambda message: message[0])
         true = "state/objects" in extra
         poses = extra["state/objects" if true else "observations/objects"]
@@ -207,23 +215,13 @@ class RunRecorder:
                 or fewer than two ticks.
             MachineError: The disk is full or not writable.
         """
-        source = "robot" if result.verdict is None else "simulation"
+        source = "robot" if self.runner.pipeline.real else "simulation"
         write_log(path, Log(source, (self.demonstration(result, video),), result.why))
-
-
-def nodes_of(tree: Behaviour) -> list[Behaviour]:
-    """A tree's nodes, parents before their children, in the order of the tree."""
-    found, stack = [], [tree]
-    while stack:
-        node = stack.pop()
-        found.append(node)
-        stack.extend(reversed(node.children))
-    return found
 
 
 def describe_nodes(nodes: list[Behaviour]) -> list[dict[str, Any]]:
     """Name, type and parent (index, -1 for the root) of each node, as plain data."""
-    from trees.vocabulary import kind_of
+    from bt_tasksim.trees.vocabulary import kind_of
 
     index = {id(node): i for i, node in enumerate(nodes)}
     out = []
@@ -254,7 +252,7 @@ def policies_of(nodes: list[Behaviour]) -> list[dict[str, Any]]:
 
 def tree_text(tree: Behaviour) -> str:
     """A tree as XML; empty where it holds nodes that XML cannot."""
-    from trees.xml_writer import tree_to_xml
+    from bt_tasksim.trees.xml_writer import tree_to_xml
 
     try:
         return tree_to_xml(tree)
@@ -265,18 +263,14 @@ def tree_text(tree: Behaviour) -> str:
 def about(result: Result, runner: Runner, scenario: str) -> dict[str, Any]:
     """A run in plain data: what was run with what, and what became of it; this is ``result.json``."""
     options, verdict = runner.options, result.verdict
-    assert runner.pipeline is not None
     engines, perception = result_names(options, runner.pipeline)
-    numbers = dataclasses.asdict(verdict) if verdict is not None else None
-    if numbers is not None:
-        numbers = {
-            k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in numbers.items()
-        }
     return {
         "status": result.status.name,
         "success": result.success,
         "reason": result.reason,
         "why": result.why,
+        "leaf": result.leaf,
+        "outcome": result.outcome.to_data(),
         "scenario": scenario,
         "seed": result.seed,
         "stream": result.configuration.stream,
@@ -293,7 +287,7 @@ def about(result: Result, runner: Runner, scenario: str) -> dict[str, Any]:
         "timing": None
         if result.timing is None
         else {**dataclasses.asdict(result.timing), "summary": str(result.timing)},
-        "verdict": numbers,
+        "verdict": None if verdict is None else verdict.to_data(),
         "versions": versions(runner.robot),
     }
 
@@ -362,9 +356,9 @@ def _texts(texts: list[str]) -> NDArray[np.bytes_]:
 def read_text(values: NDArray[Any]) -> str:
     """A text of `Demonstration.extra`, such as ``run/tree``."""
     value: Any = values.item() if isinstance(values, np.ndarray) else values
-    return (value.decode() if isinstance(value, bytes) else str(value)).strip()
+    return (value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)).strip()
 
 
 def read_texts(values: NDArray[Any]) -> list[str]:
     """Several texts of `Demonstration.extra`, such as ``messages/text``."""
-    return [v.decode() if isinstance(v, bytes) else str(v) for v in values.tolist()]
+    return [v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v) for v in values.tolist()]

@@ -1,14 +1,15 @@
-"""The command ``bt-tasksim serve-engine``."""
+"""An engine served to another process: ``bt-tasksim serve-engine``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 
-from bt_tasksim.engines.registry import build_engine
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.engines.base import engine_class
 from bt_tasksim.engines.remote.address import listening
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.robot import load_robot
+from bt_tasksim.execution.pipelines import build_engine
+from bt_tasksim.robot.description import load_robot
 
 
 def serve(
@@ -26,7 +27,7 @@ def serve(
     """Serve an engine until an interrupt.
 
     Args:
-        role: Its role, see `bt_tasksim.engines.registry.ROLES`.
+        role: Its role, see `bt_tasksim.engines.base.ROLES`.
         name: Its name.
         robot: Name or file of the robot.
         host: IP address to listen at.
@@ -49,6 +50,10 @@ def serve(
         raise MachineError(
             f"serving an engine needs the extra 'remote' ({error}): pip install 'bt-tasksim[remote]'"
         ) from error
+    found = engine_class(role, name)
+    if found.real or found.takes_address:
+        what = "is a robot, which runs behind its guard" if found.real else "is elsewhere already"
+        raise InputError(f"'{name}' {what}: only engines that are simulated in one process are served")
     address = listening(host, port)
     own = load_key(key, SERVER) if key is not None else None
     check_address(address, own)

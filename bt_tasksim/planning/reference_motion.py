@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.poses import Array, array_namespace
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array, array_namespace
 
 SHARP = np.cos(np.radians(100.0))
 """Cosine of the angle between two segments from which on a path turns back. The way round such a corner has

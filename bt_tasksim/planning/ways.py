@@ -17,10 +17,10 @@ from typing import Any
 import networkx as nx
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.errors import NoWayError
-from bt_tasksim.poses import Array
-from bt_tasksim.world import Obstacle
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Obstacle
 
 MARGIN = 0.012
 """Metres of free space kept around everything."""

@@ -12,14 +12,15 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import safetensors.numpy
 
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.files import whole_folder, write_bytes, write_text
-from bt_tasksim.network import Network
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.files import whole_folder, write_bytes, write_text
+from bt_tasksim.core.json_text import parse_json
+from bt_tasksim.policy.network import Network
 
 VERSION = 1
 """Version of the card that is written, and the only one that is read."""
@@ -101,6 +102,22 @@ class PolicyCard:
         return {"features": [list(pair) for pair in self.features], "actions": self.actions}
 
 
+class PolicySlot(NamedTuple):
+    """What a policy has to fit: a concept on a robot.
+
+    Attributes:
+        concept: The concept's class name in lower case.
+        robot: The robot's name.
+        layout: Names and sizes of the concept's features for this robot, in order.
+        actions: Size of the concept's motion part.
+    """
+
+    concept: str
+    robot: str
+    layout: Mapping[str, int]
+    actions: int
+
+
 def save_policy(folder: str | Path, network: Network, card: PolicyCard) -> PolicyCard:
     """Write a policy, whole or not at all; an older policy in the folder is replaced.
 
@@ -171,29 +188,25 @@ def load_card(folder: str | Path) -> PolicyCard:
     file = folder / CARD
     text = _read(file, f"policy '{folder}' has no {CARD}; name a folder that training has written")
     try:
-        content = json.loads(text, parse_constant=_no_constant)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"card '{file}' is not JSON: {error}; copy the policy's folder again") from error
+        content = parse_json(text, f"card '{file}'")
+    except InputError as error:
+        raise InputError(f"{error}; copy the policy's folder again") from error
     return _card(content, f"card '{file}'")
 
 
-def check_fits(
-    card: PolicyCard, folder: str | Path, concept: str, robot: str, layout: Mapping[str, int], actions: int
-) -> None:
+def check_fits(card: PolicyCard, folder: str | Path, slot: PolicySlot) -> None:
     """Check that a policy is for a concept on a robot.
 
     Args:
         card: The policy's card.
         folder: Its folder, for the sentence.
-        concept: The concept's class name in lower case.
-        robot: The robot's name.
-        layout: Names and sizes of the concept's features for this robot, in order.
-        actions: Size of the concept's motion part.
+        slot: What it has to fit.
 
     Raises:
-        InputError: It is not; says what differs.
+        InputError: It does not; says what differs.
     """
     owner = f"policy '{folder}'"
+    concept, robot, layout, actions = slot
     if card.concept != concept:
         raise InputError(
             f"{owner} is for the concept '{card.concept}', not for '{concept}'; name another one"
@@ -352,10 +365,6 @@ def _read(file: Path, missing: str) -> bytes:
         raise InputError(missing) from None
     except OSError as error:
         raise InputError(f"'{file}' cannot be read: {error.strerror or error}") from error
-
-
-def _no_constant(name: str) -> Any:
-    raise ValueError(f"{name} is no number in JSON")
 
 
 def _short(value: Any) -> str:

@@ -10,16 +10,16 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar, Protocol
 
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.files import write_text
-from bt_tasksim.policy_files import FILES, PolicyCard, check_fits, load_card, load_policy
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import load_robot
-
-if TYPE_CHECKING:
-    from bt_tasksim.concept import ConceptModel
+from bt_tasksim.core.bounded_text import read_text
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.files import write_text
+from bt_tasksim.core.json_text import parse_json
+from bt_tasksim.core.registry import parts
+from bt_tasksim.core.resources import asset
+from bt_tasksim.policy.files import FILES, PolicyCard, PolicySlot, check_fits, load_card, load_policy
+from bt_tasksim.robot.description import RobotDescription, load_robot
 
 PROGRAMMED = "programmed"
 """Name of the policy that is a concept's own."""
@@ -28,6 +28,17 @@ NEVER = "never measured"
 
 Pins = dict[str, dict[str, str]]
 """Names of policies by concept and robot."""
+
+
+class Learnable(Protocol):
+    """What the list of policies knows of a concept."""
+
+    actions: ClassVar[int]
+    """Size of the action's motion part."""
+
+    @classmethod
+    def layout(cls, robot: RobotDescription) -> Mapping[str, int]:
+        """Names and sizes of what a learned policy sees, in order."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +96,11 @@ def find_policy(name: str) -> Path | None:
     raise InputError(f"no policy '{name}'{nearest(name, [PROGRAMMED, *known])} (or give a policy's folder)")
 
 
+def is_bundled(name: str) -> bool:
+    """Whether a leaf that names this gets the programmed policy, or one of ``assets/policies``."""
+    return name == PROGRAMMED or name in _policy_folders(asset("policies"))
+
+
 def source_of(folder: Path) -> str:
     """What a leaf has to name to get this policy again, from any working folder."""
     whole = folder.resolve()
@@ -117,12 +133,10 @@ def read_pins() -> Pins:
         InputError: The file does not hold pins.
     """
     file = asset("policies", PINS)
-    try:
-        content = json.loads(file.read_text(encoding="utf-8") or "{}")
-    except FileNotFoundError:
+    if not file.exists():
         return {}
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"pins '{file}' cannot be read: {error}") from error
+    owner = f"pins '{file}'"
+    content: Any = parse_json(read_text(file, owner) or "{}", owner)
     if not isinstance(content, dict):
         raise InputError(f"pins '{file}' should map concepts to robots to names of policies")
     for concept, robots in content.items():
@@ -131,7 +145,7 @@ def read_pins() -> Pins:
     return content
 
 
-def pin(name: str, concepts: Mapping[str, type[ConceptModel]]) -> PolicyCard:
+def pin(name: str, concepts: Mapping[str, type[Learnable]]) -> PolicyCard:
     """Have leaves of a policy's concept take it on its robot, where they name none.
 
     Args:
@@ -184,7 +198,7 @@ def unpin(concept: str, robot: str) -> str:
 
 
 def list_policies(
-    folder: str | Path | None = None, concepts: Mapping[str, type[ConceptModel]] | None = None
+    folder: str | Path | None = None, concepts: Mapping[str, type[Learnable]] | None = None
 ) -> list[PolicyEntry]:
     """The policies in a folder, damaged ones with their problem.
 
@@ -227,12 +241,12 @@ def measured_text(measured: Mapping[str, Any]) -> str:
     return f"{text}, {how}" if how else text
 
 
-def _entry(name: str, folder: Path, pins: Pins, concepts: Mapping[str, type[ConceptModel]]) -> PolicyEntry:
+def _entry(name: str, folder: Path, pins: Pins, concepts: Mapping[str, type[Learnable]]) -> PolicyEntry:
     card, problem = None, ""
     try:
         card = load_card(folder)
         load_policy(folder)
-        if card.concept in concepts and asset("robots", f"{card.robot}.yaml").is_file():
+        if card.concept in concepts and card.robot in parts("robot"):
             _check_as_it_is(card, folder, concepts[card.concept])
     except InputError as error:
         problem = str(error)
@@ -240,10 +254,11 @@ def _entry(name: str, folder: Path, pins: Pins, concepts: Mapping[str, type[Conc
     return PolicyEntry(name, folder, card, problem, pinned)
 
 
-def _check_as_it_is(card: PolicyCard, folder: Path, concept: type[ConceptModel]) -> None:
+def _check_as_it_is(card: PolicyCard, folder: Path, concept: type[Learnable]) -> None:
     """Check that a policy fits its concept and robot as they are now."""
     robot = load_robot(card.robot)
-    check_fits(card, folder, card.concept, robot.name, concept.layout(robot), concept.actions)
+    slot = PolicySlot(card.concept, robot.name, concept.layout(robot), concept.actions)
+    check_fits(card, folder, slot)
 
 
 def _write_pins(pins: Pins) -> None:

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bt_tasksim.errors import InputError
-from bt_tasksim.poses import Array, array_namespace, constant
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array, array_namespace, constant
 
 CLIP = 10.0
 """Standard deviations beyond which a normalised feature is cut off."""
-_DEVIATION_FLOOR = 1e-3
+_STD_FLOOR = 1e-3
 _SIGNAL = "signal_deviation"
 
 
@@ -20,10 +20,10 @@ class Network:
 
     Args:
         mean: Means ``(n,)`` of the features.
-        deviation: Their standard deviations ``(n,)``.
+        std: Their standard deviations ``(n,)``.
         layers: Weights ``(out, in)`` and biases ``(out,)``, in order.
-        signal_deviation: Standard deviation of the noise on the last output in training, where that output
-            is a completion signal, see `bt_tasksim.policy.done_share`.
+        signal_std: Standard deviation of the noise on the last output in training, where that output
+            is a completion signal, see `bt_tasksim.policy.policy.done_share`.
 
     Raises:
         InputError: The shapes do not fit together, or a number is not finite.
@@ -32,18 +32,18 @@ class Network:
     def __init__(
         self,
         mean: Array,
-        deviation: Array,
+        std: Array,
         layers: Sequence[tuple[Array, Array]],
-        signal_deviation: float = 0.0,
+        signal_std: float = 0.0,
     ) -> None:
-        as_float = [np.ascontiguousarray(a, np.float32) for a in (mean, deviation)]
-        self.mean, self.deviation = as_float
+        as_float = [np.ascontiguousarray(a, np.float32) for a in (mean, std)]
+        self.mean, self.std = as_float
         self.layers = tuple(
             (np.ascontiguousarray(w, np.float32), np.ascontiguousarray(b, np.float32)) for w, b in layers
         )
-        self.signal_deviation = float(signal_deviation)
+        self.signal_std = float(signal_std)
         self._check()
-        self._scale = 1.0 / np.maximum(self.deviation, np.float32(_DEVIATION_FLOOR))
+        self._scale = 1.0 / np.maximum(self.std, np.float32(_STD_FLOOR))
 
     @property
     def inputs(self) -> int:
@@ -83,9 +83,9 @@ class Network:
 
     def arrays(self) -> dict[str, Array]:
         """Everything by name, for a file."""
-        out = {"mean": self.mean, "deviation": self.deviation}
-        if self.signal_deviation != 0.0:
-            out[_SIGNAL] = np.array([self.signal_deviation], np.float32)
+        out = {"mean": self.mean, "deviation": self.std}
+        if self.signal_std != 0.0:
+            out[_SIGNAL] = np.array([self.signal_std], np.float32)
         for k, (w, b) in enumerate(self.layers):
             out[f"layer{k}.weight"], out[f"layer{k}.bias"] = w, b
         return out
@@ -113,17 +113,15 @@ class Network:
         if not self.layers:
             raise InputError("a network needs at least one layer")
         n = self.mean.shape[0] if self.mean.ndim == 1 else -1
-        if self.deviation.shape != (n,):
-            raise InputError(
-                f"a network's mean {self.mean.shape} and deviation {self.deviation.shape} differ"
-            )
+        if self.std.shape != (n,):
+            raise InputError(f"a network's mean {self.mean.shape} and std {self.std.shape} differ")
         for k, (w, b) in enumerate(self.layers):
             if w.ndim != 2 or w.shape[1] != n or b.shape != (w.shape[0],):
                 raise InputError(
                     f"a network's layer {k} has weights {w.shape} after {n} inputs, bias {b.shape}"
                 )
             n = w.shape[0]
-        if self.signal_deviation < 0.0:
-            raise InputError(f"a network's {_SIGNAL} is negative, {self.signal_deviation:g}")
+        if self.signal_std < 0.0:
+            raise InputError(f"a network's {_SIGNAL} is negative, {self.signal_std:g}")
         if not all(np.isfinite(a).all() for a in self.arrays().values()):
             raise InputError("a network holds a number that is not finite")

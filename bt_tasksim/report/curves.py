@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bt_tasksim.report.run_log import read_text, read_texts
-from bt_tasksim.robot import RobotDescription, load_robot
-from demos_decomp.log import Demonstration
+from bt_tasksim.demos_decomp.log import Demonstration
+from bt_tasksim.execution.run_log import read_text, read_texts
+from bt_tasksim.robot.description import RobotDescription, load_robot
 
 Curve = dict[str, Any]
 Panel = dict[str, Any]

@@ -6,10 +6,11 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.result import Result
+from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report.video import VideoRecorder
-from bt_tasksim.runner import Result, Runner
-from bt_tasksim.scene import Scene
+from bt_tasksim.scene.scene import Scene
 
 
 def run(
@@ -37,7 +38,6 @@ def run(
     if options is None:
         options = EngineOptions(**({"rendering": video is not None} | engines))
     runner = Runner(tree, scene, options)
-    assert runner.pipeline is not None
     try:
         if video is None:
             return runner.run(seed)

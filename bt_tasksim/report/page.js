@@ -22,7 +22,7 @@ function header() {
   outcome.className = a.success ? "good" : "bad";
   make("b", {}, outcome, a.success ? "success" : "failure");
   const why = a.why || (a.success ? "the tree ended with SUCCESS" : a.reason);
-  outcome.append(a.success || !a.reason || why.includes(a.reason) ? why : `${a.reason}: ${why}`);
+  outcome.append(why);
   const names = [...new Set(Object.values(a.policies))];
   const policies = names.length === 1
     ? `all ${names[0]}`

@@ -14,11 +14,11 @@ from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.files import write_text
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.files import write_text
+from bt_tasksim.demos_decomp.log import Demonstration
 from bt_tasksim.report.curves import report_data
 from bt_tasksim.report.tree_picture import tree_svg
-from demos_decomp.log import Demonstration
 
 NO_VIDEO = "This run was not filmed."
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,39 +9,13 @@ from py_trees.behaviour import Behaviour
 from py_trees.composites import Composite
 from py_trees.decorators import Decorator
 
-from bt_tasksim.concept import ConceptModel, Condition
-from bt_tasksim.parameters import Parameter
-from trees.decorators import SubTree
-from trees.vocabulary import Kind, kind_of
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Parameter
+from bt_tasksim.trees.nodes.base import NodeKind
+from bt_tasksim.trees.nodes.subtree import SubTree
+from bt_tasksim.trees.vocabulary import kind_of
 
-SYMBOLS = {
-    "Sequence": "→",
-    "Fallback": "?",
-    "ReactiveSequence": "→ᴿ",
-    "ReactiveFallback": "?ᴿ",
-    "Parallel": "⇉",
-    "Inverter": "¬",
-    "RetryUntilSuccessful": "↺",
-    "Repeat": "↻",
-    "Timeout": "◷",
-    "ForceSuccess": "✓",
-    "ForceFailure": "✗",
-    "Train": "✎",
-}
-WORDS = {
-    "Sequence": "sequence",
-    "Fallback": "fallback",
-    "ReactiveSequence": "reactive sequence",
-    "ReactiveFallback": "reactive fallback",
-    "Parallel": "parallel",
-    "Inverter": "not",
-    "RetryUntilSuccessful": "retry",
-    "Repeat": "repeat",
-    "Timeout": "time-out",
-    "ForceSuccess": "force success",
-    "ForceFailure": "force failure",
-    "Train": "train",
-}
 SETTING_UNITS = {"timeout": "s", "tolerance": "m", "policy": ""}
 
 
@@ -52,7 +25,7 @@ class Label:
 
     Attributes:
         shape: ``control``, ``decorator``, ``subtree``, ``condition``, ``concept`` or ``other``.
-        symbol: A sign for control nodes and decorators; empty for the others.
+        symbol: A sign; empty for none.
         title: One line.
         details: Further lines: arguments that are not defaults, with units.
     """
@@ -79,15 +52,6 @@ def label_of(node: Behaviour) -> Label:
     return Label(shape, "", node.name, (name,) if name != node.name else ())
 
 
-def preorder(root: Behaviour) -> Iterator[tuple[int, Behaviour]]:
-    """Depth and node, each node before its children."""
-    stack = [(0, root)]
-    while stack:
-        depth, node = stack.pop()
-        yield depth, node
-        stack.extend((depth + 1, child) for child in reversed(node.children))
-
-
 def tree_text(root: Behaviour) -> str:
     """A tree as lines of text, one a node.
 
@@ -112,28 +76,10 @@ def _line(node: Behaviour) -> str:
     return f"{head}  ({', '.join(label.details)})" if label.details else head
 
 
-def _kind_label(node: Behaviour, kind: Kind) -> Label:
-    word, values = WORDS[kind.tag], kind.read(node)
-    match kind.tag:
-        case "Parallel":
-            total = len(node.children)
-            word += f", {_count(values['success_count'], total)} must succeed"
-            if values["failure_count"] != 1:
-                word += f", {_count(values['failure_count'], total)} failed ends it"
-        case "RetryUntilSuccessful":
-            word += " without end" if values["num_attempts"] < 0 else f" up to {values['num_attempts']} times"
-        case "Repeat":
-            word += " without end" if values["num_cycles"] < 0 else f" {values['num_cycles']} times"
-        case "Timeout":
-            word += f" {values['msec'] / 1000:g} s"
+def _kind_label(node: Behaviour, kind: NodeKind[Any]) -> Label:
+    words = kind.describe(node)
     named = node.name != kind.tag
-    shape = "control" if kind.category == "Control" else "decorator"
-    return Label(shape, SYMBOLS[kind.tag], node.name if named else word, (word,) if named else ())
-
-
-def _count(count: int, total: int) -> str:
-    number = count if count > 0 else total + count + 1
-    return "all" if number == total else f"{number} of {total}"
+    return Label(kind.category.lower(), kind.symbol, node.name if named else words, (words,) if named else ())
 
 
 def _leaf_label(node: ConceptModel | Condition) -> Label:
@@ -157,7 +103,8 @@ def _leaf_label(node: ConceptModel | Condition) -> Label:
         else:
             shown = f"{value:g}" if isinstance(value, int | float) else str(value)
             details.append(f"{key} {shown} {SETTING_UNITS[key]}".rstrip())
-    return Label(shape, "", name or plain, tuple(details))
+    symbol = node.presentation.symbol if isinstance(node, ConceptModel) else ""
+    return Label(shape, symbol, name or plain, tuple(details))
 
 
 def _value(value: Any, parameter: Parameter) -> str:

@@ -15,8 +15,9 @@ from html import escape
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.errors import InputError
-from bt_tasksim.report.tree_labels import Label, label_of, preorder, tree_text
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.report.tree_labels import Label, label_of, tree_text
+from bt_tasksim.trees.walk import preorder
 
 __all__ = ["node_ids", "tree_svg", "tree_text"]
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any
 
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.files import whole_file
-from bt_tasksim.poses import Array
-from bt_tasksim.runner import Step
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.files import whole_file
+from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.runner import Step
 
 
 class VideoRecorder:

@@ -11,20 +11,23 @@ from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.files import whole_folder, write_text
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.files import whole_folder, write_text
+from bt_tasksim.demos_decomp.log import Video
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.result import Result
+from bt_tasksim.execution.run_log import RunRecorder, about
+from bt_tasksim.execution.runner import Runner, Step
 from bt_tasksim.report.report import NO_VIDEO, write_report
-from bt_tasksim.report.run_log import RunRecorder, about
 from bt_tasksim.report.tree_picture import tree_svg
 from bt_tasksim.report.video import VideoRecorder
-from bt_tasksim.runner import Result, Runner, Step
-from bt_tasksim.scene import Scene
-from demos_decomp.log import Video
+from bt_tasksim.scene.scene import Scene
 
 RESULT, LOG, TREE, VIDEO, REPORT = "result.json", "run.h5", "tree.svg", "run.mp4", "report.html"
 FILES = (RESULT, LOG, TREE, VIDEO, REPORT)
 """Names of the files in a run's folder, which a later run may replace."""
+LEAST = 2
+"""Ticks of a run that are worth keeping when it is interrupted."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,7 @@ def write_run(
     Raises:
         InputError: The folder is no good, or the scene.
         MachineError: An engine failed, or the disk is full or not writable.
+        KeyboardInterrupt: The run was interrupted; the folder holds what was run until then.
     """
     with whole_folder(folder, FILES) as inside:
         recorder, film = RunRecorder(runner, scenario), None
@@ -85,9 +89,19 @@ def write_run(
             for callback in callbacks:
                 callback(step)
 
-        with contextlib.nullcontext() if film is None else film:
-            result = runner.run(seed, stream, record)
+        interrupt: KeyboardInterrupt | None = None
+        try:
+            with contextlib.nullcontext() if film is None else film:
+                result = runner.run(seed, stream, record)
+        except KeyboardInterrupt as stop:
+            if len(recorder) < LEAST:
+                raise
+            interrupt, film, no_video = stop, None, "No video: the run was interrupted."
+            result = runner.interrupted(len(recorder) - 1)
         remarks = _fill(inside, result, recorder, film, no_video)
+    if interrupt is not None:
+        said = f"{interrupt}; " if str(interrupt) else ""
+        raise type(interrupt)(f"{said}what was run is in {folder}") from interrupt
     paths = {name: Path(folder) / name for name in FILES if (Path(folder) / name).exists()}
     return result, RunFiles(Path(folder), paths, remarks)
 
@@ -111,8 +125,6 @@ def filming_runner(tree: Behaviour, scene: Scene, options: EngineOptions | None 
     try:
         return Runner(tree, scene, dataclasses.replace(options, rendering=True)), ""
     except MachineError as error:
-        if options.perception == "camera":
-            raise
         without = Runner(tree, scene, dataclasses.replace(options, rendering=False))
         return without, f"No video: {error}."
 

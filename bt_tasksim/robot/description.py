@@ -9,24 +9,27 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yaml
 
-from bt_tasksim import poses
-from bt_tasksim.data_file import check_keys as _check_keys
-from bt_tasksim.data_file import names as _names
-from bt_tasksim.data_file import number as _number
-from bt_tasksim.data_file import vector as _vector
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.poses import Array, array_namespace
-from bt_tasksim.resources import asset
-from bt_tasksim.safety.limits import SafetyLimits, read_limits
+from bt_tasksim.core import poses
+from bt_tasksim.core.beside import beside
+from bt_tasksim.core.document import located
+from bt_tasksim.core.errors import FieldError, InputError, nearest, within
+from bt_tasksim.core.files import file_version
+from bt_tasksim.core.plain import shown, where_text
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import part
+from bt_tasksim.core.resources import is_file
+from bt_tasksim.robot.limits import SafetyLimits, read_limits
+
+if TYPE_CHECKING:
+    from bt_tasksim.robot.schema import EnvelopeEntry, RobotFile
 
 
 @dataclass(frozen=True)
@@ -204,194 +207,168 @@ class RobotDescription:
 
 
 def load_robot(name: str) -> RobotDescription:
-    """A bundled robot by name, or one from a data file by path.
+    """A robot by name, or one from a data file by path.
+
+    What is registered as a ``robot`` is the path of its data file, or a `RobotDescription`.
 
     Raises:
         InputError: No such robot, its URDF is not to be found, or the file lacks or misstates something.
     """
-    if name.endswith((".yaml", ".yml")):
+    if is_file(name):
         path = Path(name).resolve()
         if not path.is_file():
-            raise InputError(f"no robot file '{name}'")
+            raise InputError(f"no robot file '{shown(name, 200)}'")
     else:
-        path = asset("robots", f"{name}.yaml")
-        if not path.is_file():
-            known = [p.stem for p in asset("robots").glob("*.yaml")]
-            raise InputError(f"unknown robot '{name}'{nearest(name, known)}")
-    return _load(path)
+        found: Path | RobotDescription = part("robot", name)
+        if isinstance(found, RobotDescription):
+            return found
+        path = found
+    return _load(path, file_version(path))
 
 
 @lru_cache(maxsize=32)
-def _load(path: Path) -> RobotDescription:
-    try:
-        data = yaml.safe_load(path.read_text())
-        if not isinstance(data, dict):
-            raise InputError("it should be a mapping of names to values")
-        _check_keys(data, "", _KEYS, _OPTIONAL)
-        description = _description(data, path)
-        _check(description)
-        return description
-    except yaml.YAMLError as error:
-        raise InputError(f"robot file '{path}' is not YAML: {' '.join(str(error).split())}") from error
-    except KeyError as error:
-        raise InputError(f"robot file '{path}' lacks {error}") from error
-    except (TypeError, ValueError, AttributeError, IndexError, OSError) as error:
-        raise InputError(f"robot file '{path}': {error}") from error
+def _load(path: Path, version: tuple[int, ...]) -> RobotDescription:
+    """The robot in this version of a file."""
+    from bt_tasksim.core.typed_file import load_typed
+    from bt_tasksim.robot.schema import RobotFile
+
+    data, document = load_typed(RobotFile, path, "robot file")
+    with located(document):
+        return _description(data, path)
 
 
-_KEYS: Mapping[str, Any] = {
-    "name": None,
-    "urdf": None,
-    "base_link": None,
-    "arm": dict.fromkeys(("joints", "lower", "upper", "velocity", "acceleration", "rest", "drive")),
-    "hand": dict.fromkeys(("joints", "open", "closed", "drive", "speed")),
-    "tool": {"link": None, "pose": None, "closing": None},
-    "wrist_link": None,
-    "tips": None,
-    "opposition": None,
-    "opening": None,
-    "depth": None,
-    "pads": {"links": None, "surface": {f.name: None for f in fields(Pads)}},
-    "envelope": None,
-}
-_OPTIONAL: Mapping[str, Any] = {
-    "task_mask": None,
-    "cameras": None,
-    "safety": None,
-    "solver_iterations": None,
-    "arm": {"posture": None},
-    "hand": {"synergies": None, "drive_scale": None},
-}
-
-
-def _description(data: Mapping[str, Any], path: Path) -> RobotDescription:
-    arm, hand, tool = data["arm"], data["hand"], data["tool"]
-    arm_joints, hand_joints = _names(arm["joints"], "arm.joints"), _names(hand["joints"], "hand.joints")
-    n_arm, n_hand = len(arm_joints), len(hand_joints)
-    synergies = hand.get("synergies") or {}
-    return RobotDescription(
-        name=str(data["name"]),
-        urdf=_urdf_path(str(data["urdf"]), path),
-        base_link=str(data["base_link"]),
-        arm_joints=arm_joints,
-        arm_lower=_vector(arm["lower"], n_arm, "arm.lower"),
-        arm_upper=_vector(arm["upper"], n_arm, "arm.upper"),
-        arm_velocity=_vector(arm["velocity"], n_arm, "arm.velocity"),
-        arm_acceleration=_vector(arm["acceleration"], n_arm, "arm.acceleration"),
-        rest=_vector(arm["rest"], n_arm, "arm.rest"),
-        posture=_vector(arm.get("posture", [1.0] * n_arm), n_arm, "arm.posture"),
-        arm_drive=_drive(arm["drive"], "arm.drive"),
-        hand_joints=hand_joints,
-        hand_open=_vector(hand["open"], n_hand, "hand.open"),
-        hand_closed=_vector(hand["closed"], n_hand, "hand.closed"),
-        hand_drive=_drive(hand["drive"], "hand.drive"),
-        hand_drive_scale=_scale(hand.get("drive_scale") or {}, hand_joints),
-        hand_speed=_number(hand["speed"], "hand.speed"),
+def _description(data: RobotFile, path: Path) -> RobotDescription:
+    arm, hand, tool = data.arm, data.hand, data.tool
+    n_arm, n_hand = len(arm.joints), len(hand.joints)
+    synergies = hand.synergies or {}
+    with within("urdf"):
+        urdf = _urdf_path(data.urdf, path)
+    robot = RobotDescription(
+        name=data.name,
+        urdf=urdf,
+        base_link=data.base_link,
+        arm_joints=arm.joints,
+        arm_lower=_joints(arm.lower, n_arm, "arm", "lower"),
+        arm_upper=_joints(arm.upper, n_arm, "arm", "upper"),
+        arm_velocity=_joints(arm.velocity, n_arm, "arm", "velocity"),
+        arm_acceleration=_joints(arm.acceleration, n_arm, "arm", "acceleration"),
+        rest=_joints(arm.rest, n_arm, "arm", "rest"),
+        posture=_joints(arm.posture or (1.0,) * n_arm, n_arm, "arm", "posture"),
+        arm_drive=Drive(**dict(arm.drive)),
+        hand_joints=hand.joints,
+        hand_open=_joints(hand.open, n_hand, "hand", "open"),
+        hand_closed=_joints(hand.closed, n_hand, "hand", "closed"),
+        hand_drive=Drive(**dict(hand.drive)),
+        hand_drive_scale=_scale(hand.drive_scale or {}, hand.joints),
+        hand_speed=hand.speed,
         synergies=tuple(synergies),
         synergy_directions=np.array(
-            [_vector(v, n_hand, f"hand.synergies.{k}") for k, v in synergies.items()]
+            [_joints(v, n_hand, "hand", "synergies", k) for k, v in synergies.items()]
         ).reshape(len(synergies), n_hand),
-        tool_link=str(tool["link"]),
-        tool_pose=_pose(tool["pose"], "tool.pose"),
-        closing=_vector(tool["closing"], 3, "tool.closing"),
-        wrist_link=str(data["wrist_link"]),
-        tips=tuple(_tip(t) for t in data["tips"]),
-        opposition=tuple(tuple(int(i) for i in group) for group in data["opposition"]),
-        opening=_number(data["opening"], "opening"),
-        depth=_number(data["depth"], "depth"),
-        pads=Pads(**{k: _number(v, f"pads.surface.{k}") for k, v in data["pads"]["surface"].items()}),
-        pad_links=_names(data["pads"]["links"], "pads.links"),
-        task_mask=_vector(data.get("task_mask", [1.0] * 6), 6, "task_mask"),
-        envelope=tuple(_box(b) for b in data["envelope"]),
-        solver_iterations=int(_number(data.get("solver_iterations", 15), "solver_iterations")),
-        cameras=data.get("cameras") or {},
-        safety=read_limits(data["safety"], data["arm"]) if "safety" in data else None,
+        tool_link=tool.link,
+        tool_pose=_pose(tool.pose),
+        closing=_fixed(np.array(tool.closing)),
+        wrist_link=data.wrist_link,
+        tips=tuple(Tip(tip.name, tip.links, tip.point) for tip in data.tips),
+        opposition=data.opposition,
+        opening=data.opening,
+        depth=data.depth,
+        pads=Pads(**dict(data.pads.surface)),
+        pad_links=data.pads.links,
+        task_mask=_fixed(np.array(data.task_mask)),
+        envelope=tuple(_box(box, i) for i, box in enumerate(data.envelope)),
+        solver_iterations=data.solver_iterations,
+        cameras={k: v.model_dump(exclude_unset=True) for k, v in (data.cameras or {}).items()},
+        safety=None,
         source=path,
     )
+    _check(robot)
+    if data.safety is None:
+        return robot
+    with within("safety"):
+        return replace(robot, safety=read_limits(data.safety, arm))
 
 
 def _check(robot: RobotDescription) -> None:
     """What is well formed and wrong nevertheless."""
     if len(set(robot.joints)) < len(robot.joints):
-        raise InputError("a joint is named twice in arm.joints and hand.joints")
+        raise FieldError("a joint is named twice in 'arm.joints' and 'hand.joints'", "arm", "joints")
     if not np.all(robot.arm_lower < robot.arm_upper):
-        raise InputError("arm.lower is not below arm.upper for every joint")
+        raise FieldError("'arm.lower' is not below 'arm.upper' for every joint", "arm", "lower")
     if not np.all((robot.arm_lower <= robot.rest) & (robot.rest <= robot.arm_upper)):
-        raise InputError("arm.rest is not within arm.lower and arm.upper")
-    if not (np.all(robot.arm_velocity > 0.0) and np.all(robot.arm_acceleration > 0.0)):
-        raise InputError("arm.velocity and arm.acceleration should be positive")
+        raise FieldError("'arm.rest' is not within 'arm.lower' and 'arm.upper'", "arm", "rest")
     if np.array_equal(robot.hand_open, robot.hand_closed):
-        raise InputError("hand.open and hand.closed are the same")
-    if min(robot.hand_speed, robot.opening) <= 0.0:
-        raise InputError("hand.speed and opening should be positive")
-    if np.any(robot.task_mask < 0.0) or not np.any(robot.task_mask > 0.0):
-        raise InputError("task_mask should hold no negative weight and one positive at least")
+        raise FieldError("'hand.open' and 'hand.closed' are the same", "hand", "closed")
+    if not np.any(robot.task_mask > 0.0):
+        raise FieldError("'task_mask' should have one positive weight at least", "task_mask")
     if np.count_nonzero(robot.task_mask) > len(robot.arm_joints):
-        raise InputError(
+        raise FieldError(
             f"an arm of {len(robot.arm_joints)} joints cannot follow {np.count_nonzero(robot.task_mask)} "
-            f"components of a pose: set some of task_mask to 0"
+            f"components of a pose: set some of 'task_mask' to 0",
+            "task_mask",
         )
-    if len(robot.opposition) < 2 or not all(robot.opposition):
-        raise InputError("opposition should name two groups of tips at least, none of them empty")
-    for group in robot.opposition:
+    for k, group in enumerate(robot.opposition):
         for i in group:
             if not 0 <= i < len(robot.tips):
-                raise InputError(f"opposition names tip {i} of {len(robot.tips)}")
+                raise FieldError(f"'opposition' names tip {i} of {len(robot.tips)}", "opposition", k)
 
 
-def _drive(values: Any, what: str) -> Drive:
-    known = [f.name for f in fields(Drive)]
-    _check_keys(values, f"{what}.", dict.fromkeys(known[:3]), dict.fromkeys(known[3:]))
-    return Drive(**{k: _number(v, f"{what}.{k}") for k, v in values.items()})
-
-
-def _scale(values: Mapping[str, Any], joints: tuple[str, ...]) -> Array:
-    out = np.ones(len(joints))
-    for name, value in values.items():
-        if name not in joints:
-            raise InputError(f"hand.drive_scale names '{name}'{nearest(str(name), joints)}")
-        out[joints.index(name)] = _number(value, f"hand.drive_scale.{name}")
-    out.setflags(write=False)
-    return out
-
-
-def _tip(values: Any) -> Tip:
-    _check_keys(values, "tips.", dict.fromkeys(("name", "links", "point")))
-    x, y, z = _vector(values["point"], 3, "tips.point").tolist()
-    return Tip(str(values["name"]), _names(values["links"], "tips.links"), (x, y, z))
-
-
-def _box(values: Any) -> tuple[Array, tuple[float, float, float]]:
-    _check_keys(values, "envelope.", dict.fromkeys(("position", "size")), {"rotation": None})
-    position = _vector(values["position"], 3, "envelope.position")
-    rotation = values.get("rotation", [1.0, 0.0, 0.0, 0.0])
-    x, y, z = _vector(values["size"], 3, "envelope.size").tolist()
-    return _pose([*position, *rotation], "envelope.rotation"), (x, y, z)
-
-
-def _pose(values: Any, what: str) -> Array:
-    """A pose ``(7,)`` with its quaternion normalised, for files that give a few digits."""
-    array = np.array(_vector(values, 7, what))
-    length = float(np.linalg.norm(array[3:]))
-    if abs(length - 1.0) > 1e-3:
-        raise InputError(f"{what} should end with a unit quaternion (w x y z), found {values!r}")
-    array[3:] /= length
+def _fixed(array: Array) -> Array:
     array.setflags(write=False)
     return array
 
 
+def _joints(values: Sequence[float], n: int, *where: str) -> Array:
+    """Values of joints ``(n,)``."""
+    if len(values) != n:
+        raise FieldError(
+            f"'{where_text(where)}' should be {n} numbers, one for each of '{where[0]}.joints', "
+            f"found {len(values)}",
+            *where,
+        )
+    return _fixed(np.array(values))
+
+
+def _scale(values: Mapping[str, float], joints: tuple[str, ...]) -> Array:
+    out = np.ones(len(joints))
+    for name, value in values.items():
+        if name not in joints:
+            raise FieldError(
+                f"'hand.drive_scale' names '{shown(name)}', no joint of the hand{nearest(name, joints)}",
+                "hand",
+                "drive_scale",
+                name,
+            )
+        out[joints.index(name)] = value
+    return _fixed(out)
+
+
+def _box(box: EnvelopeEntry, index: int) -> tuple[Array, tuple[float, float, float]]:
+    if abs(math.hypot(*box.rotation) - 1.0) > 1e-3:
+        raise FieldError(
+            f"'envelope[{index}].rotation' should be a unit quaternion w x y z", "envelope", index, "rotation"
+        )
+    return _pose((*box.position, *box.rotation)), box.size
+
+
+def _pose(values: Sequence[float]) -> Array:
+    """A pose ``(7,)`` with its quaternion normalised, for files that give a few digits."""
+    return _fixed(poses.unit_pose(values))
+
+
 def _urdf_path(text: str, source: Path) -> Path:
+    """The URDF: in an installed package, without importing it, or beside the robot's file."""
     package, colon, inner = text.partition(":")
-    if colon and len(package) > 1:
-        spec = importlib.util.find_spec(package)
+    if not colon:
+        path = beside(source.parent, text, "a URDF")
+    else:
+        spec = importlib.util.find_spec(package) if package.isidentifier() else None
         if spec is None or not spec.submodule_search_locations:
             raise InputError(
-                f"its URDF is in the package '{package}', which is not installed: "
-                f"install it, or copy the file and set 'urdf' to a path of your own"
+                f"its URDF is in the package '{shown(package)}', which is not installed: "
+                f"install it, or copy the file and its meshes beside this one and set 'urdf' to its path"
             )
-        path = Path(next(iter(spec.submodule_search_locations))) / "assets" / inner
-    else:
-        path = (source.parent / text).resolve()
+        path = beside(Path(next(iter(spec.submodule_search_locations))) / "assets", inner, "a URDF")
     if not path.is_file():
         raise InputError(f"no URDF at '{path}'")
     return path

@@ -6,15 +6,17 @@ which is the default, or ``clip`` where slowing a motion down makes sense of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bt_tasksim.data_file import check_keys, positive, vector
-from bt_tasksim.errors import InputError
-from bt_tasksim.poses import Array
+from bt_tasksim.core.errors import FieldError
+from bt_tasksim.core.poses import Array
+
+if TYPE_CHECKING:
+    from bt_tasksim.robot.schema import ArmEntry, SafetyEntry
 
 STOP, CLIP = "stop", "clip"
 CLIPPING = ("joint_position", "joint_velocity", "joint_acceleration", "tool_acceleration")
@@ -74,17 +76,10 @@ class SafetyLimits:
 
 
 _JOINT = ("joint_position", "joint_velocity", "joint_acceleration", "step")
-_KEYS: Mapping[str, tuple[str, ...]] = {
-    "tool_velocity": ("linear", "angular"),
-    "tool_acceleration": ("linear", "angular"),
-    "workspace": ("lower", "upper"),
-    "wrench": ("force", "torque"),
-    "tracking": ("limit",),
-}
-_TIMES = {"stale": 0.1, "validity": 0.15, "watchdog": 0.15}
+_LIMITS = (*_JOINT, "tool_velocity", "tool_acceleration", "workspace", "wrench", "tracking")
 
 
-def read_limits(data: Any, arm: Mapping[str, Any]) -> SafetyLimits:
+def read_limits(data: SafetyEntry, arm: ArmEntry) -> SafetyLimits:
     """The limits in a robot file's section ``safety``.
 
     Args:
@@ -92,90 +87,91 @@ def read_limits(data: Any, arm: Mapping[str, Any]) -> SafetyLimits:
         arm: The section ``arm``, whose limits are the widest that there may be.
 
     Raises:
-        InputError: Something is missing, unknown, of the wrong size, wider than the arm's own limit, or a
-            limit cannot have the policy that it is given.
+        FieldError: Something is of the wrong size, wider than the arm's own limit, or a limit cannot have the
+            policy that it is given.
     """
-    optional = {**dict.fromkeys(_JOINT), "timing": None}
-    check_keys(data, "safety.", dict.fromkeys(_KEYS), optional)
-    policies = {}
-    for name in (*_JOINT, *_KEYS):
-        entry = data.get(name, {})
-        keys = _KEYS.get(name) or (("lower", "upper") if name == "joint_position" else ("limit",))
-        inner = dict.fromkeys(keys)
-        needed, more = (inner, {}) if name in _KEYS else ({}, inner)
-        check_keys(entry, f"safety.{name}.", needed, {**more, "policy": None})
-        policies[name] = _policy(name, entry.get("policy", STOP))
-    n = len(arm["joints"])
-    arms = {key: vector(arm[key], n, f"arm.{key}") for key in ("lower", "upper", "velocity", "acceleration")}
-
-    def joint(name: str, key: str, default: Array) -> Array:
-        entry = data.get(name, {})
-        return vector(entry[key], n, f"safety.{name}.{key}") if key in entry else default
-
-    lower, upper = (joint("joint_position", key, arms[key]) for key in ("lower", "upper"))
-    velocity = joint("joint_velocity", "limit", arms["velocity"])
-    acceleration = joint("joint_acceleration", "limit", arms["acceleration"])
-    _no_wider("joint_position.lower", arms["lower"], lower)
-    _no_wider("joint_position.upper", upper, arms["upper"])
-    _no_wider("joint_velocity.limit", velocity, arms["velocity"])
-    _no_wider("joint_acceleration.limit", acceleration, arms["acceleration"])
-    step = joint("step", "limit", 0.1 * velocity)
+    policies = {name: _policy(name, getattr(data, name).policy) for name in _LIMITS}
+    n = len(arm.joints)
+    position = data.joint_position
+    lower = _joints(position.lower, n, np.array(arm.lower), "joint_position", "lower")
+    upper = _joints(position.upper, n, np.array(arm.upper), "joint_position", "upper")
+    velocity = _joints(data.joint_velocity.limit, n, np.array(arm.velocity), "joint_velocity", "limit")
+    acceleration = _joints(
+        data.joint_acceleration.limit, n, np.array(arm.acceleration), "joint_acceleration", "limit"
+    )
+    _no_wider(np.array(arm.lower), lower, "joint_position", "lower")
+    _no_wider(upper, np.array(arm.upper), "joint_position", "upper")
+    _no_wider(velocity, np.array(arm.velocity), "joint_velocity", "limit")
+    _no_wider(acceleration, np.array(arm.acceleration), "joint_acceleration", "limit")
+    step = _joints(data.step.limit, n, 0.1 * velocity, "step", "limit")
     if not np.all(lower < upper):
-        raise InputError("safety.joint_position.lower is not below upper for every joint")
-    for name, values in (("joint_velocity", velocity), ("joint_acceleration", acceleration), ("step", step)):
-        if not np.all(values > 0.0):
-            raise InputError(f"safety.{name}.limit should be positive for every joint")
-    corners = [vector(data["workspace"][key], 3, f"safety.workspace.{key}") for key in ("lower", "upper")]
-    box = np.array(corners)
+        raise FieldError(
+            "'safety.joint_position.lower' is not below 'upper' for every joint", "joint_position"
+        )
+    box = np.array([data.workspace.lower, data.workspace.upper])
     if not np.all(box[0] < box[1]):
-        raise InputError("safety.workspace.lower is not below upper on every axis")
+        raise FieldError("'safety.workspace.lower' is not below 'upper' on every axis", "workspace")
+    timing = data.timing
+    for name in ("stale", "validity", "watchdog"):
+        _soon_enough(name, getattr(timing, name))
     return SafetyLimits(
         lower=lower,
         upper=upper,
         velocity=velocity,
         acceleration=acceleration,
         step=step,
-        tool_speed=_one(data, "tool_velocity", "linear"),
-        tool_turn=_one(data, "tool_velocity", "angular"),
-        tool_acceleration=_one(data, "tool_acceleration", "linear"),
-        tool_turn_acceleration=_one(data, "tool_acceleration", "angular"),
+        tool_speed=data.tool_velocity.linear,
+        tool_turn=data.tool_velocity.angular,
+        tool_acceleration=data.tool_acceleration.linear,
+        tool_turn_acceleration=data.tool_acceleration.angular,
         workspace=box,
-        force=_one(data, "wrench", "force"),
-        torque=_one(data, "wrench", "torque"),
-        tracking=_one(data, "tracking", "limit"),
+        force=data.wrench.force,
+        torque=data.wrench.torque,
+        tracking=data.tracking.limit,
+        stale=timing.stale,
+        validity=timing.validity,
+        watchdog=timing.watchdog,
         policies=policies,
-        **_times(data.get("timing", {})),
     )
 
 
-def _policy(name: str, value: Any) -> str:
-    if value not in (STOP, CLIP):
-        raise InputError(f"safety.{name}.policy should be 'stop' or 'clip', found {value!r}")
+def _policy(name: str, value: str) -> str:
     if value == CLIP and name not in CLIPPING:
-        raise InputError(f"safety.{name}.policy can only be 'stop'; {', '.join(CLIPPING)} may be 'clip'")
-    return str(value)
+        raise FieldError(
+            f"'safety.{name}.policy' can only be 'stop'; {', '.join(CLIPPING)} may be 'clip'", name, "policy"
+        )
+    return value
 
 
-def _no_wider(what: str, smaller: Array, larger: Array) -> None:
+def _joints(given: Sequence[float] | None, n: int, default: Array, name: str, key: str) -> Array:
+    """A limit of every joint ``(n,)``, not to be written to."""
+    if given is not None and len(given) != n:
+        raise FieldError(
+            f"'safety.{name}.{key}' should be {n} numbers, one for each joint of the arm, found {len(given)}",
+            name,
+            key,
+        )
+    values = default if given is None else np.array(given)
+    values.setflags(write=False)
+    return values
+
+
+def _no_wider(smaller: Array, larger: Array, name: str, key: str) -> None:
     if np.any(smaller > larger + 1e-9):
         i = int(np.argmax(smaller - larger))
-        raise InputError(
-            f"safety.{what} is wider than the arm's own limit for joint {i + 1} of {len(smaller)}, by "
-            f"{float(smaller[i] - larger[i]):.3g}"
+        raise FieldError(
+            f"'safety.{name}.{key}' is wider than the arm's own limit for joint {i + 1} of "
+            f"{len(smaller)}, by {float(smaller[i] - larger[i]):.3g}",
+            name,
+            key,
         )
 
 
-def _one(data: Mapping[str, Any], name: str, key: str) -> float:
-    return positive(data[name][key], f"safety.{name}.{key}")
-
-
-def _times(data: Any) -> dict[str, float]:
-    check_keys(data, "safety.timing.", {}, dict.fromkeys(_TIMES))
-    times = {key: positive(data.get(key, value), f"safety.timing.{key}") for key, value in _TIMES.items()}
-    for key, value in times.items():
-        if value > REACTION - MARGIN:
-            raise InputError(
-                f"safety.timing.{key} should be at most {REACTION - MARGIN:g} s, found {value:g}: a robot "
-                f"holds within {REACTION:g} s of a fault"
-            )
-    return times
+def _soon_enough(name: str, seconds: float) -> None:
+    if seconds > REACTION - MARGIN:
+        raise FieldError(
+            f"'safety.timing.{name}' should be at most {REACTION - MARGIN:g} s, found {seconds:g}: a robot "
+            f"holds within {REACTION:g} s of a fault",
+            "timing",
+            name,
+        )

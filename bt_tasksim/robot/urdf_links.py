@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.urdf_visuals import origin, read_urdf
-from bt_tasksim.errors import InputError
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.robot.urdf_visuals import origin, read_urdf
 
 MOVING = ("revolute", "continuous", "prismatic")
 """Kinds of joints that move; every other one but ``fixed`` is refused."""
@@ -49,7 +49,7 @@ class LinkJoint:
         pose: Pose ``(7,)`` of the joint, and of the link at joint position 0, in the parent's frame.
         joint: Name of the joint; empty for the root.
         kind: ``fixed``, or one of `MOVING`.
-        axis: Unit vector ``(3,)`` in the link's frame.
+        axis: Unit vector ``(3,)`` in the link's frame; of no meaning where the joint is fixed.
         limits: Lower and upper position, rad or m; None for a joint without limits.
         mimic: What it follows, if anything.
     """
@@ -143,11 +143,6 @@ def _link_joint(joint: ElementTree.Element, inertials: dict[str, Inertial | None
     parent, child = (str(_child(joint, tag).get("link")) for tag in ("parent", "child"))
     if child not in inertials:
         raise ValueError(f"joint '{name}' carries '{child}', which is no link")
-    element = joint.find("axis")
-    x, y, z = (float(v) for v in (element.get("xyz", "") if element is not None else "1 0 0").split())
-    length = (x * x + y * y + z * z) ** 0.5
-    if length < 1e-6:
-        raise ValueError(f"the axis of joint '{name}' has no direction")
     limit, mimic = joint.find("limit"), joint.find("mimic")
     limits = None
     if kind in ("revolute", "prismatic"):
@@ -161,7 +156,7 @@ def _link_joint(joint: ElementTree.Element, inertials: dict[str, Inertial | None
         pose=tuple(float(v) for v in origin(joint)),
         joint=name,
         kind=kind,
-        axis=(x / length, y / length, z / length),
+        axis=_axis(joint) if kind in MOVING else (1.0, 0.0, 0.0),
         limits=limits,
         mimic=None
         if mimic is None
@@ -169,6 +164,15 @@ def _link_joint(joint: ElementTree.Element, inertials: dict[str, Inertial | None
             str(mimic.get("joint")), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))
         ),
     )
+
+
+def _axis(joint: ElementTree.Element) -> tuple[float, float, float]:
+    element = joint.find("axis")
+    x, y, z = (float(v) for v in (element.get("xyz", "") if element is not None else "1 0 0").split())
+    length = (x * x + y * y + z * z) ** 0.5
+    if length < 1e-6:
+        raise ValueError(f"the axis of joint '{joint.get('name')}' has no direction")
+    return x / length, y / length, z / length
 
 
 def _child(element: ElementTree.Element, tag: str) -> ElementTree.Element:

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from defusedxml.ElementTree import parse
 
-from bt_tasksim import poses
-from bt_tasksim.errors import InputError
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
 
 Colour = tuple[float, float, float]
 

@@ -6,37 +6,44 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import yaml
 
-from bt_tasksim import poses
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.poses import Array
-from bt_tasksim.resources import asset
-from bt_tasksim.world import PlaceModel
+from bt_tasksim.core import poses
+from bt_tasksim.core.document import Document
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.files import file_version
+from bt_tasksim.core.names import check_name
+from bt_tasksim.core.plain import Plain, shown
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import part
+from bt_tasksim.core.renamed import renamed_fields
+from bt_tasksim.core.resources import is_file
+from bt_tasksim.core.world import PlaceModel
 
-LOOKS = ("matte", "wood", "metal")
+if TYPE_CHECKING:
+    from bt_tasksim.scene.fixture_schema import FixtureFile
 
 
+@renamed_fields(look="material")
 @dataclass(frozen=True)
 class Box:
     """A solid box of a fixture: pose ``(7,)`` in its frame, full size (m), sRGB colour, friction.
 
-    ``look`` says what it is drawn like: ``matte``, ``wood`` or ``metal``.
+    ``material`` says what it is drawn like: ``matte``, ``wood`` or ``metal``.
     """
 
     pose: tuple[float, ...]
     size: tuple[float, float, float]
     colour: tuple[float, float, float] = (0.6, 0.5, 0.4)
     friction: float = 0.6
-    look: str = "matte"
+    material: str = "matte"
 
 
 @dataclass(frozen=True)
 class Place:
-    """A place of a fixture, in the fixture's frame; see `bt_tasksim.world.PlaceModel`."""
+    """A place of a fixture, in the fixture's frame; see `bt_tasksim.core.world.PlaceModel`."""
 
     name: str
     kind: str
@@ -65,6 +72,11 @@ class Fixture:
     boxes: tuple[Box, ...]
     places: tuple[Place, ...]
 
+    def __post_init__(self) -> None:
+        check_name(self.name, "the name of a fixture")
+        for place in self.places:
+            check_name(place.name, "the name of a place")
+
     def pose_array(self) -> Array:
         """The pose as an array ``(7,)``."""
         return np.array(self.pose)
@@ -89,85 +101,61 @@ class Fixture:
         )
 
     @classmethod
-    def from_data(cls, data: Mapping[str, Any]) -> Fixture:
-        """A fixture from plain data, as in a file.
+    def from_data(cls, data: Mapping[str, Plain]) -> Fixture:
+        """A fixture from plain data, as in a file or a log.
 
         Raises:
-            KeyError, TypeError, ValueError: The data lacks something or has something of a wrong kind.
+            InputError: The data is not that of a fixture.
         """
-        pose = _pose(data.get("pose", (0, 0, 0, 1, 0, 0, 0)))
+        from bt_tasksim.core.typed_file import validate
+        from bt_tasksim.scene.fixture_schema import FixtureFile
+
+        return cls.from_file(validate(FixtureFile, Document("a fixture", dict(data))))
+
+    @classmethod
+    def from_file(cls, file: FixtureFile) -> Fixture:
+        """A fixture from what stands in its file."""
         boxes = tuple(
             Box(
-                pose=_pose(b["pose"] if "pose" in b else (*b["position"], 1, 0, 0, 0)),
-                size=_size(b["size"]),
-                colour=_floats(b.get("colour", (0.6, 0.5, 0.4)), 3),
-                friction=float(b.get("friction", 0.6)),
-                look=_look(b.get("look", "matte")),
+                box.pose or (*(box.position or ()), 1.0, 0.0, 0.0, 0.0),
+                box.size,
+                box.colour,
+                box.friction,
+                box.material,
             )
-            for b in data["boxes"]
+            for box in file.boxes
         )
         places = tuple(
-            Place(
-                name=str(p["name"]),
-                kind=str(p["kind"]),
-                position=_floats(p["position"], 3),
-                extent=_floats(p["extent"], 2),
-                centre=_floats(p.get("centre", (0, 0)), 2),
-                height=float(p.get("height", 10.0)),
-                access=_floats(p.get("access", (0, 0, -1)), 3),
-                exit=_floats(p.get("exit", (0, 0, 1)), 3),
-                clearance=float(p.get("clearance", 0.1)),
-            )
-            for p in data["places"]
+            Place(p.name, p.kind, p.position, p.extent, p.centre, p.height, p.access, p.exit, p.clearance)
+            for p in file.places
         )
-        return cls(str(data["name"]), pose, boxes, places)
+        return cls(file.name, file.pose, boxes, places)
 
 
-def _pose(values: Any) -> tuple[float, ...]:
-    out: tuple[float, ...] = _floats(values, 7)
-    if abs(np.linalg.norm(out[3:]) - 1) > 1e-3:
-        raise ValueError(f"a pose is x y z and a unit quaternion w x y z, found {values!r}")
-    return out
+def load_fixture(name: str) -> Fixture:
+    """A fixture by name, or one from a data file by path.
 
+    What is registered as a ``fixture`` is the path of its data file, or a `Fixture`.
 
-def _size(values: Any) -> Any:
-    out = _floats(values, 3)
-    if min(out) <= 0:
-        raise ValueError(f"a size is three positive numbers, found {values!r}")
-    return out
-
-
-def _look(name: Any) -> str:
-    if name not in LOOKS:
-        raise ValueError(f"unknown look '{name}'{nearest(str(name), LOOKS)}")
-    return str(name)
-
-
-def _floats(values: Any, n: int) -> Any:
-    out = tuple(float(v) for v in values)
-    if len(out) != n or not np.all(np.isfinite(out)):
-        raise ValueError(f"expected {n} finite numbers, found {values!r}")
-    return out
+    Raises:
+        InputError: No such fixture, or the file is not one; says what is wrong and where.
+    """
+    if is_file(name):
+        path = Path(name).resolve()
+        if not path.is_file():
+            raise InputError(f"no fixture file '{shown(name, 200)}'")
+    else:
+        found: Path | Fixture = part("fixture", name)
+        if isinstance(found, Fixture):
+            return found
+        path = found
+    return _load(path, file_version(path))
 
 
 @lru_cache(maxsize=64)
-def load_fixture(name: str) -> Fixture:
-    """A bundled fixture by name, or one from a data file by path.
+def _load(path: Path, version: tuple[int, ...]) -> Fixture:
+    """The fixture in this version of a file."""
+    from bt_tasksim.core.typed_file import load_typed
+    from bt_tasksim.scene.fixture_schema import FixtureFile
 
-    Raises:
-        InputError: No such fixture, or the file is not one; says what is wrong.
-    """
-    if name.endswith((".yaml", ".yml")):
-        path = Path(name)
-        if not path.is_file():
-            raise InputError(f"no fixture file '{name}'")
-    else:
-        path = asset("fixtures", f"{name}.yaml")
-        if not path.is_file():
-            known = [p.stem for p in asset("fixtures").glob("*.yaml")]
-            raise InputError(f"unknown fixture '{name}'{nearest(name, known)}")
-    try:
-        data = yaml.safe_load(path.read_text())
-        return Fixture.from_data(data)
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"fixture file '{path}': {type(error).__name__}: {error}") from error
+    return Fixture.from_file(load_typed(FixtureFile, path, "fixture file")[0])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 import warnings
 from functools import lru_cache
 from pathlib import Path
@@ -9,17 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.files import file_version
-from bt_tasksim.meshes import TriangleMesh, cube_sphere, mass_properties
-from bt_tasksim.poses import Array
-from bt_tasksim.shapes import ConvexPiece, Piece, Shape
-from bt_tasksim.surfaces import Polygon, PrismSurface
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.files import file_version
+from bt_tasksim.core.poses import Array
+from bt_tasksim.scene.geometry import ConvexPiece, Piece, Shape
+from bt_tasksim.scene.meshes import TriangleMesh, cube_sphere, mass_properties
+from bt_tasksim.scene.surfaces import Polygon, PrismSurface
 
 SMALLEST = 0.005
 LARGEST = 1.0
 """Metres: the longest side of an object that an arm can handle lies between these."""
 
+FORMATS = ("obj", "stl", "ply", "off", "glb")
+"""Forms of mesh files, each in one file."""
+MOST_BYTES = 64 << 20
 _MOST_VERTICES = 64
 _HOLLOW = 1.2
 
@@ -99,8 +104,17 @@ def _read(path: str, version: tuple[int, ...]) -> tuple[TriangleMesh, tuple[Tria
         raise MachineError(
             "mesh files need the package trimesh: install bt-tasksim with its extra 'sim'"
         ) from None
+    form = Path(path).suffix[1:].lower()
+    if form not in FORMATS:
+        raise InputError(
+            f"mesh '{path}' cannot be read: its name should end with one of {', '.join(FORMATS)}"
+        )
+    if os.stat(path).st_size > MOST_BYTES:
+        raise InputError(f"mesh '{path}' is larger than {MOST_BYTES >> 20} MiB: save it with fewer triangles")
     try:
-        loaded = trimesh.load(path, force="mesh")
+        # From memory: a mesh file may name other files, of materials and pictures, which are not opened.
+        content = io.BytesIO(Path(path).read_bytes())
+        loaded = trimesh.load(content, file_type=form, force="mesh", skip_materials=True)
         loaded.merge_vertices()
     except Exception as error:  # readers of a dozen formats raise whatever they please
         raise InputError(f"mesh '{path}' cannot be read: {type(error).__name__}: {error}") from error

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from bt_tasksim.poses import Array, from_matrix, pose
+from bt_tasksim.core.poses import Array, from_matrix, pose
 
 
 @dataclass(frozen=True, eq=False)

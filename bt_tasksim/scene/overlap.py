@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.poses import Array
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.shapes import BoxPiece, Piece
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.shapes import BoxPiece, Piece
 
 TOLERANCE = 5e-4
 """Metres of overlap that count as touching."""

@@ -1,28 +1,45 @@
-"""Success as the physics state tells it: where the object is, whether all is at rest and unharmed.
+"""The success evaluator: whether a run did what the scene's goal asks, as the physics state tells it.
 
-Nothing here looks at the tree, its statuses or its estimates.
+Nothing here looks at the tree, its statuses or its estimates. What each relation asks of an object stands in
+`bt_tasksim.scene.relations`; what every run must keep to stands here.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.poses import Array
-from bt_tasksim.scene import ActorConfiguration, Goal
-from bt_tasksim.world import Hidden, ObjectModel, PlaceModel, WorldModel
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import Outcome, register_reason
+from bt_tasksim.core.units import METRES, METRES_PER_SECOND, RADIANS, RADIANS_PER_SECOND
+from bt_tasksim.core.world import Hidden, WorldModel
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.relations import FinalState, relation_named
+from bt_tasksim.scene.specs import Goal
 
 AT_REST = (0.01, 0.1)
 """Speeds in m/s and rad/s below which an object is at rest."""
 DEEPEST = 0.002
 """Metres of overlap of two bodies that may not be exceeded at any time of a run."""
-TOUCHING = 1e-4
-"""Metres between hand and object within which the hand touches it."""
 KNOCKED = (0.05, math.radians(15.0))
 """Metres and radians by which another object may be shifted or tilted."""
+
+NO_GOAL = register_reason("no_goal", "no goal is set for this scene")
+NOT_AT_REST = register_reason(
+    "not_at_rest",
+    "{object} still moves at {speed} and {turning}",
+    speed=METRES_PER_SECOND,
+    turning=RADIANS_PER_SECOND,
+)
+HAND_NOT_CLEAR = register_reason("hand_not_clear", "the hand still touches {object}")
+KNOCKED_OVER = register_reason(
+    "knocked_over", "{object} was shifted by {shift} and tilted by {tilt:.0f}", shift=METRES, tilt=RADIANS
+)
+PENETRATION = register_reason("penetration", "two bodies overlapped by {depth:.1f}", depth=METRES)
 
 
 @dataclass(frozen=True)
@@ -31,87 +48,89 @@ class Verdict:
 
     Attributes:
         success: Everything asked for is true.
-        reason: A short, countable reason for failure, such as ``not in place``; empty on success.
-        why: One sentence with numbers.
-        position_error: Metres from where the object should stand; NaN where no goal says so.
-        angle_error: Radians from how it should stand, up to its symmetry; NaN likewise.
+        outcome: How the object is at the end, or the first thing that is wrong.
+        position_error: Metres from where the object should be; NaN where no goal says so.
+        angle_error: Radians from how it should be, up to its symmetry; NaN likewise.
         penetration: Deepest overlap of two bodies during the run, metres.
     """
 
     success: bool
-    reason: str
-    why: str
+    outcome: Outcome
     position_error: float
     angle_error: float
     penetration: float
 
+    @property
+    def reason(self) -> str:
+        """The registered name of the reason for failure; empty on success."""
+        return "" if self.success else self.outcome.cause.reason.name
 
-def judge(configuration: ActorConfiguration, model: WorldModel, hidden: Hidden) -> Verdict:
+    @property
+    def why(self) -> str:
+        """One sentence with numbers."""
+        return self.outcome.sentence
+
+    def to_data(self) -> dict[str, Any]:
+        """As plain data, for files; what no goal asks for is None."""
+        errors = {
+            "position_error": self.position_error,
+            "angle_error": self.angle_error,
+            "penetration": self.penetration,
+        }
+        return {
+            "success": self.success,
+            "reason": self.reason,
+            "why": self.why,
+            **{name: value if math.isfinite(value) else None for name, value in errors.items()},
+        }
+
+
+def evaluate_success(configuration: ActorConfiguration, world: WorldModel, hidden: Hidden) -> Verdict:
     """Judge the state at the end of a run.
 
     Args:
         configuration: The world as it was drawn, with its goal.
-        model: Names and facts.
+        world: Names and facts.
         hidden: The physics state at the end.
     """
-    goal = configuration.goal
-    depth = float(hidden.penetration)
+    goal, depth = configuration.goal, float(hidden.penetration)
     if goal is None:
-        return Verdict(True, "", "no goal is set for this scene", math.nan, math.nan, depth)
-    k = model.object_index(goal.object)
-    place, thing = model.place(goal.place), model.object(goal.object)
-    if goal.relation == "lifted":
-        return _judge_lifted(configuration, goal, hidden, k)
-    distance, angle, placed = _placement(goal, place, thing, hidden.objects[k])
-    off = f"{1000 * distance:.0f} mm and {math.degrees(angle):.1f} degrees off"
-
-    def end(reason: str, why: str) -> Verdict:
-        return Verdict(not reason, reason, why, distance, angle, depth)
-
-    if not placed:
-        inside = goal.relation == "inside"
-        reason = "not in the bin" if inside else _misplaced(goal, distance)
-        return end(
-            reason, f"{goal.object} {'is not in' if inside else 'does not stand on'} {goal.place}: {off}"
-        )
-    speed, turning = (float(np.linalg.norm(v)) for v in np.split(hidden.velocities[k], 2))
-    if speed > AT_REST[0] or turning > AT_REST[1]:
-        return end("not at rest", f"{goal.object} still moves at {1000 * speed:.0f} mm/s")
-    if float(hidden.hand_distance[k]) <= TOUCHING:
-        return end("hand not clear", f"the hand still touches {goal.object}")
-    for i, actor in enumerate(configuration.objects):
-        if i == k:
-            continue
-        shift = float(np.linalg.norm(hidden.objects[i][:3] - np.array(actor.pose[:3])))
-        tilt = _tilt(hidden.objects[i]) - _tilt(np.array(actor.pose))
-        if shift > KNOCKED[0] or tilt > KNOCKED[1]:
-            moved = f"was shifted by {1000 * shift:.0f} mm and tilted by {math.degrees(tilt):.0f} degrees"
-            return end("knocked something over", f"{actor.name} {moved}")
-    if depth > DEEPEST:
-        return end("penetration", f"two bodies overlapped by {1000 * depth:.1f} mm")
-    return end(
-        "", f"{goal.object} {'is in' if goal.relation == 'inside' else 'stands on'} {goal.place}, {off}"
+        return Verdict(True, NO_GOAL(), math.nan, math.nan, depth)
+    final = FinalState(configuration, world, hidden)
+    relation = relation_named(goal.relation)
+    placement = relation.evaluate(goal, final)
+    wrong = None if placement.reached else placement.outcome
+    if wrong is None:
+        wrong = next(_wrong(goal, final, relation.in_hand), None)
+    return Verdict(
+        wrong is None, wrong or placement.outcome, placement.position_error, placement.angle_error, depth
     )
 
 
-def _judge_lifted(configuration: ActorConfiguration, goal: Goal, hidden: Hidden, k: int) -> Verdict:
-    """The object hangs in the hand alone, as high as it should, and as upright as it stood."""
-    start, now = np.array(configuration.objects[k].pose), hidden.objects[k]
-    missing = goal.height - float(now[2] - start[2])
-    up = np.array([0.0, 0.0, 1.0])
-    cosine = float(poses.rotate(start[3:], up) @ poses.rotate(now[3:], up))
-    tilt, depth = math.acos(min(max(cosine, -1.0), 1.0)), float(hidden.penetration)
-    off = f"{1000 * missing:.0f} mm below and {math.degrees(tilt):.1f} degrees off"
-    reason, why = "", f"{goal.object} is held {1000 * goal.height:.0f} mm up, {off}"
-    if bool(np.any(hidden.support[k])) or float(hidden.hand_distance[k]) > TOUCHING:
-        reason, why = "not lifted", f"{goal.object} is not in the hand: {off}"
-    elif abs(missing) > goal.position_tolerance:
-        reason, why = "slipped", f"{goal.object} did not follow the hand: {off}"
-    elif tilt > goal.angle_tolerance:
-        reason, why = "tilted or turned", f"{goal.object} did not keep upright: {off}"
-    elif depth > DEEPEST:
-        reason, why = "penetration", f"two bodies overlapped by {1000 * depth:.1f} mm"
-    return Verdict(not reason, reason, why, abs(missing), tilt, depth)
+def _wrong(goal: Goal, final: FinalState, in_hand: bool) -> Iterator[Outcome]:
+    """What is wrong besides the goal's own relation, the first thing first."""
+    hidden = final.hidden
+    if not in_hand:
+        velocity = hidden.velocities[final.world.object_index(goal.object)]
+        speed, turning = (float(np.linalg.norm(v)) for v in np.split(velocity, 2))
+        if speed > AT_REST[0] or turning > AT_REST[1]:
+            yield NOT_AT_REST(object=goal.object, speed=speed, turning=turning)
+        if final.touched(goal.object):
+            yield HAND_NOT_CLEAR(object=goal.object)
+        yield from _knocked_over(goal, final)
+    if float(hidden.penetration) > DEEPEST:
+        yield PENETRATION(depth=hidden.penetration)
+
+
+def _knocked_over(goal: Goal, final: FinalState) -> Iterator[Outcome]:
+    for actor in final.configuration.objects:
+        if actor.name == goal.object:
+            continue
+        before, now = final.start(actor.name), final.pose(actor.name)
+        shift = float(np.linalg.norm(now[:3] - before[:3]))
+        tilted = float(poses.tilt(now[3:]) - poses.tilt(before[3:]))
+        if shift > KNOCKED[0] or tilted > KNOCKED[1]:
+            yield KNOCKED_OVER(object=actor.name, shift=shift, tilt=tilted)
 
 
 def at_rest(hidden: Hidden) -> bool:
@@ -121,43 +140,3 @@ def at_rest(hidden: Hidden) -> bool:
         np.all(np.linalg.norm(v[:, :3], axis=-1) < AT_REST[0] / 2)
         and np.all(np.linalg.norm(v[:, 3:], axis=-1) < AT_REST[1] / 2)
     )
-
-
-def _misplaced(goal: Goal, distance: float) -> str:
-    return "not in place" if distance > goal.position_tolerance else "tilted or turned"
-
-
-def _placement(goal: Goal, place: PlaceModel, model: ObjectModel, pose: Array) -> tuple[float, float, bool]:
-    """Distance (m) and angle (rad) to where the object should be, and whether that is good enough."""
-    local = poses.multiply(poses.inverse(place.pose), pose)
-    if goal.relation == "inside":
-        low = all(abs(float(local[i]) - place.centre[i]) <= place.extent[i] / 2 for i in range(2))
-        inside = low and -0.01 < float(local[2]) < place.height
-        return float(np.linalg.norm(local[:2])), _tilt(pose), inside
-    should = np.array([0.0, 0.0, model.extent[2] / 2])
-    distance = float(np.linalg.norm(local[:3] - should))
-    angle = _angle(local[3:], model)
-    return distance, angle, distance <= goal.position_tolerance and angle <= goal.angle_tolerance
-
-
-def _angle(rotation: Array, model: ObjectModel) -> float:
-    """Smallest angle (rad) from upright with the place's heading, over the object's symmetries."""
-    if model.symmetry == 0:
-        return _tilt(np.concatenate([np.zeros(3), rotation]))
-    if model.cubic:
-        m = np.abs(poses.to_matrix(rotation))
-        rows = np.argmax(m, axis=1)
-        snapped = np.zeros((3, 3))
-        snapped[np.arange(3), rows] = np.sign(poses.to_matrix(rotation)[np.arange(3), rows])
-        if len(set(rows.tolist())) == 3:
-            cosine = (np.trace(snapped.T @ poses.to_matrix(rotation)) - 1) / 2
-            return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    return min(
-        float(poses.angle_between(rotation, poses.yaw(2 * np.pi * k / model.symmetry)))
-        for k in range(max(model.symmetry, 1))
-    )
-
-
-def _tilt(pose: Array) -> float:
-    up = poses.rotate(pose[3:], np.array([0.0, 0.0, 1.0]))
-    return float(np.arccos(np.clip(up[2], -1.0, 1.0)))

@@ -14,8 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
-from bt_tasksim.meshes import superellipsoid_scale
-from bt_tasksim.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.scene.meshes import superellipsoid_scale
 
 _FEW = 16
 
@@ -30,7 +30,7 @@ class Footprint(Protocol):
         """The same for points ``(..., 2)``: points ``(..., 2)`` and inside ``(...)``."""
 
 
-class Surface(Protocol):
+class OuterSurface(Protocol):
     """The outer surface of a solid."""
 
     def nearest(self, point: Array) -> Array:
@@ -111,7 +111,7 @@ class PrismSurface:
     half_height: float
 
     def nearest(self, point: Array) -> Array:
-        """See `Surface`."""
+        """See `OuterSurface`."""
         if type(point) is np.ndarray and point.size <= 3 * _FEW:
             return np.array([self.one(*p) for p in point.reshape(-1, 3).tolist()]).reshape(point.shape)
         xp = array_namespace(point)
@@ -125,7 +125,7 @@ class PrismSurface:
         return xp.concat([flat, height[..., None]], axis=-1)
 
     def one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """See `Surface`."""
+        """See `OuterSurface`."""
         h = self.half_height
         fx, fy, inside = self.footprint.nearest(x, y)
         if inside and h - abs(z) < math.hypot(x - fx, y - fy):
@@ -141,7 +141,7 @@ class SuperellipsoidSurface:
     exponents: tuple[float, float]
 
     def nearest(self, point: Array) -> Array:
-        """See `Surface`."""
+        """See `OuterSurface`."""
         if type(point) is np.ndarray and point.size <= 3 * _FEW:
             return np.array([self.one(*p) for p in point.reshape(-1, 3).tolist()]).reshape(point.shape)
         p = np.asarray(point, float)
@@ -152,7 +152,7 @@ class SuperellipsoidSurface:
         return array_namespace(point).asarray(p * scale[..., None])
 
     def one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """See `Surface`."""
+        """See `OuterSurface`."""
         a, b, c = self.half_size
         e1, e2 = self.exponents
         u, v, w = abs(x / a), abs(y / b), abs(z / c)

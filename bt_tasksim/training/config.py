@@ -6,12 +6,28 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
-from bt_tasksim.errors import InputError, nearest
+from pydantic import Field
+
+from bt_tasksim.core.document import Document
+from bt_tasksim.core.errors import FieldError, InputError
+from bt_tasksim.core.plain import short
+from bt_tasksim.core.renamed import renamed_fields
+from bt_tasksim.core.typed_file import Model, Number, check_record, record_model, validate
 from bt_tasksim.training.reward import Reward
 
+LARGEST_ROLLOUT = 2**21
+"""Decisions: they are kept in memory, some hundred numbers each."""
 
+
+@renamed_fields(
+    lanes="n_envs",
+    lane_steps="n_steps",
+    log_deviation="log_std",
+    final_log_deviation="final_log_std",
+    lesson_share="stage_share",
+)
 @dataclass(frozen=True)
 class TrainConfig:
     """How a policy is learned with PPO.
@@ -22,99 +38,72 @@ class TrainConfig:
     Attributes:
         steps: Decisions of the leaves under training, in all.
         seed: Everything random follows from it.
-        lanes: Parallel strands of episodes in a rollout; results depend on it, and not on the workers.
-        lane_steps: Decisions of a lane in one rollout. 8 lanes of 512 hold some 150 episodes: enough to judge
-            a completion signal that pays once in each.
+        n_envs: Environments in a rollout, side by side; results depend on it, and not on the workers.
+        n_steps: Decisions of each environment in one rollout. 8 environments of 512 hold some 150 episodes:
+            enough to judge a completion signal that pays once in each.
         epochs: Passes over a rollout.
         minibatch: Decisions in a gradient step.
         learning_rate: At the beginning.
         final_learning_rate: At the end; in between it falls linearly, so that the last policy is settled.
         gae_lambda: Of the generalised advantage estimation: a reward that comes once, 40 decisions later.
         clip: Largest relative change of a decision's probability.
-        entropy: Weight of the entropy; none, since the deviation below only shrinks when that pays.
+        entropy: Weight of the entropy; none, since the std below only shrinks when that pays.
         hidden: Sizes of the hidden layers; 64 and 64 decide in 15 microseconds.
-        log_deviation: Logarithm of the actions' standard deviation at the beginning: 0.22. The reference
+        log_std: Logarithm of the actions' standard deviation at the beginning: 0.22. The reference
             motion is nearly right already: wider exploration hides what small changes are worth, and teaches
             to keep away from what only exploring makes dangerous.
-        final_log_deviation: Largest logarithm of the standard deviation at the end. The bound falls
+        final_log_std: Largest logarithm of the standard deviation at the end. The bound falls
             linearly in the second half: what is rewarded last is nearly what is done without exploration.
-        terminate_bias: Bias of the completion signal at the beginning, of which `bt_tasksim.policy.TERMINATE`
-            is the threshold: a first policy ends an episode at one decision in 100.
-        lesson_share: A lesson ends after this share of the steps at the latest, whatever it came to: what it
-            was to teach may be beyond a robot's reach, and the last lesson is what counts.
-        success_window: Episodes over which the success rate is taken that ends a lesson.
+        terminate_bias: Bias of the completion signal at the beginning, whose threshold is
+            `bt_tasksim.policy.policy.TERMINATE`: a first policy ends an episode at one decision in 100.
+        stage_share: A stage ends after this share of the steps at the latest, whatever it came to: what it
+            was to teach may be beyond a robot's reach, and the last stage is what counts.
+        success_window: Episodes over which the success rate is taken that ends a stage.
         evaluate_every: Rollouts between two evaluations on held-apart draws; 0: only at the end.
-        evaluation_draws: Held-apart draws of each, see `bt_tasksim.training.ppo.CLEARLY`.
+        evaluation_draws: Held-apart draws of each, see `bt_tasksim.training.record.CLEARLY`.
         checkpoint_every: Rollouts between two checkpoints: what a killed training loses at most.
         reward: What an episode pays.
     """
 
-    steps: int = 1_000_000
-    seed: int = 0
-    lanes: int = 8
-    lane_steps: int = 512
-    epochs: int = 10
-    minibatch: int = 512
-    learning_rate: float = 4e-4
-    final_learning_rate: float = 2e-5
-    gae_lambda: float = 0.97
-    clip: float = 0.2
-    entropy: float = 0.0
-    hidden: tuple[int, ...] = (64, 64)
-    log_deviation: float = -1.5
-    final_log_deviation: float = -2.2
-    terminate_bias: float = 0.0
-    lesson_share: float = 0.25
-    success_window: int = 300
-    evaluate_every: int = 12
-    evaluation_draws: int = 200
-    checkpoint_every: int = 4
+    steps: Annotated[int, Field(ge=1, le=10**12)] = 1_000_000
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    n_envs: Annotated[int, Field(ge=1, le=4096)] = 8
+    n_steps: Annotated[int, Field(ge=1, le=LARGEST_ROLLOUT)] = 512
+    epochs: Annotated[int, Field(ge=1, le=1000)] = 10
+    minibatch: Annotated[int, Field(ge=1, le=LARGEST_ROLLOUT)] = 512
+    learning_rate: Annotated[Number, Field(gt=0.0, le=1.0)] = 4e-4
+    final_learning_rate: Annotated[Number, Field(gt=0.0, le=1.0)] = 2e-5
+    gae_lambda: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.97
+    clip: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.2
+    entropy: Annotated[Number, Field(ge=-10.0, le=10.0)] = 0.0
+    hidden: Annotated[
+        tuple[Annotated[int, Field(ge=1, le=1024)], ...], Field(strict=False, min_length=1, max_length=8)
+    ] = (64, 64)
+    log_std: Annotated[Number, Field(ge=-20.0, le=2.0)] = -1.5
+    final_log_std: Annotated[Number, Field(ge=-20.0, le=2.0)] = -2.2
+    terminate_bias: Annotated[Number, Field(ge=-50.0, le=50.0)] = 0.0
+    stage_share: Annotated[Number, Field(gt=0.0, le=1.0)] = 0.25
+    success_window: Annotated[int, Field(ge=1, le=10**6)] = 300
+    evaluate_every: Annotated[int, Field(ge=0, le=10**9)] = 12
+    evaluation_draws: Annotated[int, Field(ge=0, le=10**5)] = 200
+    checkpoint_every: Annotated[int, Field(ge=1, le=10**9)] = 4
     reward: Reward = field(default_factory=Reward)
 
     def __post_init__(self) -> None:
-        for name in (
-            "steps",
-            "lanes",
-            "lane_steps",
-            "epochs",
-            "minibatch",
-            "success_window",
-            "checkpoint_every",
-        ):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise InputError(f"training: '{name}' should be a positive whole number, found {value!r}")
-        for name in ("seed", "evaluate_every", "evaluation_draws"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-                raise InputError(
-                    f"training: '{name}' should be zero or a positive whole number, found {value!r}"
-                )
-        for name in ("learning_rate", "final_learning_rate", "clip"):
-            value = getattr(self, name)
-            if not math.isfinite(value) or value <= 0.0:
-                raise InputError(f"training: '{name}' should be positive, found {value!r}")
-        if not 0.0 <= self.gae_lambda <= 1.0:
-            raise InputError(f"training: 'gae_lambda' should be between 0 and 1, found {self.gae_lambda!r}")
-        if not 0.0 < self.lesson_share <= 1.0:
-            raise InputError(
-                f"training: 'lesson_share' should be above 0 and at most 1, found {self.lesson_share!r}"
-            )
-        for name in ("entropy", "log_deviation", "final_log_deviation", "terminate_bias"):
-            value = getattr(self, name)
-            if not math.isfinite(value):
-                raise InputError(f"training: '{name}' should be a finite number, found {value!r}")
+        check_record(self, "training")
         if not isinstance(self.reward, Reward):
-            raise InputError(f"training: 'reward' should be a Reward, found {self.reward!r}")
-        if not self.hidden or any(n < 1 for n in self.hidden):
-            raise InputError(f"training: 'hidden' should hold sizes of layers, found {self.hidden!r}")
-        if self.lanes * self.lane_steps < 2:
-            raise InputError("training: a rollout needs two decisions at least")
+            raise InputError(f"training: 'reward' should be a Reward, found {short(self.reward)}")
+        if not 2 <= self.rollout <= LARGEST_ROLLOUT:
+            raise FieldError(
+                f"training: a rollout of 'n_envs' times 'n_steps' should have 2 to {LARGEST_ROLLOUT} "
+                f"decisions, found {self.rollout}",
+                "n_steps",
+            )
 
     @property
     def rollout(self) -> int:
         """Decisions of one rollout."""
-        return self.lanes * self.lane_steps
+        return self.n_envs * self.n_steps
 
     @property
     def rollouts(self) -> int:
@@ -132,16 +121,10 @@ class TrainConfig:
         Raises:
             InputError: A setting is unknown or no good.
         """
-        known = {f.name for f in dataclasses.fields(cls)}
-        for name in data:
-            if name not in known:
-                raise InputError(f"training: unknown setting '{name}'{nearest(name, known)}")
-        values = dict(data)
-        try:
-            if isinstance(values.get("reward"), Mapping):
-                values["reward"] = Reward(**values["reward"])
-            if "hidden" in values:
-                values["hidden"] = tuple(values["hidden"])
-            return cls(**values)
-        except TypeError as error:
-            raise InputError(f"training: {error}") from error
+        return cls.from_model(validate(record_model(cls), Document("training", dict(data))))
+
+    @classmethod
+    def from_model(cls, model: Model) -> TrainConfig:
+        """The settings that their model read from a file."""
+        values = model.model_dump()
+        return cls(**{**values, "reward": Reward(**values["reward"])})

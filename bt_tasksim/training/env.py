@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from math import isfinite
 from typing import Any
 
@@ -11,17 +11,35 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept import TIMED_OUT, VIOLATED, ConceptModel, Decision
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import BtTasksimError, InputError, LeafError
-from bt_tasksim.policy import Action, Policy, split_action
-from bt_tasksim.poses import Array
-from bt_tasksim.runner import LONGEST, Runner, end_all, failed_leaf, raising_leaf
-from bt_tasksim.scene import Scene
-from bt_tasksim.training.decorator import Train, concepts_in, train_nodes
-from bt_tasksim.training.follower import Judgement, Outcome
-from bt_tasksim.training.reward import PARTS, Reward
+from bt_tasksim.concept.leaf import Decision
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.reporting import outcome_of, speaker
+from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError
+from bt_tasksim.core.outcomes import (
+    INTERRUPTED,
+    LIMIT_VIOLATED,
+    TIME_OVER,
+    TIMED_OUT,
+    Outcome,
+    outcome_of_error,
+    register_reason,
+)
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.renamed import renamed_arguments
+from bt_tasksim.execution.leaf_errors import ticking
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import LONGEST, Runner
+from bt_tasksim.policy.policy import Action, Policy, split_action
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.training.judge import Judgement, SignalOutcome
+from bt_tasksim.training.reward import Reward
+from bt_tasksim.training.reward_parts import End, Transition
+from bt_tasksim.trees.nodes.train import Train, concepts_in, train_nodes
 
+BEGAN_ANEW = register_reason("began_anew", "'{train}' began anew before what follows ended")
+TREE_ENDED = register_reason("tree_ended", "the tree ended before what follows did")
+FOLLOWER_LATE = register_reason("follower_late", "what follows did not end in time")
 REDRAWS = 50
 """Draws in a row in which the subtree may stay inactive."""
 CAMERA = "overview"
@@ -35,11 +53,12 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
     what follows it runs to its end within that same ``step`` and pays the sufficient reward.
 
     An action holds the concept's motion in [-1, 1] and, last, the completion signal: above
-    `bt_tasksim.policy.TERMINATE` the task is done, and the motion counts for nothing.
+    `bt_tasksim.policy.policy.TERMINATE` the task is done, and the motion counts for nothing.
 
     ``info`` of a step: ``reward`` (its parts by name, see `Reward`); and of an episode's last one:
-    ``is_success``, ``status`` (of the subtree), ``follower`` (status of what follows), ``why``, ``discarded``
-    (the judgement was spoiled: ``truncated`` and no sufficient reward) and ``seconds``.
+    ``is_success``, ``status`` (of the subtree), ``follower`` (status of what follows), ``reason`` (the name
+    of a reason), ``why`` (its sentence), ``discarded`` (the judgement was spoiled: ``truncated`` and no
+    sufficient reward) and ``seconds``.
 
     Args:
         tree: The tree, with one `Train` node at least.
@@ -47,8 +66,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         train: Name of the `Train` node; by default the first one.
         options: Engines; by default SAPIEN with the noise model ``original``.
         reward: What is paid.
-        stream: Stream of draws, see `bt_tasksim.scene.STREAMS`.
-        lesson: Number of the scene's lesson that worlds are drawn from; None: the scene itself.
+        stream: Stream of draws, see `bt_tasksim.scene.configuration.STREAMS`.
+        stage: Number of the scene's stage that worlds are drawn from; None: the scene itself.
         longest: Seconds of an episode, earlier siblings included, after which it is truncated.
         render_mode: ``rgb_array``, or None.
         policies: Policies of other leaves, by the leaf's name: what was trained before.
@@ -60,6 +79,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
+    @renamed_arguments(lesson="stage")
     def __init__(
         self,
         tree: Behaviour,
@@ -68,7 +88,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         options: EngineOptions | None = None,
         reward: Reward | None = None,
         stream: str = "training",
-        lesson: int | None = None,
+        stage: int | None = None,
         longest: float = LONGEST,
         render_mode: str | None = None,
         policies: Mapping[str, Policy] | None = None,
@@ -86,7 +106,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
                 leaf.use(policies[leaf.name])
         self.tree, self.scene = tree, scene
         self.reward = reward or Reward()
-        self.stream, self.lesson, self.render_mode = stream, lesson, render_mode
+        self.stream, self.stage, self.render_mode = stream, stage, render_mode
         self.layout = shared_layout(self.train, self.learners, self.runner.robot)
         n, m = sum(self.layout.values()), self.learners[0].actions
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (n,), np.float32)
@@ -97,7 +117,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         """Draws so far in which the subtree was never active."""
         self.discarded = 0
         """Episodes so far whose judgement an error spoiled."""
-        self._ticking: Iterator[Any] | None = None
+        self._ticking: Generator[Behaviour | Decision, None, None] | None = None
         self._decision: Decision | None = None
         self._limit = 0
 
@@ -125,7 +145,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
                 break
             redrawn += 1
             if redrawn >= REDRAWS or given is not None:
-                leaf = failed_leaf(self.tree)
+                leaf = speaker(self.tree)
                 raise InputError(
                     f"'{self.train.name}' was not reached in {redrawn} draws; the last one (seed {draw}) "
                     f"ended with {self.tree.status.name}: {leaf.feedback_message if leaf is not None else ''}"
@@ -135,6 +155,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         self._potential = 0.0
         self._leaf = decision.leaf
         self._before = decision
+        self._last_motion: Array | None = None
         return self._features(decision), {"draw": draw, "redrawn": redrawn}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -160,19 +181,18 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             raise RuntimeError("step() without an episode: call reset() first")
         decision.leaf.decide(action)
         self._decision = None
-        parts = dict.fromkeys(PARTS, 0.0)
+        self._motion = action.motion
         found = self._until_decision()
-        if found is not None:
-            self._decision = found
-            parts["shaping"] = self._shape(found)
-            return self._features(found), parts["shaping"], False, False, {"reward": parts}
-        return self._end(parts)
+        if found is None:
+            return self._end()
+        self._decision = found
+        parts = self._pay(found)
+        return self._features(found), sum(parts.values()), False, False, {"reward": parts}
 
     def render(self) -> Array | None:
         """The picture ``(height, width, 3)`` of a camera beside the robot, uint8."""
         if self.render_mode is None:
             return None
-        assert self.runner.pipeline is not None
         return self.runner.pipeline.render(CAMERA).colour
 
     def close(self) -> None:
@@ -180,21 +200,20 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         self._drop()
         for leaf in self.learners:
             leaf.under_training = False
-        assert self.runner.pipeline is not None
         self.runner.pipeline.close()
 
     # ---- the episode ------------------------------------------------------------------------------------
 
     def _begin(self, draw: int) -> Decision | None:
         self._drop()
-        configuration = self.scene.sample(draw, self.stream, self.lesson)
+        configuration = self.scene.sample(draw, self.stream, self.stage)
         self._world = self.runner.reset(configuration)
         self.judgement.tolerance = configuration.tolerance
         self.judgement.reset()
         self._ticks_left = round(self.runner.longest * configuration.control_frequency)
         self._activation: int | None = None
-        self._outcome: Outcome | None = None
-        self._over = ""
+        self._judged: SignalOutcome | None = None
+        self._over: Outcome | None = None
         self._decision = self._until_decision()
         return self._decision
 
@@ -210,7 +229,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
                         self.judgement.reset()  # what it did in earlier rounds
                 if train.activations == self._activation:
                     return node
-                self._over = "interrupted"
+                self._over = INTERRUPTED()
                 return None
             self.judgement.saw(node)
             if node is train and train.status != Status.RUNNING:
@@ -218,62 +237,49 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
                     self.judgement.reset()
                     continue
                 if train.status == Status.SUCCESS:
-                    self._outcome = self._follow()
-                self._over = "ended"
+                    self._judged = self._follow()
                 return None
             if node is not None:
                 continue
             if self._activation is not None and train.status != Status.RUNNING:
-                self._over = "interrupted"
+                self._over = INTERRUPTED()
                 return None
             if self.tree.status != Status.RUNNING:
-                self._over = "never began"
                 return None
             if not self._control_period():
-                self._over = "time over"
+                self._over = TIME_OVER(limit=self.runner.longest)
                 return None
 
-    def _follow(self) -> Outcome:
+    def _follow(self) -> SignalOutcome:
         """Run what follows to its end."""
         judgement = self.judgement
         try:
-            outcome = judgement.ended(self.train)
-            while outcome is None:
+            judged = judgement.ended(self.train)
+            while judged is None:
                 node = self._next_node()
                 if isinstance(node, Decision):
-                    return Outcome(
-                        False, "INVALID", f"'{self.train.name}' began anew before what follows ended"
-                    )
+                    return SignalOutcome(False, "INVALID", BEGAN_ANEW(train=self.train.name))
                 judgement.saw(node)
-                outcome = judgement.ended(node)
-                if outcome is None and node is None:
+                judged = judgement.ended(node)
+                if judged is None and node is None:
                     if self.tree.status != Status.RUNNING:
-                        return Outcome(False, "INVALID", "the tree ended before what follows did")
+                        return SignalOutcome(False, "INVALID", TREE_ENDED())
                     if not self._control_period():
-                        return Outcome(False, "RUNNING", "what follows did not end in time", discarded=True)
-            return outcome
+                        return SignalOutcome(False, "RUNNING", FOLLOWER_LATE(), discarded=True)
+            return judged
         except (InputError, LeafError):
             raise
         except BtTasksimError as error:
-            return Outcome(False, "INVALID", str(error), discarded=True)
+            return SignalOutcome(False, "INVALID", outcome_of_error(error), discarded=True)
 
-    def _next_node(self) -> Any:
+    def _next_node(self) -> Behaviour | Decision | None:
         """The next node that the present tick visits; None at its end."""
         if self._ticking is None:
-            self._ticking = self.tree.tick()
-        try:
-            return next(self._ticking)
-        except StopIteration:
+            self._ticking = ticking(self.tree)
+        node = next(self._ticking, None)
+        if node is None:
             self._ticking = None
-            return None
-        except BaseException as error:
-            self._ticking = None
-            culprit = raising_leaf(error, self.tree)
-            end_all(self.tree, culprit)
-            if isinstance(error, BtTasksimError) or not isinstance(error, Exception):
-                raise
-            name = culprit.name if culprit is not None else self.tree.name
-            raise LeafError(f"leaf '{name}' raised {type(error).__name__}: {error}") from error
+        return node
 
     def _control_period(self) -> bool:
         if self._ticks_left <= 0:
@@ -282,40 +288,37 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         self.runner.step(self.runner.context.command)
         return True
 
-    def _end(self, parts: dict[str, float]) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def _end(self) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """The last step of an episode: what is paid, and why."""
-        train, outcome = self.train, self._outcome
-        leaf = self._before.leaf
-        why, truncated = leaf.feedback_message, False
-        if self._over in ("interrupted", "time over"):
-            why, truncated = self._over, self._over == "time over"
-        elif outcome is not None:
-            why, truncated = outcome.why, outcome.discarded
-            if not outcome.discarded and self.reward.sufficient:
-                parts["success" if outcome.success else "failure"] = (
-                    self.reward.success if outcome.success else self.reward.failure
-                )
-        elif why.startswith(VIOLATED):
-            parts["violated"] = self.reward.violated
-        elif why.startswith(TIMED_OUT):
-            parts["timeout"] = self.reward.timeout
+        train, judged = self.train, self._judged
+        outcome, truncated = self._before.leaf.outcome, False
+        end: End = "cut"
+        if self._over is not None:
+            outcome, truncated = self._over, self._over.is_a(TIME_OVER)
+        elif judged is not None:
+            outcome, truncated = judged.outcome, judged.discarded
+            if not judged.discarded and self.reward.sufficient:
+                end = "success" if judged.success else "failure"
+        elif outcome is not None and outcome.is_a(LIMIT_VIOLATED):
+            end = "violated"
+        elif outcome is not None and outcome.is_a(TIMED_OUT):
+            end = "timeout"
         else:
-            failed = failed_leaf(train)
-            why = failed.feedback_message if failed is not None else why
-            parts["failure"] = self.reward.failure
-        kept = truncated or (outcome is not None and (outcome.success or not self.reward.sufficient))
-        if kept:  # the present observation is charged once: there is no state after it
-            parts["shaping"] = self.reward.shape(self._potential, self._potential)
-        else:
-            parts["shaping"] = self.reward.take_back(self._potential)
-        self.discarded += truncated and outcome is not None
+            failed = speaker(train)
+            outcome = (outcome_of(failed) if failed is not None else None) or outcome
+            end = "failure"
+        kept = truncated or (judged is not None and (judged.success or not self.reward.sufficient))
+        # Where it is kept, the present observation is charged once: there is no state after it.
+        parts = self.reward.pay(self._transition(self._potential if kept else 0.0, end))
+        self.discarded += truncated and judged is not None
         info = {
             "reward": parts,
-            "is_success": outcome is not None and outcome.success and not outcome.discarded,
+            "is_success": judged is not None and judged.success and not judged.discarded,
             "status": train.status.name,
-            "follower": "" if outcome is None else outcome.status,
-            "why": why,
-            "discarded": outcome is not None and outcome.discarded,
+            "follower": "" if judged is None else judged.status,
+            "reason": "" if outcome is None else outcome.cause.reason.name,
+            "why": "" if outcome is None else outcome.sentence,
+            "discarded": judged is not None and judged.discarded,
             "seconds": self.runner.context.now,
         }
         features = self._features(self._before)
@@ -326,10 +329,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         """End a tick that is suspended."""
         self._decision = None
         if self._ticking is not None:
-            close = getattr(self._ticking, "close", None)
+            self._ticking.close()
             self._ticking = None
-            if close is not None:
-                close()
 
     def _features(self, decision: Decision) -> Array:
         """What the leaf sees; kept for the episode's last step."""
@@ -346,14 +347,21 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
     def _cost(self, decision: Decision) -> float:
         return float(decision.leaf.model.necessary_cost(decision.seen, decision.memory))
 
-    def _shape(self, decision: Decision) -> float:
-        """Shaping for the way from the last decision to this one; a new leaf starts from nothing."""
-        cost = self._cost(decision)
-        if decision.leaf is not self._leaf:
-            self._leaf, self._cost0, self._potential = decision.leaf, cost, 0.0
-            return 0.0
-        before, self._potential = self._potential, self._cost0 - cost
-        return self.reward.shape(before, self._potential)
+    def _pay(self, found: Decision) -> dict[str, float]:
+        """What the last decision pays, now that the next one is there; a new leaf starts from nothing."""
+        cost = self._cost(found)
+        after = self._cost0 - cost
+        if found.leaf is not self._leaf:
+            self._leaf, self._cost0, self._potential, after = found.leaf, cost, 0.0, 0.0
+        parts = self.reward.pay(self._transition(after))
+        self._last_motion = self._motion if found.leaf is self._before.leaf else None
+        self._potential = after
+        return parts
+
+    def _transition(self, after: float, end: End = "") -> Transition:
+        return Transition(
+            self._before, self._motion, self._last_motion, self._potential, after, self.reward.gamma, end
+        )
 
 
 def find_train(tree: Behaviour, name: str | None = None) -> Train:
@@ -371,7 +379,7 @@ def find_train(tree: Behaviour, name: str | None = None) -> Train:
     raise InputError(f"no Train node '{name}' in the tree; there is {', '.join(repr(n.name) for n in found)}")
 
 
-def shared_layout(train: Train, learners: list[ConceptModel], robot: Any) -> dict[str, int]:
+def shared_layout(train: Train, learners: list[ConceptModel], robot: RobotDescription) -> dict[str, int]:
     """What all leaves that learn under one Train see.
 
     Raises:

@@ -6,23 +6,31 @@ or on the order of the episodes.
 
 from __future__ import annotations
 
+import json
+import math
 import multiprocessing
 import os
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from py_trees.common import Status
 
-from bt_tasksim.engines.registry import EngineOptions, result_names
-from bt_tasksim.engines.ros.address import is_ros
-from bt_tasksim.errors import BtTasksimError, InputError, LostEngine, MachineError
-from bt_tasksim.interrupts import held_back
+from bt_tasksim.concept.plugins import load_all
+from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
+from bt_tasksim.core.files import check_writable, write_text
+from bt_tasksim.core.interrupts import ending, held_back, terminable
+from bt_tasksim.core.outcomes import outcome_of_error
+from bt_tasksim.core.plugins import loaded
+from bt_tasksim.execution.pipelines import EngineOptions, result_names
+from bt_tasksim.scene.configuration import check_seed
+from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
 
-CONFIDENCE = 0.95
+if TYPE_CHECKING:
+    from bt_tasksim.execution.runner import Runner
 
 
 @dataclass(frozen=True)
@@ -34,104 +42,73 @@ class Job:
         scene: Name or file of the scene, or None for the tree's own.
         robot: Name or file of the robot, or None for the scene's own.
         options: Which engines.
-        nodes: A Python file with concepts and conditions of one's own, for an XML tree.
         policies: Concepts and the policies that their leaves take, whatever the tree itself says.
+        plugins: Plugins that the process loads first, by default those of this process.
     """
 
     tree: str
     scene: str | None = None
     robot: str | None = None
     options: EngineOptions = field(default_factory=EngineOptions)
-    nodes: str | None = None
     policies: tuple[tuple[str, str], ...] = ()
+    plugins: tuple[str, ...] = field(default_factory=loaded)
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """One episode, in short.
+class EvaluationFile:
+    """Keeps an evaluation in a file while it is made: give it to `evaluate` as ``keep``.
 
-    Attributes:
-        seed: Its seed.
-        success: The tree ended SUCCESS and the physics state agrees.
-        status: The tree's status.
-        reason: Short reason for failure.
-        why: One sentence.
-        control_steps: Control periods.
-        position_error: Metres, NaN where no goal says so.
-        angle_error: Radians, likewise.
-        penetration: Deepest overlap of two bodies, metres.
-        wall_time: Seconds it took.
+    Args:
+        path: Where to; what is there stays until the first episode has ended.
+
+    Raises:
+        InputError: The folder does not exist, or the path is a folder or a device.
+        MachineError: It is not writable.
     """
 
-    seed: int
-    success: bool
-    status: str
-    reason: str
-    why: str
-    control_steps: int
-    position_error: float
-    angle_error: float
-    penetration: float
-    wall_time: float
+    EVERY = 2.0
+    """Seconds between two writings: what a killed evaluation loses at most."""
+
+    def __init__(self, path: str | Path) -> None:
+        check_writable(path)
+        self.path = path
+        self._written = -math.inf
+
+    def __call__(self, evaluation: Evaluation, last: bool) -> None:
+        """Write what there is, if it is time.
+
+        Args:
+            evaluation: What there is.
+            last: There will be no more.
+        """
+        now = time.monotonic()
+        if last or now - self._written >= self.EVERY:
+            write_text(self.path, json.dumps(evaluation.to_json(), indent=2, allow_nan=False) + "\n")
+            self._written = now
 
 
-@dataclass(frozen=True)
-class Evaluation:
-    """The outcomes of an evaluation and what they were measured with."""
+class EvaluationInterrupted(KeyboardInterrupt):  # as KeyboardInterrupt, which it is
+    """An evaluation was interrupted.
 
-    scenario: str
-    robot: str
-    engines: str
-    perception: str
-    policies: dict[str, str]
-    outcomes: tuple[Outcome, ...]
-    seconds: float
-
-    @property
-    def successes(self) -> int:
-        """Count of successful episodes."""
-        return sum(o.success for o in self.outcomes)
-
-    def to_json(self) -> dict[str, Any]:
-        """The fields of ``evaluate --json``."""
-        n = len(self.outcomes)
-        failures = Counter(o.reason for o in self.outcomes if not o.success)
-        return {
-            "scenario": self.scenario,
-            "robot": self.robot,
-            "engines": self.engines,
-            "perception": self.perception,
-            "policies": self.policies,
-            "episodes": n,
-            "successes": self.successes,
-            "success_rate": self.successes / n,
-            "confidence_interval": list(wilson(self.successes, n)),
-            "failures": dict(failures.most_common()),
-            "failed_seeds": [o.seed for o in self.outcomes if not o.success],
-            "seconds": round(self.seconds, 3),
-            "control_steps": sum(o.control_steps for o in self.outcomes),
-            "outcomes": [asdict(o) for o in self.outcomes],
-        }
-
-
-def wilson(successes: int, n: int) -> tuple[float, float]:
-    """Wilson's confidence interval (95 %) of a success rate.
-
-    Source: E. B. Wilson, "Probable inference, the law of succession, and statistical inference", J. American
-    Statistical Association 22, 1927; computed by SciPy.
+    Args:
+        evaluation: The episodes that had ended.
     """
-    from scipy.stats import binomtest
 
-    interval = binomtest(successes, n).proportion_ci(CONFIDENCE, method="wilson")
-    return float(interval.low), float(interval.high)
+    def __init__(self, evaluation: Evaluation) -> None:
+        super().__init__(f"{len(evaluation.outcomes)} of {evaluation.asked} episodes had ended")
+        self.evaluation = evaluation
+
+
+class EvaluationTerminated(EvaluationInterrupted, Terminated):
+    """An evaluation was ended by SIGTERM or SIGHUP."""
 
 
 def evaluate(
     job: Job,
     seeds: Sequence[int],
     workers: int = 1,
-    progress: Callable[[Outcome], None] | None = None,
+    progress: Callable[[EpisodeOutcome], None] | None = None,
     stream: str = "evaluation",
+    keep: Callable[[Evaluation, bool], None] | None = None,
 ) -> Evaluation:
     """Run one episode for each seed.
 
@@ -141,11 +118,14 @@ def evaluate(
         workers: Worker processes; 1 runs in this process.
         progress: Called after every episode, in the order in which they end.
         stream: Stream of draws.
+        keep: Called after every episode with what there is, and at the end with true, however it comes.
 
     Returns:
         The outcomes in the order of the seeds.
 
     Raises:
+        EvaluationInterrupted: By Ctrl-C; holds what there is.
+        EvaluationTerminated: By SIGTERM or SIGHUP; likewise.
         InputError: The tree, scene, robot or engines are no good, or there are no seeds.
         LostEngine: An engine in another process has gone away.
         MachineError: A robot has failed.
@@ -156,51 +136,74 @@ def evaluate(
         raise InputError(f"an evaluation needs at least one worker, found {workers}")
     if workers > 1 and job.options.remote:
         raise InputError("an engine in another process serves one client at a time: evaluate with 1 worker")
+    for seed in seeds:
+        check_seed(seed)
     started = time.perf_counter()
     runner = _runner(job)  # errors show here, before any process starts
-    with closing(runner.pipeline):  # what serves one client at a time is free for the next one
-        found = _outcomes(runner, job, seeds, workers, progress, stream)
     engines, perception = result_names(job.options, runner.pipeline)
-    return Evaluation(
-        scenario=_name(job),
-        robot=runner.robot.name,
-        engines=engines,
-        perception=perception,
-        policies=_policies(runner),
-        outcomes=tuple(found[s] for s in seeds),
-        seconds=time.perf_counter() - started,
-    )
+    found: dict[int, EpisodeOutcome] = {}
+
+    def evaluation() -> Evaluation:
+        return Evaluation(
+            scenario=_name(job),
+            robot=runner.robot.name,
+            engines=engines,
+            perception=perception,
+            policies=_policies(runner),
+            outcomes=tuple(found[s] for s in seeds if s in found),
+            seconds=time.perf_counter() - started,
+            asked=len(seeds),
+        )
+
+    def ended(outcome: EpisodeOutcome) -> None:
+        found[outcome.seed] = outcome
+        if progress is not None:
+            progress(outcome)
+        if keep is not None and len(found) < len(seeds):
+            keep(evaluation(), False)
+
+    with closing(runner.pipeline):  # what serves one client at a time is free for the next one
+        try:
+            with terminable():
+                _run_all(runner, job, seeds, workers, ended, stream)
+        except KeyboardInterrupt as stop:
+            with ending():
+                if keep is not None and found:
+                    keep(evaluation(), True)
+            kind = EvaluationTerminated if isinstance(stop, Terminated) else EvaluationInterrupted
+            raise kind(evaluation()) from stop
+        except BtTasksimError:
+            if keep is not None and found:
+                keep(evaluation(), True)
+            raise
+    if keep is not None:
+        keep(evaluation(), True)
+    return evaluation()
 
 
-def _outcomes(
-    runner: Any,
+def _run_all(
+    runner: Runner,
     job: Job,
     seeds: Sequence[int],
     workers: int,
-    progress: Callable[[Outcome], None] | None,
+    ended: Callable[[EpisodeOutcome], None],
     stream: str,
-) -> dict[int, Outcome]:
-    """Outcomes by seed."""
-    found: dict[int, Outcome] = {}
+) -> None:
+    """Run all episodes, in this process or in others."""
     if workers == 1:
         for seed in seeds:
-            found[seed] = episode(runner, seed, stream)
-            if progress is not None:
-                progress(found[seed])
-    else:
-        with _one_thread_each(), held_back(spawning=True):
-            pool = multiprocessing.get_context("spawn").Pool(
-                min(workers, len(seeds)), initializer=_start, initargs=(job, stream)
-            )
-        with pool:
-            for outcome in pool.imap_unordered(_work, seeds):
-                found[outcome.seed] = outcome
-                if progress is not None:
-                    progress(outcome)
-    return found
+            ended(episode(runner, seed, stream))
+        return
+    with _one_thread_each(), held_back(spawning=True):
+        pool = multiprocessing.get_context("spawn").Pool(
+            min(workers, len(seeds)), initializer=_start, initargs=(job, stream)
+        )
+    with pool:
+        for outcome in pool.imap_unordered(_work, seeds):
+            ended(outcome)
 
 
-def episode(runner: Any, seed: int, stream: str = "evaluation") -> Outcome:
+def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOutcome:
     """One episode; an error in it is a failure with the error as its reason.
 
     Raises:
@@ -215,21 +218,19 @@ def episode(runner: Any, seed: int, stream: str = "evaluation") -> Outcome:
     except InputError:
         raise
     except BtTasksimError as error:
-        if isinstance(error, MachineError) and (
-            isinstance(error, LostEngine) or is_ros(runner.options.engines)
-        ):
+        if isinstance(error, MachineError) and (isinstance(error, LostEngine) or runner.options.real):
             raise  # an engine that is not there any more, or a robot, says nothing about the tree
-        return Outcome(
-            seed, False, Status.INVALID.name, type(error).__name__, str(error), 0, nan, nan, nan,
+        return EpisodeOutcome(
+            seed, False, Status.INVALID.name, "", outcome_of_error(error), 0, nan, nan, nan,
             time.perf_counter() - started,
         )  # fmt: skip
     v = result.verdict
-    return Outcome(
+    return EpisodeOutcome(
         seed=seed,
         success=result.success,
         status=result.status.name,
-        reason=result.reason,
-        why=result.why,
+        leaf=result.leaf,
+        outcome=result.outcome,
         control_steps=result.control_steps,
         position_error=nan if v is None else v.position_error,
         angle_error=nan if v is None else v.angle_error,
@@ -243,29 +244,35 @@ _worker: dict[str, Any] = {}
 
 
 def _start(job: Job, stream: str) -> None:
-    _worker["runner"], _worker["stream"] = _runner(job), stream
+    """Begin a worker. A pool replaces one that fails here by another, for ever: so `_work` raises it."""
+    _worker["stream"] = stream
+    try:
+        _worker["runner"] = _runner(job)
+    except Exception as error:
+        _worker["error"] = error
 
 
-def _work(seed: int) -> Outcome:
+def _work(seed: int) -> EpisodeOutcome:
+    if "error" in _worker:
+        raise _worker["error"]
     return episode(_worker["runner"], seed, _worker["stream"])
 
 
-def _runner(job: Job) -> Any:
-    from bt_tasksim.runner import Runner
-    from trees.load import load_source
+def _runner(job: Job) -> Runner:
+    from bt_tasksim.execution.runner import Runner
+    from bt_tasksim.trees.load import load_source
 
-    source = load_source(job.tree, job.robot, job.scene, job.nodes, job.policies)
+    load_all(job.plugins)
+    source = load_source(job.tree, job.robot, job.scene, job.policies)
     return Runner(source.build(), source.scene, job.options)
 
 
 def _name(job: Job) -> str:
-    from pathlib import Path
-
     return Path(job.tree).stem if job.tree.endswith((".py", ".xml")) else job.tree
 
 
-def _policies(runner: Any) -> dict[str, str]:
-    from bt_tasksim.concept import ConceptNode
+def _policies(runner: Runner) -> dict[str, str]:
+    from bt_tasksim.concept.leaf import ConceptNode
 
     return {
         leaf.name: leaf.policy_in_use.name for leaf in runner.tree.iterate() if isinstance(leaf, ConceptNode)

@@ -3,33 +3,42 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.context import Context, Known
-from bt_tasksim.judge import DEEPEST
-from bt_tasksim.training.decorator import Train, concepts_in, follower_of
-from bt_tasksim.world import Hidden
+from bt_tasksim.concept.context import Context, Known
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.reporting import outcome_of
+from bt_tasksim.core.outcomes import OUT_OF_REACH, Outcome, register_reason
+from bt_tasksim.core.units import COUNT
+from bt_tasksim.core.world import Hidden
+from bt_tasksim.scene.success import DEEPEST, PENETRATION
+from bt_tasksim.trees.nodes.train import Train, concepts_in, follower_of
+
+FOLLOWED = register_reason("followed", "{node} succeeded")
+FOLLOWER_FAILED = register_reason("follower_failed", "{node}")
+GOAL_MISSED = register_reason(
+    "goal_missed", "{leaf} ended SUCCESS, and its goal is missed by {cost:.2g}", cost=COUNT
+)
+FOLLOWER_NOT_REACHED = register_reason("follower_not_reached", "'{ended}' ended before '{follower}' did")
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SignalOutcome:
     """What became of a completion signal.
 
     Attributes:
         success: Status and hidden state agree that it was right.
         status: The follower's status; empty without a follower.
-        why: One sentence.
+        outcome: Why.
         discarded: An error of engine or kinematics spoiled the judgement.
         cost: Largest sufficient cost of what succeeded, in units of what is tolerable.
     """
 
     success: bool
     status: str
-    why: str
+    outcome: Outcome
     discarded: bool = False
     cost: float = 0.0
 
@@ -51,16 +60,15 @@ class Judgement:
         self._judged = set(concepts_in(self.follower if self.follower is not None else train))
         self._began: dict[ConceptModel, tuple[int, Hidden | None]] = {}
         self._activations: dict[ConceptModel, int] = {}
-        self._cost, self._why = 0.0, ""
         self.reset()
 
     def reset(self) -> None:
         """Begin an episode."""
         self._began.clear()
         self._activations = {leaf: leaf.activations for leaf in self._judged}
-        self._cost, self._why = 0.0, ""
+        self._cost, self._missed = 0.0, GOAL_MISSED(leaf="", cost=0.0)
 
-    def saw(self, node: Any) -> None:
+    def saw(self, node: Behaviour | None) -> None:
         """Take note of a node that a tick has visited."""
         if not isinstance(node, ConceptModel) or node not in self._judged:
             return
@@ -76,12 +84,9 @@ class Judgement:
             known = Known(hidden, self._context.world, began[1])
             cost = float(node.sufficient_cost(known, node.memory))
             if cost >= self._cost and cost > 0.0:
-                self._cost, self._why = (
-                    cost,
-                    f"{node.name} ended SUCCESS, and its goal is missed by {cost:.2g}",
-                )
+                self._cost, self._missed = cost, GOAL_MISSED(leaf=node.name, cost=cost)
 
-    def ended(self, node: Any = None) -> Outcome | None:
+    def ended(self, node: Behaviour | None = None) -> SignalOutcome | None:
         """The outcome, once there is one.
 
         Args:
@@ -90,32 +95,32 @@ class Judgement:
         """
         follower, scope = self.follower, self.scope
         if follower is None:
-            return self._outcome(self._train)
+            return self._judged_by(self._train)
         if node is follower and follower.status in (Status.SUCCESS, Status.FAILURE):
-            return self._outcome(follower)
+            return self._judged_by(follower)
         if scope is not None and (node is None or node is scope) and scope.status != Status.RUNNING:
-            why = _why(scope) or f"'{scope.name}' ended before '{follower.name}' did"
-            return Outcome(False, follower.status.name, why)
+            unreached = FOLLOWER_NOT_REACHED(ended=scope.name, follower=follower.name)
+            return SignalOutcome(False, follower.status.name, _failed(scope) or unreached)
         return None
 
-    def _outcome(self, node: Behaviour) -> Outcome:
+    def _judged_by(self, node: Behaviour) -> SignalOutcome:
         name = "" if self.follower is None else node.status.name
         hidden = self._context.hidden()
         if node.status == Status.FAILURE:
-            why = _why(node)
-            return Outcome(False, name, why, discarded="out of reach" in why)
+            outcome = _failed(node) or FOLLOWER_FAILED(node=node.name)
+            return SignalOutcome(False, name, outcome, discarded=outcome.is_a(OUT_OF_REACH))
         if self._cost >= self.tolerance:
-            return Outcome(False, name, self._why, cost=self._cost)
+            return SignalOutcome(False, name, self._missed, cost=self._cost)
         if hidden is not None and float(hidden.penetration) > DEEPEST:
-            depth = 1000 * float(hidden.penetration)
-            return Outcome(False, name, f"two bodies overlapped by {depth:.1f} mm", cost=self._cost)
-        return Outcome(True, name, f"{node.name} succeeded", cost=self._cost)
+            return SignalOutcome(False, name, PENETRATION(depth=hidden.penetration), cost=self._cost)
+        return SignalOutcome(True, name, FOLLOWED(node=node.name), cost=self._cost)
 
 
-def _why(root: Behaviour) -> str:
-    """The reason of the leaf that failed below a node."""
+def _failed(root: Behaviour) -> Outcome | None:
+    """What the last failed leaf of a subtree says, or the subtree itself."""
     leaf = next(
         (n for n in root.iterate() if n.status == Status.FAILURE and not n.children and n.feedback_message),
-        None,
+        root,
     )
-    return f"{leaf.name}: {leaf.feedback_message}" if leaf is not None else root.feedback_message
+    said = outcome_of(leaf)
+    return None if said is None else FOLLOWER_FAILED(said, node=leaf.name)

@@ -1,4 +1,4 @@
-"""PPO of stable-baselines3, fed with lanes."""
+"""PPO of stable-baselines3, fed with rollouts of several environments."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
-from bt_tasksim.network import Network
-from bt_tasksim.poses import Array
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.policy.network import Network
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.rollouts import Lane
+from bt_tasksim.training.rollouts import EnvironmentRollout
 
 
 class _Spaces(gymnasium.Env[Array, Array]):
@@ -56,7 +57,7 @@ class Statistics:
 
 
 class Learner:
-    """A PPO whose rollouts come from lanes.
+    """A PPO whose rollouts come from several environments.
 
     Args:
         observation_space: Box ``(n,)``.
@@ -73,7 +74,7 @@ class Learner:
             self.ppo = PPO(
                 "MlpPolicy",
                 _Spaces(observation_space, action_space),
-                n_steps=config.lane_steps * config.lanes,
+                n_steps=config.n_steps * config.n_envs,
                 batch_size=min(config.minibatch, config.rollout),
                 n_epochs=config.epochs,
                 learning_rate=lambda left: (
@@ -87,19 +88,19 @@ class Learner:
                 policy_kwargs={
                     "net_arch": {"pi": list(config.hidden), "vf": list(config.hidden)},
                     "activation_fn": torch.nn.Tanh,
-                    "log_std_init": config.log_deviation,
+                    "log_std_init": config.log_std,
                 },
             )
             with torch.no_grad():
                 self.ppo.policy.action_net.bias[-1] = config.terminate_bias
         self.ppo.rollout_buffer = RolloutBuffer(
-            config.lane_steps,
+            config.n_steps,
             observation_space,
             action_space,
             device="cpu",
             gae_lambda=config.gae_lambda,
             gamma=config.reward.gamma,
-            n_envs=config.lanes,
+            n_envs=config.n_envs,
         )
         outputs = [TensorBoardOutputFormat(str(board))] if board is not None else []
         self.logger = Logger(None if board is None else str(board), outputs)
@@ -116,37 +117,41 @@ class Learner:
 
     @property
     def decisive(self) -> Network:
-        """The present policy as it decides for good, see `bt_tasksim.policy.done_share`."""
+        """The present policy as it decides for good, see `bt_tasksim.policy.policy.done_share`."""
         network = self.network
-        return Network(network.mean, network.deviation, network.layers, float(self.deviation[-1]))
+        return Network(network.mean, network.std, network.layers, float(self.std[-1]))
 
     @property
-    def deviation(self) -> Array:
+    def std(self) -> Array:
         """Standard deviations ``(m,)`` of the actions."""
         return np.exp(_numpy(self.ppo.policy.log_std))
 
-    def update(self, lanes: list[Lane], iteration: int) -> None:
-        """Learn from one rollout."""
+    def update(self, rollouts: list[EnvironmentRollout], iteration: int) -> None:
+        """Learn from one rollout.
+
+        Raises:
+            InputError: The weights are no finite numbers any more.
+        """
         config, policy, buffer = self.config, self.ppo.policy, self.ppo.rollout_buffer
         network = self.network
-        n = config.lane_steps
-        features = np.stack([network.normalise(lane.features) for lane in lanes], axis=1)
-        actions = np.stack([lane.actions for lane in lanes], axis=1)
-        rewards = np.stack([lane.rewards for lane in lanes], axis=1)
-        starts = np.stack([lane.starts for lane in lanes], axis=1)
+        n = config.n_steps
+        features = np.stack([network.normalise(rollout.features) for rollout in rollouts], axis=1)
+        actions = np.stack([rollout.actions for rollout in rollouts], axis=1)
+        rewards = np.stack([rollout.rewards for rollout in rollouts], axis=1)
+        starts = np.stack([rollout.starts for rollout in rollouts], axis=1)
         with torch.no_grad():
             flat = torch.as_tensor(features.reshape(-1, features.shape[-1]))
             values, log_prob, _ = policy.evaluate_actions(
                 flat, torch.as_tensor(actions.reshape(-1, actions.shape[-1]))
             )
-            values = values.reshape(n, len(lanes))
-            log_prob = log_prob.reshape(n, len(lanes))
-            last = torch.zeros(len(lanes))
-            ended = np.ones(len(lanes), bool)
-            for k, lane in enumerate(lanes):
-                if len(lane.cut):
-                    beyond = policy.predict_values(torch.as_tensor(network.normalise(lane.cut))).flatten()
-                    for at, value in zip(lane.cut_at.tolist(), beyond, strict=True):
+            values = values.reshape(n, len(rollouts))
+            log_prob = log_prob.reshape(n, len(rollouts))
+            last = torch.zeros(len(rollouts))
+            ended = np.ones(len(rollouts), bool)
+            for k, rollout in enumerate(rollouts):
+                if len(rollout.cut):
+                    beyond = policy.predict_values(torch.as_tensor(network.normalise(rollout.cut))).flatten()
+                    for at, value in zip(rollout.cut_at.tolist(), beyond, strict=True):
                         if at == n - 1:
                             last[k], ended[k] = value, False
                         else:
@@ -158,12 +163,17 @@ class Learner:
         self.ppo.num_timesteps += config.rollout
         self.ppo._update_current_progress_remaining(iteration, max(config.rollouts, 1))
         with _seeded(config.seed, iteration + 1):
-            self.ppo.train()
+            try:
+                self.ppo.train()
+            except ValueError as error:  # torch refuses a distribution of NaN
+                raise _diverged(iteration) from error
+        if not all(bool(torch.isfinite(values).all()) for values in policy.state_dict().values()):
+            raise _diverged(iteration)
         left = min(1.0, 2.0 - 2.0 * iteration / max(config.rollouts, 1))
-        bound = config.final_log_deviation + left * (config.log_deviation - config.final_log_deviation)
+        bound = config.final_log_std + left * (config.log_std - config.final_log_std)
         with torch.no_grad():
-            policy.log_std.clamp_(max=max(bound, config.final_log_deviation))
-        self.statistics.update(np.concatenate([lane.features for lane in lanes]))
+            policy.log_std.clamp_(max=max(bound, config.final_log_std))
+        self.statistics.update(np.concatenate([rollout.features for rollout in rollouts]))
 
     # ---- checkpoints ------------------------------------------------------------------------------------
 
@@ -205,8 +215,15 @@ class Learner:
                 module.weight.copy_(torch.as_tensor(w))
                 module.bias.copy_(torch.as_tensor(b))
         self.statistics.mean = network.mean.astype(float)
-        self.statistics.variance = network.deviation.astype(float) ** 2
+        self.statistics.variance = network.std.astype(float) ** 2
         self.statistics.count = float(self.config.rollout * 50)
+
+
+def _diverged(iteration: int) -> InputError:
+    return InputError(
+        f"the training diverged in rollout {iteration}: the network's weights are no finite numbers any "
+        "more; take a smaller learning rate, and look at the rewards"
+    )
 
 
 def _numpy(tensor: Any) -> Array:

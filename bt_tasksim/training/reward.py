@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
+from typing import Annotated
 
-from bt_tasksim.errors import InputError
+from pydantic import Field
+
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.registry import part
+from bt_tasksim.core.typed_file import Number, Switch, check_record
+from bt_tasksim.training.reward_parts import RewardPart, Transition
+
+Penalty = Annotated[Number, Field(ge=-1e6, le=0.0)]
+Term = Annotated[Number, Field(ge=-1e6, le=1e6)]
 
 
 @dataclass(frozen=True)
@@ -26,38 +34,40 @@ class Reward:
         gamma: The learner's discount, for the potential too. With 0.99 a second of care would cost a fifth of
             what it may save.
         sufficient: What follows pays; else only shaping and limits do (an ablation).
+        terms: Weights of further parts by their names; none by default.
     """
 
-    success: float = 1.0
-    failure: float = -1.0
-    violated: float = -1.0
-    timeout: float = -1.0
-    shaping: float = 0.3
-    gamma: float = 0.999
-    sufficient: bool = True
+    success: Annotated[Number, Field(gt=0.0, le=1e6)] = 1.0
+    failure: Penalty = -1.0
+    violated: Penalty = -1.0
+    timeout: Penalty = -1.0
+    shaping: Annotated[Number, Field(ge=0.0, le=1e6)] = 0.3
+    gamma: Annotated[Number, Field(gt=0.0, le=1.0)] = 0.999
+    sufficient: Switch = True
+
+    terms: Annotated[dict[str, Term], Field(max_length=32)] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.gamma <= 1.0:
-            raise InputError(f"'gamma' should be above 0 and at most 1, found {self.gamma:g}")
-        paid = (self.success, self.failure, self.violated, self.timeout, self.shaping)
-        if not all(math.isfinite(v) for v in paid):
-            raise InputError(f"a reward's parts should be finite numbers, found {paid}")
-        if self.success <= 0.0 or max(self.failure, self.violated, self.timeout) > 0.0:
-            raise InputError("success should pay more than nothing, and failures no more than nothing")
-        if self.shaping < 0.0:
-            raise InputError(f"'shaping' should not be negative, found {self.shaping:g}")
+        check_record(self, "reward")
+        for name in self.terms:
+            if name in PARTS:
+                raise InputError(f"reward: '{name}' has a field of its own, and is no further term")
+            part("reward part", name)
 
-    def shape(self, before: float, after: float) -> float:
-        """Shaping for a change of potential (necessary cost at the start less the present one)."""
-        return self.shaping * (self.gamma * after - before)
+    @property
+    def weights(self) -> dict[str, float]:
+        """Weights of all parts by name."""
+        return {**{name: getattr(self, name) for name in PARTS}, **self.terms}
 
-    def take_back(self, before: float) -> float:
-        """Shaping at an end without success: the potential after it is nothing, so coming near never pays.
+    def pay(self, transition: Transition) -> dict[str, float]:
+        """What a decision pays, by part."""
+        out = {}
+        for name, weight in self.weights.items():
+            reward_part: RewardPart = part("reward part", name)()
+            paid = reward_part.pay(transition)
+            out[name] = weight * paid if paid else 0.0
+        return out
 
-        Source: M. Grzes, "Reward shaping in episodic reinforcement learning", AAMAS 2017.
-        """
-        return -self.shaping * before
 
-
-PARTS = tuple(f.name for f in fields(Reward) if f.name not in ("gamma", "sufficient"))
-"""Names of the parts of a reward, as an episode's ``info["reward"]`` gives them."""
+PARTS = ("success", "failure", "violated", "timeout", "shaping")
+"""Names of the parts that every reward has; an episode's ``info["reward"]`` begins with them."""

@@ -1,6 +1,6 @@
 """Episodes collected over worker processes, the same whatever their number.
 
-A rollout is a fixed number of lanes. Each lane runs its own episodes for a fixed number of decisions, with
+A rollout is a fixed number of environments. Each runs its own episodes for a fixed number of decisions, with
 its own seeds, in whichever worker is free: so the number of workers changes the time and nothing else.
 """
 
@@ -17,19 +17,19 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.errors import BtTasksimError, InputError, MachineError
-from bt_tasksim.interrupts import held_back
-from bt_tasksim.network import Network
-from bt_tasksim.policy import split_action
-from bt_tasksim.poses import Array
+from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
+from bt_tasksim.core.interrupts import held_back
+from bt_tasksim.core.poses import Array
+from bt_tasksim.policy.network import Network
+from bt_tasksim.policy.policy import split_action
 
 EnvMaker = Callable[[], Any]
 """Builds an environment in a worker process."""
 
 
 @dataclass(frozen=True)
-class Lane:
-    """What one lane brought back; ``n`` decisions.
+class EnvironmentRollout:
+    """What one environment brought back; ``n`` decisions.
 
     Attributes:
         features: ``(n, n_features)`` as the concept gave them.
@@ -37,7 +37,7 @@ class Lane:
         rewards: ``(n,)``.
         starts: ``(n,)`` boolean, the decision is the first one of its episode.
         cut: Features ``(k, n_features)`` after decisions ``cut_at (k,)`` at which an episode was truncated.
-        cut_at: See ``cut``; the last decision of the lane is among them unless its episode ended there.
+        cut_at: See ``cut``; the environment's last decision is among them unless its episode ended there.
         ends: For each episode that ended: success, decisions, return and reason.
         redrawn: Draws in which the subtree was never active.
     """
@@ -53,24 +53,24 @@ class Lane:
 
 
 @dataclass(frozen=True)
-class Task:
-    """What a worker is to do: a lane of a rollout, or the evaluation of one draw."""
+class RolloutTask:
+    """What a worker is to do: an environment of a rollout, or the evaluation of one draw."""
 
     kind: str
     network: dict[str, Array]
-    deviation: Array
+    std: Array
     seed: tuple[int, ...]
     decisions: int
-    lesson: int | None
+    stage: int | None
     draw: int = 0
 
 
-def collect(env: Any, task: Task) -> Lane:
-    """One lane: episodes until there are enough decisions."""
+def collect(env: Any, task: RolloutTask) -> EnvironmentRollout:
+    """One environment: episodes until there are enough decisions."""
     network = Network.from_arrays(task.network)
-    env.lesson = task.lesson
+    env.stage = task.stage
     rng = np.random.default_rng(task.seed)
-    noise = rng.standard_normal((task.decisions, network.outputs)).astype(np.float32) * task.deviation
+    noise = rng.standard_normal((task.decisions, network.outputs)).astype(np.float32) * task.std
     draws = rng.integers(2**31, size=task.decisions + 1).tolist()
     before = env.redrawn
     features, info = env.reset(seed=draws[0])
@@ -94,7 +94,7 @@ def collect(env: Any, task: Task) -> Lane:
             if k < task.decisions - 1:
                 features, info = env.reset(seed=draws[episode])
         starts.append(over)
-    return Lane(
+    return EnvironmentRollout(
         features=np.array(rows, np.float32),
         actions=np.array(actions, np.float32),
         rewards=np.array(rewards, np.float32),
@@ -106,16 +106,16 @@ def collect(env: Any, task: Task) -> Lane:
     )
 
 
-def judge_draw(env: Any, task: Task) -> tuple[int, bool, str]:
+def judge_draw(env: Any, task: RolloutTask) -> tuple[int, bool, str]:
     """One held-apart draw with the policy's own decisions: its seed, whether it succeeded, and the reason."""
     network = Network.from_arrays(task.network)
-    env.lesson = None
+    env.stage = None
     stream, env.stream = env.stream, "validation"
     try:
         features, info = env.reset(seed=task.draw, options={"draw": task.draw})
         nearer = 0.0
         while True:
-            motion, done = split_action(network(features), network.signal_deviation)
+            motion, done = split_action(network(features), network.signal_std)
             nearer += float(done)
             action = np.append(motion, 1.0 if nearer >= 1.0 else -1.0)
             features, _, terminated, truncated, info = env.step(action)
@@ -160,7 +160,7 @@ class Workers:
             self._pipes.append(mine)
             self._processes.append(process)
 
-    def each(self, tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+    def each(self, tasks: Sequence[RolloutTask]) -> Iterator[tuple[int, Any]]:
         """The tasks' numbers and results, in the order in which they are done.
 
         Raises:
@@ -214,7 +214,7 @@ def _work(make: EnvMaker, pipe: Connection, others: list[Connection]) -> None:
         try:
             if env is None:
                 env = make()
-            pipe.send(("done", collect(env, task) if task.kind == "lane" else judge_draw(env, task)))
+            pipe.send(("done", collect(env, task) if task.kind == "environment" else judge_draw(env, task)))
         except BtTasksimError as error:
             own = InputError if isinstance(error, InputError) else MachineError
             pipe.send(("error", own(str(error))))

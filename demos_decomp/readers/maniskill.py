@@ -9,22 +9,43 @@ for some environments and otherwise judged from the height at which the actor re
 from __future__ import annotations
 
 import functools
-import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
+from numpy.typing import NDArray
 
-from bt_tasksim import poses
-from bt_tasksim.errors import InputError, MachineError
-from demos_decomp.log import Demonstration, Floats, Log, Surface, Track, checked_log
-from demos_decomp.log_file import opened
+from bt_tasksim.core import hdf5, poses
+from bt_tasksim.core.bounded_text import read_text
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.hdf5 import Node
+from bt_tasksim.core.json_text import parse_json
+from bt_tasksim.core.registry import register
+from bt_tasksim.demos_decomp.log import (
+    FARTHEST,
+    MOST_SAMPLES,
+    SLOWEST,
+    Demonstration,
+    Floats,
+    Log,
+    Surface,
+    Track,
+    checked_log,
+)
+from bt_tasksim.demos_decomp.readers.base import LogReader
 
+LARGEST_SIDECAR = 64 << 20
+"""Bytes of the JSON file beside a trajectory."""
 ROBOTS = {"panda": "panda_v2.urdf", "panda_wristcam": "panda_v3.urdf"}
 TOOL = "panda_hand_tcp"
 CONTROL_RATE = 20.0
+MOST_RATE = 10_000.0
+JOINTS = 9
+"""Of the Panda: seven of the arm, two fingers."""
 TABLE = Surface(pose=np.array([-0.12, 0.0, 0.0, 1.0, 0, 0, 0]), extent=np.array([1.209, 2.418]), kind="table")
 """ManiSkill's table in ManiSkill's world."""
 
@@ -39,12 +60,21 @@ SIZES = {
 _NOT_OBJECTS = ("goal", "table", "ground")
 
 
-def is_maniskill(path: Path) -> bool:
-    """Whether a file is an HDF5 file with ManiSkill's trajectories in it."""
-    if not h5py.is_hdf5(path):
-        return False
-    with opened(path) as file:
-        return any(name.startswith("traj_") for name in file)
+@register("log reader", "maniskill")
+class ManiSkillTrajectories(LogReader):
+    """ManiSkill's ``trajectory.h5`` with ``trajectory.json`` beside it."""
+
+    title = "ManiSkill trajectory.h5"
+
+    def recognises(self, path: Path) -> bool:
+        """It is an HDF5 file with ManiSkill's trajectories in it."""
+        if not hdf5.is_hdf5(path):
+            return False
+        return any(name.startswith("traj_") for name in hdf5.read(path, wanted=()).names())
+
+    def read(self, path: Path) -> Log:
+        """See `read_maniskill`."""
+        return read_maniskill(path)
 
 
 def read_maniskill(path: Path) -> Log:
@@ -60,22 +90,47 @@ def read_maniskill(path: Path) -> Log:
         InputError: A file is missing or damaged, has no states, or shows a robot that is not known here.
         MachineError: The package mani_skill, which brings the robot's URDF, is not installed.
     """
-    about = _description(path.with_suffix(".json"), path)
+    recorded = _recording(path.with_suffix(".json"), path)
+    file = hdf5.read(path, wanted=["traj_*/env_states/**"])
+    names = sorted((int(n[5:]), n) for n in file.groups if re.fullmatch(r"traj_[0-9]{1,9}", n))
+    shown = tuple(_demonstration(file.groups[n], path, n, number, recorded) for number, n in names)
+    return checked_log(Log("maniskill", shown, recorded.description, str(path)), f"'{path}'")
+
+
+@dataclass(frozen=True)
+class _Recording:
+    """What ``trajectory.json`` says: environment, description, samples per second, seeds by episode."""
+
+    environment: str
+    description: str
+    rate: float
+    seeds: Mapping[int, int | None]
+
+
+def _recording(path: Path, trajectory: Path) -> _Recording:
+    about = _description(path, trajectory)
     try:
-        environment = str(about["env_info"]["env_id"])
-        settings = about["env_info"].get("env_kwargs", {})
-        seeds = {int(e["episode_id"]): e.get("episode_seed") for e in about["episodes"]}
-        rate = float(settings.get("control_freq") or CONTROL_RATE)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"'{path.with_suffix('.json')}' has no env_info and episodes: {error}") from error
-    with opened(path) as file:
-        numbers = sorted(int(name[5:]) for name in file if name[:5] == "traj_" and name[5:].isdigit())
-        shown = tuple(
-            _demonstration(file[f"traj_{number}"], path, number, environment, seeds.get(number), rate)
-            for number in numbers
+        environment = about["env_info"]["env_id"]
+        settings = about["env_info"].get("env_kwargs") or {}
+        rate = settings.get("control_freq") or CONTROL_RATE
+        seeds = {episode["episode_id"]: episode.get("episode_seed") for episode in about["episodes"]}
+        description = about.get("source_desc") or ""
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"'{path}' has no env_info and episodes: {error}") from error
+    for value, kinds, name, what in (
+        (environment, str, "env_id", "text"),
+        (description, str, "source_desc", "text"),
+        (rate, int | float, "control_freq", "a number"),
+        *((number, int, "episode_id", "a whole number") for number in seeds),
+        *((seed, int | None, "episode_seed", "a whole number") for seed in seeds.values()),
+    ):
+        if not isinstance(value, kinds) or isinstance(value, bool):
+            raise InputError(f"'{path}': {name} should be {what}, found {repr(value)[:60]}")
+    if not 1.0 / SLOWEST <= rate <= MOST_RATE:
+        raise InputError(
+            f"'{path}': control_freq is {rate}; it should be from {1.0 / SLOWEST} to {MOST_RATE:g}"
         )
-    log = Log("maniskill", shown, str(about.get("source_desc", "")), str(path))
-    return checked_log(log, f"'{path}'")
+    return _Recording(environment, description, float(rate), seeds)
 
 
 def _description(path: Path, trajectory: Path) -> Any:
@@ -83,42 +138,79 @@ def _description(path: Path, trajectory: Path) -> Any:
         raise InputError(
             f"'{trajectory}' needs '{path.name}' beside it, which says what robot and task it shows"
         )
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"'{path}' is not valid JSON: {error}") from error
+    owner = f"'{path}'"
+    return parse_json(read_text(path, owner, LARGEST_SIDECAR), owner)
 
 
-def _demonstration(
-    group: Any, path: Path, number: int, environment: str, seed: int | None, rate: float
-) -> Demonstration:
-    where = f"'{path}': traj_{number}/env_states"
-    if "env_states/articulations" not in group or "env_states/actors" not in group:
+def _demonstration(group: Node, path: Path, name: str, number: int, recorded: _Recording) -> Demonstration:
+    where = f"'{path}': {name}/env_states"
+    articulations, actors = group.group("env_states/articulations"), group.group("env_states/actors")
+    if articulations is None or actors is None:
         raise InputError(f"{where} is missing; record the trajectories with env states")
-    states = group["env_states"]
-    robots = [name for name in states["articulations"] if name in ROBOTS]
+    robots = [robot for robot in articulations.data if robot in ROBOTS]
     if not robots:
-        seen = ", ".join(states["articulations"])
+        seen = ", ".join(articulations.names()) or "none"
         raise InputError(f"{where} shows no robot that is known here ({', '.join(ROBOTS)}) but {seen}")
-    state = states["articulations"][robots[0]][()].astype(np.float64)
-    to_base = poses.inverse(state[:, :7])
-    joints = state[:, 13 : 13 + (state.shape[1] - 13) // 2]
+    state = _states(
+        articulations.data[robots[0]], None, 13 + 2 * JOINTS, f"{where}/articulations/{robots[0]}"
+    )
+    base, joints = state[:, :7], state[:, 13 : 13 + JOINTS]
+    to_base = poses.inverse(_poses(base, f"{where}/articulations/{robots[0]}"))
     objects = {}
-    for name, actor in states["actors"].items():
-        if not name.startswith(_NOT_OBJECTS):
-            pose = poses.multiply(to_base, actor[()][:, :7].astype(np.float64))
-            objects[name] = Track(pose, "box", _size(environment, name, pose))
+    for thing, actor in actors.data.items():
+        if not thing.startswith(_NOT_OBJECTS):
+            at = f"{where}/actors/{thing}"
+            pose = poses.multiply(to_base, _poses(_states(actor, len(state), 13, at)[:, :7], at))
+            objects[thing] = Track(pose, "box", _size(recorded.environment, thing, pose))
     table = Surface(poses.multiply(to_base[0], TABLE.pose), TABLE.extent, TABLE.kind)
+    seed = recorded.seeds.get(number)
     return Demonstration(
         name=f"{number:03d}",
-        time=np.arange(len(state)) / rate,
+        time=np.arange(len(state)) / recorded.rate,
         hand_pose=tool_poses(robots[0], joints),
         hand_opening=joints[:, -2:].sum(axis=1),
         objects=objects,
         places={"table": table},
-        task=environment,
-        seed=None if seed is None else int(seed),
+        task=recorded.environment,
+        seed=seed,
     )
+
+
+def _states(values: NDArray[Any], count: int | None, width: int, where: str) -> Floats:
+    """States ``(T, width)`` as they should be: numbers that a robot's motions can be.
+
+    Args:
+        values: As read.
+        count: Rows that there should be; None for any number above one.
+        width: Columns.
+        where: For messages.
+    """
+    if values.dtype.kind not in "iuf":
+        raise InputError(f"{where} does not hold numbers")
+    if (
+        values.ndim != 2
+        or values.shape[1] != width
+        or len(values) != (count or len(values))
+        or len(values) < 2
+    ):
+        raise InputError(f"{where} has shape {values.shape} instead of ({count or 'at least 2'}, {width})")
+    if len(values) > MOST_SAMPLES:
+        raise InputError(f"{where} has {len(values)} samples, more than {MOST_SAMPLES}; split the log")
+    states = values.astype(np.float64)
+    used = np.abs(states[:, :7] if width == 13 else np.delete(states, np.s_[7:13], axis=1)[:, : 7 + JOINTS])
+    wrong = np.flatnonzero(~(used <= FARTHEST).all(axis=1))
+    if wrong.size:
+        raise InputError(f"{where} has NaN, infinity or more than {FARTHEST:g} m or rad at index {wrong[0]}")
+    return states
+
+
+def _poses(rows: Floats, where: str) -> Floats:
+    """Poses ``(T, 7)`` with quaternions of length one, as they were but for rounding."""
+    lengths = np.linalg.norm(rows[:, 3:], axis=1)
+    wrong = np.flatnonzero(np.abs(lengths - 1.0) > 0.05)
+    if wrong.size:
+        raise InputError(f"{where} has a quaternion of length {lengths[wrong[0]]:.3g} at index {wrong[0]}")
+    return rows
 
 
 def tool_poses(robot: str, joints: Floats) -> Floats:

@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from benchmarks.experiments import ablations, follower, judged, learning, pages, robot, sequences, shapes
 from benchmarks.experiments.__main__ import main
 from benchmarks.experiments.common import EXPERIMENTS, Request, share
-from bt_tasksim.policy import Action
-from bt_tasksim.training.decorator import follower_of, train_nodes
-from concept_nodes import Grasp, Pick
+from bt_tasksim.concept_nodes import Grasp, Pick
+from bt_tasksim.policy.policy import Action
+from bt_tasksim.trees.nodes.train import follower_of, train_nodes
 
 COUNTS = {
     "draws": 10, "successes": 9, "interval": [0.6, 0.98], "done": 9, "done_right": 9,
@@ -24,7 +24,7 @@ COUNTS = {
 ROWS = [
     {
         "steps": 4096 * (k + 1), "episodes": 100, "success": k / 10, "return": 0.0, "length": 20.0,
-        "ends": {"success": 10 * k, "violated": 100 - 10 * k}, "lesson": "near" if k < 4 else "far",
+        "ends": {"success": 10 * k, "violated": 100 - 10 * k}, "stage": "near" if k < 4 else "far",
         "seconds": 60.0 * k, **({"held_apart": {"successes": 10 * k, "draws": 100}} if k % 2 else {}),
     }
     for k in range(8)

@@ -14,7 +14,7 @@ import pytest
 
 from benchmarks import faults
 from benchmarks.faults import Bench, Seen, attempt
-from bt_tasksim.errors import MachineError
+from bt_tasksim.core.errors import MachineError
 
 GOOD = Seen(0.1, 0.2, 0.01, 0.0, "stale", "said", [], True)
 
@@ -103,6 +103,7 @@ def test_a_twin_that_does_not_answer_is_ended(monkeypatch: Any) -> None:
 
     class Twin:
         evaluation_port = 1
+        secret = "of the twin that is not there"
 
         def __init__(self, *_: Any, **__: Any) -> None: ...
 

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from benchmarks.loop import shortest_way, with_way
-from bt_tasksim.pacing import Timing
+from bt_tasksim.engines.clock import Timing
 
 
 def test_the_shortest_way_of_a_state_counts() -> None:

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from benchmarks import remote
-from bt_tasksim.errors import MachineError
+from bt_tasksim.core.errors import MachineError
 
 
 @pytest.fixture

@@ -1,20 +1,25 @@
-"""Policies made by hand, for what is done with policies."""
+"""Policies made by hand, for what is done with policies; one recorded run, for what is left of one."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from bt_tasksim import policy_library
-from bt_tasksim.network import Network
-from bt_tasksim.policy_files import PolicyCard, save_policy
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import load_robot
-from concept_nodes import Grasp
+from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.core.resources import asset
+from bt_tasksim.execution.run_log import RunRecorder, read_text
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.policy import library as policy_library
+from bt_tasksim.policy.files import PolicyCard, save_policy
+from bt_tasksim.policy.network import Network
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.trees.scenarios import pick_and_place
 
 
 def grasp_network(robot: str = "panda", gain: float = 0.6) -> Network:
@@ -88,3 +93,36 @@ def shipped(tmp_path, monkeypatch):
         return home
 
     return write
+
+
+@pytest.fixture(scope="session")
+def recorded():
+    """A run of pick_and_place: runner, recorder, result."""
+    runner = Runner(pick_and_place.build(), pick_and_place.scene())
+    recorder = RunRecorder(runner)
+    result = runner.run(3, record=recorder)
+    statuses = [node.status for node in recorder.nodes]
+    return SimpleNamespace(runner=runner, recorder=recorder, result=result, statuses=statuses)
+
+
+@pytest.fixture(scope="session")
+def run(recorded):
+    """The same, as a demonstration."""
+    return recorded.recorder.demonstration(recorded.result)
+
+
+@pytest.fixture
+def renamed(run):
+    """Makes a run whose first node has another name, and says something else."""
+
+    def make(name, text):
+        nodes = json.loads(read_text(run.extra["run/nodes"]))
+        nodes[0]["name"] = name
+        extra = {
+            **run.extra,
+            "run/nodes": np.array(json.dumps(nodes).encode()),
+            "messages/text": np.array([text.encode()] * len(run.extra["messages/text"])),
+        }
+        return dataclasses.replace(run, extra=extra)
+
+    return make

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from bt_tasksim.checking.situations import Situations, frozen
-from bt_tasksim.concept import ConceptModel
+from bt_tasksim.concept.model import ConceptModel
 
 TOLERANCE = 1e-9
 FUNCTIONS = (

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from bt_tasksim import poses
-from bt_tasksim.errors import InputError
-from concept_nodes import AtPose, Holding, Pick, Place, TimePassed, Upright
+from bt_tasksim.concept.condition import HOLDS, HOLDS_NOT
+from bt_tasksim.concept_nodes import AtPose, Holding, Pick, Place, TimePassed, Upright
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf"])
@@ -58,7 +59,7 @@ def test_upright(toy, degrees, yes):
     tilted = poses.pose([0.5, 0, 0.1], poses.from_rotation_vector(np.array([0, math.radians(degrees), 0])))
     found = asked(toy, Upright("cup"), objects=objects_with(toy, tilted))
     assert found.status == (Status.SUCCESS if yes else Status.FAILURE)
-    assert found.feedback_message == f"cup is tilted by {degrees} degrees"
+    assert found.outcome.detail.numbers["angle"] == pytest.approx(math.radians(degrees), abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,8 @@ def test_at_pose(toy, millimetres, degrees, yes):
     pose = poses.multiply(place.pose, poses.pose([millimetres / 1000, 0, half], turn))
     found = asked(toy, AtPose("cup", on="goal"), objects=objects_with(toy, pose))
     assert found.status == (Status.SUCCESS if yes else Status.FAILURE)
-    assert found.feedback_message == f"cup is {millimetres} mm and {degrees} degrees off"
+    off = {"distance": millimetres / 1000, "angle": math.radians(degrees)}
+    assert found.outcome.detail.numbers == pytest.approx(off, abs=1e-6)
 
 
 def test_on_another_object(toy):
@@ -89,15 +91,16 @@ def test_on_another_object(toy):
 def test_time_passed(toy, time, yes):
     found = asked(toy, TimePassed(2.0), time=np.float64(time))
     assert found.status == (Status.SUCCESS if yes else Status.FAILURE)
-    assert found.feedback_message == f"{time:.2f} s have passed"
+    assert found.outcome.is_a(HOLDS if yes else HOLDS_NOT)
+    assert found.outcome.detail.numbers == {"time": time}
 
 
 def test_holding(toy):
     stage = toy(Holding("cup"))
-    assert stage.tick() == Status.FAILURE and stage.tree.feedback_message.endswith(" mm from the tool")
+    assert stage.tick() == Status.FAILURE and stage.tree.outcome.detail.numbers["distance"] > 0.03
     stage.world.hold("cup")
     stage.look()
-    assert stage.tick() == Status.SUCCESS and stage.tree.feedback_message == "cup is 0 mm from the tool"
+    assert stage.tick() == Status.SUCCESS and stage.tree.outcome.detail.numbers["distance"] < 0.03
 
 
 def test_conditions_command_nothing_and_are_built_again(toy):

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from bt_tasksim import poses
-from concept_nodes import Grasp
-from concept_nodes.grasp import grasp_pose
+from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.concept_nodes.grasp import TOO_WIDE
+from bt_tasksim.concept_nodes.grasp_pose import grasp_pose
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import CANNOT_START, DONE, LIMIT_VIOLATED, TIMED_OUT
 
 SCENARIOS = ("pick_and_place", "shelf_to_shelf")
 
@@ -58,27 +60,48 @@ def test_closing_axis_and_standoff_are_obeyed(toy):
     assert np.allclose(memory.path.table[-1], goal, atol=1e-9)
 
 
+@pytest.mark.parametrize("wrong", [-0.015, 0.01, 0.02])
+def test_the_programmed_grasp_believes_the_support_and_not_an_estimate_above_or_below_it(toy, wrong):
+    """A wrong height of the estimate leaves the hand where it goes without that error."""
+    heights = []
+    for error in (0.0, wrong):
+        leaf = Grasp("box", policy="programmed")
+        stage = toy(leaf)
+        objects = stage.world.now.objects.copy()
+        objects[stage.world.model.object_index("box"), 2] += error
+        stage.world.put(objects=objects)
+        stage.look()
+        while stage.tick() == Status.RUNNING and leaf.memory.closing < 0.0:
+            pass
+        heights.append(float(stage.world.now.tool_pose[2]))
+    assert heights[1] == pytest.approx(heights[0], abs=0.001)
+
+
 def test_an_object_wider_than_the_hand_is_refused_with_both_widths(toy):
-    from bt_tasksim.scene import ObjectSpec, Scene
+    from bt_tasksim.scene.scene import Scene
+    from bt_tasksim.scene.specs import ObjectSpec
 
     wide = ObjectSpec(("box",), on="table", size=((0.11, 0.11, 0.11), (0.11, 0.11, 0.11)))
     stage = toy(Grasp("box"), Scene(objects={"box": wide}))
     assert stage.tick() == Status.FAILURE
-    assert stage.tree.feedback_message == "cannot start: box is 110 mm wide, the hand opens 80 mm"
+    assert stage.tree.outcome.is_a(CANNOT_START) and stage.tree.outcome.is_a(TOO_WIDE)
+    assert stage.tree.outcome.cause.numbers == pytest.approx({"width": 0.11, "opening": 0.08})
 
 
 def test_done_only_after_contacts_on_both_sides_and_a_still_hand(toy):
     leaf = Grasp("cup", timeout=30)
     stage = toy(leaf)
     assert stage.tick(400) == Status.FAILURE  # the toy hand closes on nothing
-    assert leaf.feedback_message.startswith("limit violated: hand 100 % closed, no contact, tool ")
+    assert leaf.outcome.is_a(LIMIT_VIOLATED)
+    assert leaf.outcome.detail.numbers["closure"] == 1.0
+    assert leaf.outcome.detail.names["contact"] == "no contact"
 
     for contacts, status in (([True, False], Status.FAILURE), ([True, True], Status.SUCCESS)):
         leaf = Grasp("cup", timeout=6)
         stage = toy(leaf)
         step = stage.world.step
 
-        def grip(command, look=False, step=step, stage=stage, contacts=contacts):
+        def grip(command, step=step, stage=stage, contacts=contacts):
             step(command)
             if stage.world.now.closure > 0.5:
                 stage.world.put(closure=np.float64(0.5), contacts=np.array(contacts))
@@ -86,17 +109,18 @@ def test_done_only_after_contacts_on_both_sides_and_a_still_hand(toy):
 
         stage.world.step = grip
         assert stage.tick(400) == status, leaf.feedback_message
-        words = leaf.feedback_message
+        measured = leaf.outcome.detail
+        assert measured.numbers["closure"] == 0.5
         if status == Status.SUCCESS:
-            assert "hand 50 % closed, contact at left, right, tool 0 mm from cup" in words
+            assert leaf.outcome.is_a(DONE) and measured.names["contact"] == "contact at left, right"
             assert stage.context.reached("holding", "cup")
         else:
-            assert words.startswith("not done within 6 s: hand 50 % closed, contact at left,")
+            assert leaf.outcome.is_a(TIMED_OUT) and measured.names["contact"] == "contact at left"
             assert not stage.context.reached("holding", "cup")
 
 
 def test_an_unknown_object_is_named(toy):
-    from bt_tasksim.errors import InputError
+    from bt_tasksim.core.errors import InputError
 
     with pytest.raises(InputError, match="no object 'cupp' in the scene; did you mean 'cup'"):
         toy(Grasp("cupp")).tick()

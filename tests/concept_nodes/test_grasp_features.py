@@ -5,12 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bt_tasksim import poses
 from bt_tasksim.checking.situations import stacked
-from bt_tasksim.context import Seen
-from bt_tasksim.world import Observation
-from concept_nodes import Grasp, grasp_features
-from concept_nodes.grasp_features import (
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept_nodes import Grasp, grasp_features
+from bt_tasksim.concept_nodes.grasp_features import (
     ACROSS,
     ACTIONS,
     ALONG,
@@ -19,11 +17,13 @@ from concept_nodes.grasp_features import (
     CLOSE,
     EAGER,
     HASTE,
-    PACE,
     PERIOD,
     RATE,
     SCALE,
+    TIME_SCALING,
 )
+from bt_tasksim.core import poses
+from bt_tasksim.core.world import Observation
 
 SCENARIOS = ("pick_and_place", "shelf_to_shelf")
 
@@ -98,13 +98,13 @@ def test_parts_of_the_features_stand_where_the_layout_says(near):
     assert np.allclose(found[places["tool from grasp pose"]][:3], local / 0.03)
 
 
-def test_the_programmed_action_is_the_reference_motion(near):
+def test_the_programmed_action_is_the_middle_of_an_action_at_the_reference_motions_pace(near):
     for k in range(near.real):
         seen, memory = instant(near, k)
-        memory = memory._replace(offset=np.zeros(CLOSE + 1))
+        there = memory._replace(offset=memory.middle * np.array(SCALE))
         action = near.leaf.programmed_motion(seen, memory)
-        assert np.allclose(offsets(action, seen, memory), 0.0, atol=1e-12)
-        assert pace(action, seen, memory) == 1.0
+        assert np.allclose(offsets(action, seen, there), there.offset, atol=1e-12)
+        assert scaling_of(action, seen, memory) == 1.0
     reference = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.3))
     assert grasp_features.displaced(reference, np.zeros(CLOSE + 1)) is reference
 
@@ -139,13 +139,13 @@ def offsets(action, seen, memory):
     return grasp_features.moved_offset(action, grasp_features.met(action, seen, memory), seen, memory)
 
 
-def pace(action, seen, memory):
-    return float(grasp_features.pace(action, grasp_features.met(action, seen, memory), seen, memory))
+def scaling_of(action, seen, memory):
+    return float(grasp_features.time_scaling(action, grasp_features.met(action, seen, memory), seen, memory))
 
 
-def paced(pace):
+def paced(scaling):
     action = np.zeros(len(ACTIONS))
-    action[PACE] = pace
+    action[TIME_SCALING] = scaling
     return action
 
 
@@ -155,11 +155,11 @@ def paced(pace):
 )
 def test_the_middle_of_the_pace_is_a_careful_approach(near, asked, share):
     seen, memory = approaching(near)
-    assert pace(paced(asked), seen, memory) == pytest.approx(share)
+    assert scaling_of(paced(asked), seen, memory) == pytest.approx(share)
     after = near.leaf.advance(paced(asked), seen, memory)
     assert float(after.delay) == pytest.approx((1.0 - share) * near.world.control_period)
     before, _ = approaching(near, within=-0.1)
-    assert pace(paced(asked), before, memory) == 1.0
+    assert scaling_of(paced(asked), before, memory) == 1.0
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_a_hand_that_stands_on_something_goes_back(near, contact, behind, stands
     along = offsets(paced(0.0), seen, memory)[ALONG]
     assert bool(grasp_features.met(paced(0.0), seen, memory).stands) == stands
     assert along == pytest.approx(-BACK_RATE if stands else 0.0)
-    assert pace(paced(0.0), seen, memory) == (0.0 if stands else CAREFUL)
+    assert scaling_of(paced(0.0), seen, memory) == (0.0 if stands else CAREFUL)
     assert not grasp_features.met(paced(HASTE), seen, memory).stands
     assert not grasp_features.met(paced(0.0), seen, memory._replace(closing=np.float64(0.1))).stands
 
@@ -209,7 +209,7 @@ def test_a_search_aside_stays_where_it_has_come(near, contact, behind, closing, 
     stays = offsets(across(0.0), calm, later)[ACROSS]
     assert stays == pytest.approx(expected if searches else 0.0)
     hurried = action.copy()
-    hurried[PACE] = HASTE
+    hurried[TIME_SCALING] = HASTE
     assert not grasp_features.met(hurried, seen, memory).searches
 
 
@@ -218,8 +218,8 @@ def test_fingers_come_as_slowly_as_the_pace_until_opposing_ones_touch(near):
     memory = memory._replace(closing=np.float64(0.1), closed=np.float64(0.2))
     step = near.robot.hand_speed * near.world.control_period
 
-    def closed(pace, asked=1.0, seen=seen, tightening=1.0):
-        found = grasp_features.closed(np.float64(pace), np.float64(asked), tightening, seen, memory)
+    def closed(scaling, asked=1.0, seen=seen, tightening=1.0):
+        found = grasp_features.closed(np.float64(scaling), np.float64(asked), tightening, seen, memory)
         return float(found)
 
     assert closed(0.25) == pytest.approx(0.2 + 0.25 * step)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
 
 
 class Felt:

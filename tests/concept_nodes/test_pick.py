@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from concept_nodes import Pick
+from bt_tasksim.concept_nodes import Pick
+from bt_tasksim.concept_nodes.holding import NOT_HELD
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.outcomes import CANNOT_START, DONE
+
+pytestmark = pytest.mark.physical
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf"])
@@ -29,21 +34,24 @@ def test_it_goes_straight_so_far_in_that_direction(toy, direction):
     assert np.abs(gap - np.outer(along, direction)).max() < 1e-9
     assert np.diff(along).max() / 0.05 < 0.3 * 1.05
     assert np.allclose(tools[:, 3:], start[3:]) and all(c.hand is None for c in stage.world.steps)
-    assert (
-        leaf.feedback_message.startswith("done after ") and "tool 0 mm from its goal" in leaf.feedback_message
-    )
+    assert leaf.outcome.is_a(DONE) and leaf.outcome.detail.numbers["tool_to_goal"] < 0.0005
+
+
+def test_a_distance_below_zero_is_refused():
+    with pytest.raises(InputError, match=r"'distance' .* should not be below 0"):
+        Pick("cup", distance=-1)
 
 
 def test_without_the_object_in_the_hand_it_cannot_start(toy):
     stage = toy(Pick("cup"))
     assert stage.tick() == Status.FAILURE
-    assert stage.tree.feedback_message.startswith("cannot start: cup is not held (")
-    assert stage.tree.feedback_message.endswith(" mm from the tool)")
+    assert stage.tree.outcome.is_a(CANNOT_START) and stage.tree.outcome.is_a(NOT_HELD)
+    assert stage.tree.outcome.cause.names == {"object": "cup"}
     assert stage.context.command.tool is None
 
 
 def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
-    from bt_tasksim.context import Known
+    from bt_tasksim.concept.context import Known
 
     decisions = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick]
     cost = [float(d.leaf.sufficient_cost(Known(d.hidden, d.seen.world), d.memory)) for d in decisions]
@@ -51,7 +59,7 @@ def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
 
 
 def test_what_may_not_be_squeezed_costs_the_hands_force(recorded_run):
-    from bt_tasksim.context import Known
+    from bt_tasksim.concept.context import Known
 
     decision = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick][-1]
     now = Known(decision.hidden, decision.seen.world)
@@ -67,7 +75,7 @@ def test_what_may_not_be_squeezed_costs_the_hands_force(recorded_run):
 def test_the_squeeze_counts_at_the_beginning_too(recorded_run):
     import dataclasses
 
-    from bt_tasksim.context import Known
+    from bt_tasksim.concept.context import Known
 
     decision = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick][-1]
     hidden = decision.hidden

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from concept_nodes import Place
+from bt_tasksim.concept_nodes import Place
+from bt_tasksim.concept_nodes.holding import NOT_HELD
+from bt_tasksim.core.outcomes import CANNOT_START, DONE
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf"])
@@ -31,7 +33,7 @@ def follow(stage, floor=None, newtons=8.0):
     """The cup follows the tool, and pushes back where it meets a floor at this height of its centre."""
     step = stage.world.step
 
-    def moved(command, look=False):
+    def moved(command):
         before = stage.world.now.tool_pose.copy()
         step(command)
         now = stage.world.now
@@ -52,7 +54,7 @@ def test_it_stops_when_the_support_is_felt(toy):
     follow(stage, floor=0.2)
     assert stage.tick(400) == Status.SUCCESS
     assert heights(stage)[-1] == pytest.approx(0.2, abs=0.03) and heights(stage)[-1] > 0.15
-    assert leaf.feedback_message.startswith("done after ") and "8.0 N felt, cup " in leaf.feedback_message
+    assert leaf.outcome.is_a(DONE) and leaf.outcome.detail.numbers["felt"] == pytest.approx(8.0)
 
 
 def test_less_than_the_pressing_force_is_no_support(toy):
@@ -86,7 +88,7 @@ def test_a_distance_limits_how_far_it_goes(toy):
 def test_without_the_object_in_the_hand_it_cannot_start(toy):
     stage = toy(Place("cup", on="goal"))
     assert stage.tick() == Status.FAILURE
-    assert stage.tree.feedback_message.startswith("cannot start: cup is not held (")
+    assert stage.tree.outcome.is_a(CANNOT_START) and stage.tree.outcome.is_a(NOT_HELD)
 
 
 def test_the_cost_falls_to_nothing_where_it_stands(recorded_run):

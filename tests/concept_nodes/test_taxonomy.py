@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from bt_tasksim.errors import InputError
-from concept_nodes.taxonomy import (
+from bt_tasksim.concept_nodes.taxonomy import (
     TASKS,
     Change,
     ContactState,
@@ -22,6 +21,7 @@ from concept_nodes.taxonomy import (
     time_reverse,
     translation_state,
 )
+from bt_tasksim.core.errors import InputError
 
 X, Y, Z = np.eye(3)
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bt_tasksim import poses
-from demos_decomp.log import Demonstration, Surface, Track
-from demos_decomp.synthetic_motion import minimum_jerk
+from bt_tasksim.core import poses
+from bt_tasksim.demos_decomp.log import Demonstration, Surface, Track
+from bt_tasksim.demos_decomp.synthetic_motion import minimum_jerk
 
 ROOT = Path(__file__).resolve().parents[2]
 DOWN = poses.frame_from_axes(np.array([0.0, 0, -1]), np.array([0.0, 1, 0]))

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_tasksim.errors import InputError
-from demos_decomp.decompose import decompose, decompose_log
-from demos_decomp.graph import build_graph, graph_to_json, in_order
-from demos_decomp.log import Log
-from demos_decomp.merging import aligned, merged_parameters
-from demos_decomp.synthetic import make
-from demos_decomp.tasks import Task
+from bt_tasksim.concept.task import Task
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.demos_decomp.decompose import decompose, decompose_log
+from bt_tasksim.demos_decomp.graph import build_graph, graph_to_json, in_order
+from bt_tasksim.demos_decomp.log import Log
+from bt_tasksim.demos_decomp.merging import aligned, merged_parameters
+from bt_tasksim.demos_decomp.synthetic import make
 
 WHOLE = ("grasp", "pick", "bring", "place", "release")
 

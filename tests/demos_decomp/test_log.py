@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bt_tasksim.errors import InputError
-from demos_decomp.log import Log, Surface, Track, Utterance, checked, checked_log
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.demos_decomp.log import Log, Surface, Track, Utterance, checked, checked_log
 
 A, B = (0.45, -0.15, 0.05), (0.5, 0.2, 0.05)
 

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bt_tasksim.errors import InputError, MachineError
-from demos_decomp.log import Log, Utterance, Video
-from demos_decomp.log_file import read_log, write_log
-from demos_decomp.readers import open_log, readers, register
-from demos_decomp.synthetic import make
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.demos_decomp.log import Log, Utterance, Video
+from bt_tasksim.demos_decomp.log_file import read_log, write_log
+from bt_tasksim.demos_decomp.readers import open_log
+from bt_tasksim.demos_decomp.synthetic import make
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +119,22 @@ def rewritten(path, change):
     return path
 
 
+def _instead(file, name, values):
+    del file[name]
+    file[name] = values
+
+
+def _scaled(file, factor):
+    times = file["demonstrations/000/time"]
+    times[...] = times[()] * factor
+
+
+def _virtual():
+    layout = h5py.VirtualLayout((10,), "f8")
+    layout[:] = h5py.VirtualSource("other.h5", "x", (10,))
+    return layout
+
+
 FAULTS = {
     "format": (lambda f: f.attrs.__setitem__("format", "other"), "format 'other'"),
     "version": (lambda f: f.attrs.__setitem__("version", 9), "version 9"),
@@ -161,6 +177,75 @@ FAULTS = {
     "demonstration elsewhere": (
         lambda f: f.__setitem__("demonstrations/002", h5py.ExternalLink("other.h5", "/")),
         "points outside itself",
+    ),
+    "external link above": (
+        lambda f: (
+            f.__delitem__("demonstrations/000/hand"),
+            f.__setitem__("demonstrations/000/hand", h5py.ExternalLink("other.h5", "/hand")),
+        ),
+        "points outside itself",
+    ),
+    "external storage": (
+        lambda f: f["demonstrations/000"].create_dataset(
+            "secret", (4,), "f8", external=[("/etc/passwd", 0, 32)]
+        ),
+        "secret points outside itself",
+    ),
+    "virtual data": (
+        lambda f: f["demonstrations/000"].create_virtual_dataset("far", _virtual()),
+        "far points outside itself",
+    ),
+    "declared size": (
+        lambda f: f["demonstrations/000"].create_dataset("big", (10**11,), "f8", chunks=(1000,)),
+        "big holds 100000000000 values",
+    ),
+    "text as numbers": (
+        lambda f: _instead(f, "demonstrations/000/hand/opening", np.array([b"1.0"] * 3)),
+        "does not hold numbers",
+    ),
+    "numbers as text": (
+        lambda f: _instead(
+            f, "demonstrations/000/narration/text", np.zeros(len(f["demonstrations/000/narration/time"]))
+        ),
+        "narration should hold",
+    ),
+    "seed in words": (
+        lambda f: f["demonstrations/000"].attrs.__setitem__("seed", "seven"),
+        "seed is 'seven'",
+    ),
+    "seeds": (lambda f: f["demonstrations/000"].attrs.__setitem__("seed", [1, 2]), "attribute seed"),
+    "size in words": (
+        lambda f: f["demonstrations/000/objects/cup"].attrs.__setitem__("size", "small"),
+        "attribute size is 'small'; write numbers",
+    ),
+    "height in words": (
+        lambda f: f["demonstrations/000/places/table"].attrs.__setitem__("height", "high"),
+        "attribute height is 'high'; write numbers",
+    ),
+    "heights": (
+        lambda f: f["demonstrations/000/places/table"].attrs.__setitem__("height", [1.0, 2.0]),
+        "holds 2 numbers",
+    ),
+    "rate in words": (
+        lambda f: f["demonstrations/000/video"].attrs.__setitem__("fps", "fast"),
+        "attribute fps is 'fast'",
+    ),
+    "objects as data": (
+        lambda f: _instead(f, "demonstrations/000/objects", np.zeros(3)),
+        "objects is not a group",
+    ),
+    "versions": (lambda f: f.attrs.__setitem__("version", [1, 1]), r"version \[1, 1\]"),
+    "odd words": (lambda f: f.attrs.__setitem__("units", "m\x1b[2J"), r"units 'm\?\[2J'"),
+    "far away": (
+        lambda f: f["demonstrations/000/hand/pose"].__setitem__((3, 0), 1e150),
+        "more than 1000 m away at index 3",
+    ),
+    "nanoseconds": (lambda f: _scaled(f, 1e9), "looks like nanoseconds"),
+    "microseconds": (lambda f: _scaled(f, 1e6), "looks like microseconds"),
+    "milliseconds": (lambda f: _scaled(f, 1e3), "looks like milliseconds"),
+    "a gap of years": (
+        lambda f: f["demonstrations/000/time"].__setitem__(-1, 1e9),
+        "more than 86400",
     ),
     "zero quaternion": (
         lambda f: f["demonstrations/000/hand/pose"].__setitem__((2, slice(3, 7)), 0.0),
@@ -214,16 +299,3 @@ def test_nothing_is_written_of_a_faulty_log_or_into_no_folder(tmp_path, log):
     with pytest.raises(InputError, match=r"folder .* does not exist"):
         write_log(tmp_path / "no" / "a.h5", log)
     assert os.listdir(tmp_path) == []
-
-
-def test_further_kinds_of_logs_can_be_registered(tmp_path, log):
-    (tmp_path / "a.hands").write_text("hands!")
-    known = len(readers())
-    register("hands", lambda p: p.suffix == ".hands", lambda p: log)
-    try:
-        assert open_log(tmp_path / "a.hands") is log
-    finally:
-        from demos_decomp import readers as module
-
-        module._READERS.pop(0)
-    assert len(readers()) == known

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import shutil
 
@@ -9,10 +10,10 @@ import h5py
 import numpy as np
 import pytest
 
-from bt_tasksim.errors import InputError
-from demos_decomp import maniskill
-from demos_decomp.readers import open_log
-from demos_decomp.recognition import recognise
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.demos_decomp.readers import maniskill, open_log
+from bt_tasksim.demos_decomp.recognition import recognise
+from tests.attacks import trajectories
 
 EXPECTED = {
     "PickCube-v1": ["grasp", "pick", "bring"],
@@ -65,6 +66,16 @@ def test_frames_sizes_and_names(log, task):
     assert 0.07 < shown.hand_opening[0] < 0.081
 
 
+def test_a_trajectory_may_be_numbered_with_zeros(recorded, tmp_path):
+    for suffix in ("h5", "json"):
+        shutil.copy(recorded / "maniskill" / "PickCube-v1" / f"trajectory.{suffix}", tmp_path)
+    file = tmp_path / "trajectory.h5"
+    file.chmod(0o644)
+    with h5py.File(file, "r+") as opened:
+        opened.move("traj_2", "traj_02")
+    assert [shown.name for shown in open_log(file).demonstrations] == [f"{k:03d}" for k in range(10)]
+
+
 def test_stacked_onto_the_other_cube(recorded):
     for shown in open_log(recorded / "maniskill" / "StackCube-v1" / "trajectory.h5").demonstrations:
         tasks, _ = recognise(shown)
@@ -81,7 +92,7 @@ def test_missing_or_wrong_files_are_refused(recorded, tmp_path):
         open_log(path)
     about = path.with_suffix(".json")
     about.write_text("{")
-    with pytest.raises(InputError, match="not valid JSON"):
+    with pytest.raises(InputError, match="not JSON"):
         open_log(path)
     about.write_text("{}")
     with pytest.raises(InputError, match="has no env_info and episodes"):
@@ -104,3 +115,77 @@ def test_missing_or_wrong_files_are_refused(recorded, tmp_path):
 def test_an_unknown_actor_is_as_high_as_it_rests():
     pose = np.array([[0.5, 0, 0.03, 1, 0, 0, 0]])
     np.testing.assert_allclose(maniskill._size("Other-v1", "thing", pose), [0.06] * 3)
+
+
+def told(change):
+    """What `trajectory.json` says, changed."""
+    about = copy.deepcopy(trajectories.ABOUT)
+    change(about)
+    return about
+
+
+@pytest.fixture
+def made(tmp_path):
+    """Writes a trajectory of two lifts, each part of it changed."""
+
+    def write(states=lambda file: None, about=trajectories.ABOUT):
+        path = tmp_path / "trajectory.h5"
+        path.write_bytes(trajectories.trajectory())
+        with h5py.File(path, "a") as file:
+            states(file)
+        path.with_suffix(".json").write_text(json.dumps(about))
+        return path
+
+    return write
+
+
+def instead(name, values):
+    def change(file):
+        del file[name]
+        file[name] = values
+
+    return change
+
+
+ROBOT, CUBE = "traj_0/env_states/articulations/panda", "traj_1/env_states/actors/cube"
+STATES = {
+    "text": instead(ROBOT, np.array([b"a"] * 60)),
+    "one row": instead(ROBOT, np.zeros((1, 31))),
+    "three dimensions": instead(ROBOT, np.zeros((60, 31, 1))),
+    "columns": instead(ROBOT, np.zeros((60, 20))),
+    "rows of an actor": instead(CUBE, np.zeros((59, 13))),
+    "zero quaternions": instead(CUBE, np.zeros((60, 13))),
+    "NaN": lambda file: file[ROBOT].__setitem__((3, 15), np.nan),
+    "far": lambda file: file[CUBE].__setitem__((3, 0), 1e150),
+    "a group": lambda file: (file.__delitem__(CUBE), file.create_group(CUBE), file.__delitem__(ROBOT)),
+    "elsewhere": instead("traj_0/env_states/actors", h5py.ExternalLink("other.h5", "/")),
+    "huge": lambda file: file["traj_0/env_states/actors"].create_dataset("big", (10**11,), "f8", chunks=(9,)),
+}
+TOLD = {
+    "environment": lambda about: about["env_info"].update(env_id=["PickCube-v1"]),
+    "rate in words": lambda about: about["env_info"]["env_kwargs"].update(control_freq="fast"),
+    "rate": lambda about: about["env_info"]["env_kwargs"].update(control_freq=1e150),
+    "settings": lambda about: about["env_info"].update(env_kwargs=[1]),
+    "seed": lambda about: about["episodes"][0].update(episode_seed="seven"),
+    "numbers": lambda about: about["episodes"][0].update(episode_id=[0]),
+    "episodes": lambda about: about.update(episodes=3),
+    "description": lambda about: about.update(source_desc={"a": 1}),
+}
+
+
+def test_a_sound_trajectory_is_read(made):
+    assert [shown.name for shown in open_log(made()).demonstrations] == ["000", "001"]
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_faulty_states_are_one_sentence(made, name):
+    with pytest.raises(InputError, match=r"trajectory\.h5") as caught:
+        open_log(made(STATES[name]))
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_a_faulty_description_is_one_sentence(made, name):
+    with pytest.raises(InputError, match=r"trajectory\.json") as caught:
+        open_log(made(about=told(TOLD[name])))
+    assert str(caught.value).isprintable()

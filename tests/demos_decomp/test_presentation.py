@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from defusedxml import ElementTree
 
-from bt_tasksim.errors import InputError
-from demos_decomp.decompose import decompose_log
-from demos_decomp.graph import build_graph
-from demos_decomp.log import Log
-from demos_decomp.picture import picture, write_picture
-from demos_decomp.synthetic import make
-from demos_decomp.table import described, nearest_way, text_table
-from demos_decomp.tasks import Task
+from bt_tasksim.concept.demonstrated import nearest_way
+from bt_tasksim.concept.task import Task
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.demos_decomp.decompose import decompose_log
+from bt_tasksim.demos_decomp.graph import build_graph
+from bt_tasksim.demos_decomp.log import Log
+from bt_tasksim.demos_decomp.picture import picture, write_picture
+from bt_tasksim.demos_decomp.synthetic import make
+from bt_tasksim.demos_decomp.table import described, text_table
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -9,7 +9,15 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from demos_decomp.signals import RATE, evenly_sampled, left_noise, simplified, smooth, speed, swings
+from bt_tasksim.demos_decomp.signals import (
+    RATE,
+    evenly_sampled,
+    left_noise,
+    simplified,
+    smooth,
+    speed,
+    swings,
+)
 
 walks = st.lists(st.floats(-0.01, 0.01), min_size=3, max_size=120).map(np.cumsum)
 

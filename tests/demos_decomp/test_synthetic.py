@@ -7,14 +7,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from bt_tasksim.errors import InputError
-from bt_tasksim.resources import asset
-from demos_decomp.decompose import decompose_log
-from demos_decomp.readers import open_log
-from demos_decomp.recognition import recognise
-from demos_decomp.synthetic import SHIPPED, main, make, shipped
-from demos_decomp.synthetic_motion import FINE_RATE, Hand, Sensing, minimum_jerk, tremor
-from demos_decomp.synthetic_scenes import SCRIPTS
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.demos_decomp.decompose import decompose_log
+from bt_tasksim.demos_decomp.readers import open_log
+from bt_tasksim.demos_decomp.recognition import recognise
+from bt_tasksim.demos_decomp.synthetic import SHIPPED, main, make, shipped
+from bt_tasksim.demos_decomp.synthetic_motion import FINE_RATE, Hand, Sensing, minimum_jerk, tremor
+from bt_tasksim.demos_decomp.synthetic_scenes import SCRIPTS
 
 WHOLE = ["grasp", "pick", "bring", "place", "release"]
 EXPECTED = {"pick_and_place": WHOLE, "shelf_to_shelf": WHOLE, "pick_and_throw": [*WHOLE[:3], "release"]}

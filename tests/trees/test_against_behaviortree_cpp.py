@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-import trees
-from bt_tasksim.concept import Condition
-from bt_tasksim.training.decorator import Train
-from trees import authoring
+from bt_tasksim import trees
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.trees.nodes.train import Train
 
 cpp = pytest.importorskip("behaviortreepy", reason="BehaviorTree.CPP's Python binding is not installed")
 
@@ -81,18 +80,18 @@ def build(shape) -> tuple[Behaviour, list[Scripted]]:
             return leaves[-1]
         kind = part[0]
         if kind in ("retry", "repeat"):
-            return getattr(authoring, kind)(part[2], node(part[1]))
+            return getattr(trees, kind)(part[2], node(part[1]))
         if kind == "parallel":
             children = [node(c) for c in part[1]]
             fit = [max(-len(children), min(len(children), c)) for c in part[2:]]
-            return authoring.parallel("p", *children, success=fit[0], failure=fit[1])
+            return trees.parallel("p", *children, success=fit[0], failure=fit[1])
         if kind == "subtree":
-            return authoring.subtree("s", node(part[1]))
+            return trees.subtree("s", node(part[1]))
         if kind == "train":
             return Train(node(part[1]))
         if kind in ("invert", "force_success", "force_failure"):
-            return getattr(authoring, kind)(node(part[1]))
-        return getattr(authoring, kind)("n", *(node(c) for c in part[1]))
+            return getattr(trees, kind)(node(part[1]))
+        return getattr(trees, kind)("n", *(node(c) for c in part[1]))
 
     return node(shape), leaves
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import py_trees
 import pytest
 
-import trees
-from bt_tasksim.concept import ConceptModel, Condition
-from bt_tasksim.errors import InputError
-from bt_tasksim.parameters import ObjectName
-from bt_tasksim.world import Command
-from trees.authoring import DEEPEST
+from bt_tasksim import trees
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import ObjectName
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.world import Command
+from bt_tasksim.trees.check import DEEPEST
 
 
 class Poke(ConceptModel):
@@ -165,3 +167,13 @@ def test_every_public_name_is_there():
     assert "sequence" in dir(trees)
     with pytest.raises(AttributeError, match="no attribute 'sequense'"):
         _ = trees.sequense
+
+
+def test_nodes_that_count_wall_clock_time_are_warned_of():
+    with pytest.warns(UserWarning, match=r"wall-clock.*timeout\("):
+        trees.check_tree(py_trees.decorators.Timeout("slow", Near("cup"), duration=3.0))
+    with pytest.warns(UserWarning, match=r"wall-clock.*Wait\("):
+        trees.check_tree(trees.sequence("s", py_trees.timers.Timer("later", 0.1), Near("cup")))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        trees.check_tree(trees.timeout(3.0, Near("cup")))

@@ -5,15 +5,17 @@ import textwrap
 import pytest
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.errors import InputError
-from concept_nodes import Grasp, Pick
-from trees import save_tree, sequence
-from trees.load import load_source, names_in, scenarios
+from bt_tasksim.concept.plugins import load_parts
+from bt_tasksim.concept_nodes import Grasp, Pick
+from bt_tasksim.core import plugins
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.trees import save_tree, sequence
+from bt_tasksim.trees.load import load_source, names_in, own_nodes, scenarios
 
 GOOD = """
 from bt_tasksim import Scene
-from concept_nodes import Grasp, Pick
-from trees import sequence
+from bt_tasksim.concept_nodes import Grasp, Pick
+from bt_tasksim.trees import sequence
 
 def scene(robot="panda"):
     return Scene(robot, objects={"cup": "on table"}, name="mine")
@@ -67,11 +69,11 @@ def test_without_one_the_tree_says_it(write):
 
 def test_policies_of_concepts_that_the_tree_lacks(write):
     file = write("t.py", GOOD)
-    assert refused(file, None, None, None, [("bring", "x")]) == (
+    assert refused(file, None, None, [("bring", "x")]) == (
         "a policy is given for 'bring', and the tree has no leaf of this concept; known: grasp, pick"
     )
-    assert "did you mean 'grasp'" in refused(file, None, None, None, [("gasp", "x")])
-    assert "'pick' is given twice" in refused(file, None, None, None, [("pick", "x"), ("pick", "x")])
+    assert "did you mean 'grasp'" in refused(file, None, None, [("gasp", "x")])
+    assert "'pick' is given twice" in refused(file, None, None, [("pick", "x"), ("pick", "x")])
 
 
 # ---- scenarios --------------------------------------------------------------------------------------------
@@ -233,8 +235,8 @@ def test_what_is_no_xml(write, text):
 
 
 OWN = '''
-from bt_tasksim.concept import Condition
-from bt_tasksim.parameters import ObjectName
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.parameters import ObjectName
 
 
 class Shiny(Condition):
@@ -255,13 +257,15 @@ def test_nodes_of_ones_own_come_from_a_file(tmp_path):
         '<root BTCPP_format="4" scene="shelf_to_shelf">'
         '<BehaviorTree ID="a"><Shiny target="cup"/></BehaviorTree></root>'
     )
-    root = load_source(str(tree), nodes=str(file)).build()
-    assert type(root).__name__ == "Shiny" and root.target == "cup"
-    with pytest.raises(InputError, match=r"unknown node 'Shiny'.*--nodes FILE\.py"):
+    with pytest.raises(InputError, match=r"unknown node 'Shiny'.*--plugin FILE\.py"):
         load_source(str(tree))
+    with plugins.scratch():
+        load_parts(str(file))
+        root = load_source(str(tree)).build()
+        assert type(root).__name__ == "Shiny" and root.target == "cup"
     file.write_text("from concept_nodes import Grasp\n")
     with pytest.raises(InputError, match="defines no concept and no condition"):
-        load_source(str(tree), nodes=str(file))
+        own_nodes(str(file))
 
 
 def test_a_log_is_no_tree(tmp_path):

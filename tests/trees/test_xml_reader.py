@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import trees
-from bt_tasksim.concept import ConceptModel, Condition
-from bt_tasksim.errors import InputError
-from bt_tasksim.parameters import Direction, Metres, ObjectName
-from bt_tasksim.world import Command
-from trees.xml_reader import MOST_NODES
-from trees.xml_source import LARGEST
+from bt_tasksim import trees
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Direction, Metres, ObjectName
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.world import Command
+from bt_tasksim.trees.xml_reader import MOST_NODES
+from bt_tasksim.trees.xml_source import LARGEST
 
 
 class Poke(ConceptModel):

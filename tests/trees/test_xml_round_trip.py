@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from py_trees.behaviour import Behaviour
 
-import trees
-from bt_tasksim.concept import ConceptModel, Condition
-from bt_tasksim.errors import InputError
-from bt_tasksim.parameters import (
+from bt_tasksim import trees
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import (
     Direction,
     Flag,
     Metres,
@@ -24,9 +24,10 @@ from bt_tasksim.parameters import (
     Ratio,
     Text,
 )
-from bt_tasksim.training.decorator import Train
-from bt_tasksim.world import Command
-from trees import authoring
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.world import Command
+from bt_tasksim.trees.check import DEEPEST
+from bt_tasksim.trees.nodes.train import Train
 
 
 class Poke(ConceptModel):
@@ -114,20 +115,18 @@ def extend(inner: st.SearchStrategy) -> st.SearchStrategy:
     several = st.lists(inner, min_size=1, max_size=3)
     guards = st.lists(conditions(), max_size=2)
     return st.one_of(
-        st.builds(lambda n, c: authoring.sequence(n, *c), names, several),
-        st.builds(lambda n, c: authoring.fallback(n, *c), names, several),
-        st.builds(lambda n, g, c: authoring.reactive_sequence(n, *g, c), names, guards, inner),
-        st.builds(lambda n, g, c: authoring.reactive_fallback(n, *g, c), names, guards, inner),
+        st.builds(lambda n, c: trees.sequence(n, *c), names, several),
+        st.builds(lambda n, c: trees.fallback(n, *c), names, several),
+        st.builds(lambda n, g, c: trees.reactive_sequence(n, *g, c), names, guards, inner),
+        st.builds(lambda n, g, c: trees.reactive_fallback(n, *g, c), names, guards, inner),
         st.builds(parallel_of, names, several, st.integers(-3, 3), st.integers(-3, 3)),
-        st.builds(lambda k, c: authoring.retry(k, c), st.just(-1) | st.integers(1, 9), inner),
-        st.builds(
-            lambda k, c, n: authoring.repeat(k, c, name=n), st.just(-1) | st.integers(1, 9), inner, names
-        ),
-        st.builds(lambda s, c: authoring.timeout(s, c), st.floats(0.001, 1e4), inner),
-        st.builds(lambda c: authoring.invert(c), inner),
-        st.builds(lambda c, n: authoring.force_success(c, name=n), inner, names),
-        st.builds(lambda c: authoring.force_failure(c), inner),
-        st.builds(lambda n, c: authoring.subtree(n, c), names, inner),
+        st.builds(lambda k, c: trees.retry(k, c), st.just(-1) | st.integers(1, 9), inner),
+        st.builds(lambda k, c, n: trees.repeat(k, c, name=n), st.just(-1) | st.integers(1, 9), inner, names),
+        st.builds(lambda s, c: trees.timeout(s, c), st.floats(0.001, 1e4), inner),
+        st.builds(lambda c: trees.invert(c), inner),
+        st.builds(lambda c, n: trees.force_success(c, name=n), inner, names),
+        st.builds(lambda c: trees.force_failure(c), inner),
+        st.builds(lambda n, c: trees.subtree(n, c), names, inner),
         st.builds(lambda c, n: Train(c, n), inner, st.none() | names),
     )
 
@@ -136,7 +135,7 @@ def parallel_of(name: str, children: list[Behaviour], success: int, failure: int
     def fit(count: int) -> int:
         return max(-len(children), min(len(children), count or 1))
 
-    return authoring.parallel(name, *children, success=fit(success), failure=fit(failure))
+    return trees.parallel(name, *children, success=fit(success), failure=fit(failure))
 
 
 random_trees = st.recursive(leaves(), extend, max_leaves=12)
@@ -160,7 +159,7 @@ def test_equal_trees_have_equal_xml(a, b):
 
 def small(**changes) -> Behaviour:
     arguments = {"target": "cup", "distance": 0.2} | changes
-    return authoring.sequence("main", Near("cup"), authoring.retry(2, Poke(**arguments)))
+    return trees.sequence("main", Near("cup"), trees.retry(2, Poke(**arguments)))
 
 
 @pytest.mark.parametrize(
@@ -182,11 +181,11 @@ def test_trees_of_other_shape_are_not_the_same():
     def guarded(make, *extra):
         return make("main", Near("cup"), *extra, Poke("cup"))
 
-    plain = guarded(authoring.sequence)
-    assert not trees.same_tree(plain, guarded(authoring.reactive_sequence))
-    assert not trees.same_tree(plain, guarded(authoring.fallback))
-    assert not trees.same_tree(plain, guarded(authoring.sequence, Ready()))
-    assert not trees.same_tree(authoring.retry(2, Ready()), authoring.retry(3, Ready()))
+    plain = guarded(trees.sequence)
+    assert not trees.same_tree(plain, guarded(trees.reactive_sequence))
+    assert not trees.same_tree(plain, guarded(trees.fallback))
+    assert not trees.same_tree(plain, guarded(trees.sequence, Ready()))
+    assert not trees.same_tree(trees.retry(2, Ready()), trees.retry(3, Ready()))
 
 
 def test_an_argument_that_equals_its_default_changes_nothing():
@@ -213,7 +212,7 @@ def test_a_file_holds_the_models_of_its_leaves():
 
 
 def test_what_is_to_be_learned_is_written_and_its_decorator_declared():
-    tree = authoring.sequence("main", Train(Poke("cup")), Poke("box"))
+    tree = trees.sequence("main", Train(Poke("cup")), Poke("box"))
     text = trees.tree_to_xml(tree)
     root = ET.fromstring(text)
     assert root.find(".//BehaviorTree//Train").attrib == {"name": "train poke cup"}
@@ -229,14 +228,14 @@ def test_what_is_to_be_learned_is_written_and_its_decorator_declared():
 
 def test_a_subtree_used_twice_is_written_once():
     def fetch():
-        return authoring.subtree("fetch", Poke("cup"))
+        return trees.subtree("fetch", Poke("cup"))
 
-    root = ET.fromstring(trees.tree_to_xml(authoring.sequence("main", fetch(), fetch())))
+    root = ET.fromstring(trees.tree_to_xml(trees.sequence("main", fetch(), fetch())))
     assert [tree.get("ID") for tree in root.findall("BehaviorTree")] == ["main", "fetch"]
 
 
 def test_subtrees_of_one_name_and_other_content_stay_apart():
-    tree = authoring.sequence("all", *(authoring.subtree("fetch it", Poke(o)) for o in ("cup", "box", "can")))
+    tree = trees.sequence("all", *(trees.subtree("fetch it", Poke(o)) for o in ("cup", "box", "can")))
     text = trees.tree_to_xml(tree)
     loaded = trees.tree_from_xml(text, NODES)
     assert trees.same_tree(tree, loaded)
@@ -252,8 +251,8 @@ def test_the_deepest_tree_goes_both_ways_and_deeper_is_refused():
             tree = wrap(tree)
         return tree
 
-    for wrap in (authoring.invert, lambda c: authoring.subtree("s", c), lambda c: authoring.sequence("s", c)):
-        tree = nest(wrap, authoring.DEEPEST)
+    for wrap in (trees.invert, lambda c: trees.subtree("s", c), lambda c: trees.sequence("s", c)):
+        tree = nest(wrap, DEEPEST)
         assert trees.same_tree(tree, trees.tree_from_xml(trees.tree_to_xml(tree), NODES))
         with pytest.raises(InputError, match="more than 200 levels"):
             trees.tree_to_xml(nest(wrap, 2500))
@@ -265,7 +264,7 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path):
     before = path.read_bytes()
     assert trees.same_tree(small(), trees.load_tree(path, NODES))
     with pytest.raises(InputError, match="cannot be written as XML"):
-        trees.save_tree(authoring.sequence("a\x00", Ready()), path)
+        trees.save_tree(trees.sequence("a\x00", Ready()), path)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["tree.xml"]
     with pytest.raises(InputError, match="does not exist"):
@@ -281,10 +280,10 @@ def test_what_xml_cannot_hold_is_refused():
             raise NotImplementedError
 
     with pytest.raises(InputError, match=r"'mine' is a .*Other, which cannot be written as XML"):
-        trees.tree_to_xml(authoring.sequence("main", Other("mine")))
+        trees.tree_to_xml(trees.sequence("main", Other("mine")))
 
 
 def test_leaves_of_one_name_and_two_classes_are_refused():
     first, second = (type("Same", (Ready,), {"__doc__": "One of two."}) for _ in range(2))
     with pytest.raises(InputError, match="two different leaves are called Same"):
-        trees.tree_to_xml(authoring.sequence("main", first(), second()))
+        trees.tree_to_xml(trees.sequence("main", first(), second()))

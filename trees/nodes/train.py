@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Sequence
 from py_trees.decorators import Decorator
 
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.errors import InputError
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.registry import register
+from bt_tasksim.trees.nodes.base import NodeKind
+from bt_tasksim.trees.walk import nodes_of
 
 
 class Train(Decorator):
@@ -76,27 +79,33 @@ class Train(Decorator):
         return found
 
 
+@register("tree node", "Train")
+class TrainKind(NodeKind[Train]):
+    """See `Train`."""
+
+    category = "Decorator"
+    behaviour = Train
+    symbol = "✎"
+    label = "train"
+    own = True
+
+    def make(self, name: str, children: list[Behaviour], ports: Mapping[str, int]) -> Train:
+        """See `NodeKind.make`."""
+        return Train(children[0], name)
+
+
 def _inherits_layout(cls: type[ConceptModel]) -> bool:
     return not any("layout" in vars(base) for base in cls.__mro__[: cls.__mro__.index(ConceptModel)])
 
 
 def concepts_in(root: Behaviour) -> list[ConceptModel]:
     """The concepts of a tree, in its order from left to right."""
-    if isinstance(root, ConceptModel):
-        return [root]
-    return [leaf for child in root.children for leaf in concepts_in(child)]
+    return [node for node in nodes_of(root) if isinstance(node, ConceptModel)]
 
 
 def train_nodes(root: Behaviour) -> list[Train]:
     """The Train nodes of a tree, in its order from left to right."""
-    return list(_train_nodes(root))
-
-
-def _train_nodes(root: Behaviour) -> Iterator[Train]:
-    if isinstance(root, Train):
-        yield root
-    for child in root.children:
-        yield from _train_nodes(child)
+    return [node for node in nodes_of(root) if isinstance(node, Train)]
 
 
 def judges(leaf: ConceptModel) -> bool:

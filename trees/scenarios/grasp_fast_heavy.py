@@ -1,6 +1,6 @@
 """Grasp a heavy, slippery object and lift it fast: what follows a grasp says how firm it should be.
 
-Shapes, lessons and strips are those of `grasp_then_pick`; `grasp_gentle_lift` is the opposite.
+Shapes, stages and strips are those of `grasp_then_pick`; `grasp_gentle_lift` is the opposite.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from dataclasses import replace
 
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept_nodes import Grasp, Pick
 from bt_tasksim.scene import Goal, Scene
-from bt_tasksim.training.decorator import Train
-from concept_nodes import Grasp, Pick
-from trees.authoring import sequence
-from trees.scenarios.grasp_gentle_lift import TIGHTENING, TIMEOUT
-from trees.scenarios.grasp_then_pick import UNSEEN, lessons
+from bt_tasksim.trees import sequence
+from bt_tasksim.trees.nodes.train import Train
+from bt_tasksim.trees.scenarios.grasp_gentle_lift import TIGHTENING, TIMEOUT
+from bt_tasksim.trees.scenarios.grasp_then_pick import UNSEEN, stages
 
 MASS, FRICTION = (0.4, 0.9), (0.1, 0.3)
 LIFT, SPEED = 0.3, 1.2
@@ -27,7 +27,7 @@ def scene(robot: str = "panda") -> Scene:
         robot,
         objects={"target": replace(UNSEEN, mass=MASS, friction=FRICTION)},
         goal=Goal("target", "table", relation="lifted", height=LIFT),
-        lessons=lessons(mass=MASS, friction=FRICTION),
+        stages=stages(mass=MASS, friction=FRICTION),
         name="grasp_fast_heavy",
     )
 

@@ -1,6 +1,6 @@
 """Grasp a light, fragile object and lift it slowly: what follows a grasp says how firm it should be.
 
-The follower's own goal limits the hand's force on the object, which no policy can see. Shapes, lessons and
+The follower's own goal limits the hand's force on the object, which no policy can see. Shapes, stages and
 strips are those of `grasp_then_pick`; `grasp_fast_heavy` is the opposite.
 """
 
@@ -10,11 +10,11 @@ from dataclasses import replace
 
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept_nodes import Grasp, Pick
 from bt_tasksim.scene import Goal, Scene
-from bt_tasksim.training.decorator import Train
-from concept_nodes import Grasp, Pick
-from trees.authoring import sequence
-from trees.scenarios.grasp_then_pick import UNSEEN, lessons
+from bt_tasksim.trees import sequence
+from bt_tasksim.trees.nodes.train import Train
+from bt_tasksim.trees.scenarios.grasp_then_pick import UNSEEN, stages
 
 MASS, FRICTION = (0.05, 0.15), (0.3, 0.9)
 LIFT, SPEED = 0.15, 0.15
@@ -31,7 +31,7 @@ def scene(robot: str = "panda") -> Scene:
         robot,
         objects={"target": replace(UNSEEN, mass=MASS, friction=FRICTION)},
         goal=Goal("target", "table", relation="lifted", height=LIFT),
-        lessons=lessons(mass=MASS, friction=FRICTION),
+        stages=stages(mass=MASS, friction=FRICTION),
         name="grasp_gentle_lift",
     )
 

@@ -1,7 +1,7 @@
 """Grasp an object of unknown shape, size, mass and friction, and lift it: the tree a grasp is trained in.
 
 The scene itself draws what is never trained on: other kinds of objects, and of superellipsoids other sizes
-and exponents (the odd strips of their ranges). Its lessons draw superellipsoids from the even strips alone,
+and exponents (the odd strips of their ranges). Its stages draw superellipsoids from the even strips alone,
 on the table, and on a stand to which the hand comes slanted, as to a shelf.
 """
 
@@ -12,10 +12,10 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.scene import Goal, HandStart, Lesson, ObjectSpec, Scene
-from bt_tasksim.training.decorator import Train
-from concept_nodes import Grasp, Pick
-from trees.authoring import sequence
+from bt_tasksim.concept_nodes import Grasp, Pick
+from bt_tasksim.scene import CurriculumStage, Goal, HandStart, ObjectSpec, Scene
+from bt_tasksim.trees import sequence
+from bt_tasksim.trees.nodes.train import Train
 
 LIFT = 0.3
 UNSEEN = ObjectSpec(
@@ -24,7 +24,7 @@ UNSEEN = ObjectSpec(
     mass=(0.05, 0.6),
     friction=(0.3, 0.9),
     exponents=((0.05, 0.8), (0.05, 2.0)),
-    strips="odd",
+    split="odd",
     size_error=0.1,
 )
 """Exponents beyond 0.8 in the vertical make bodies that do not stand on a table."""
@@ -35,7 +35,7 @@ BOXES = ObjectSpec(
     mass=(0.05, 0.3),
     friction=(0.5, 0.9),
     exponents=((0.05, 0.2), (0.05, 0.5)),
-    strips="even",
+    split="even",
     size_error=0.1,
 )
 SHAPES = ObjectSpec(
@@ -45,7 +45,7 @@ SHAPES = ObjectSpec(
     mass=(0.05, 0.6),
     friction=(0.3, 0.9),
     exponents=((0.05, 0.8), (0.05, 2.0)),
-    strips="even",
+    split="even",
     size_error=0.1,
 )
 HAND = HandStart("target")
@@ -60,19 +60,19 @@ BROAD = ("xarm7_ability",)
 Of 39 such draws halfway through a training none succeeded."""
 
 
-def _lesson(
+def _stage(
     name: str,
     spec: ObjectSpec,
     noise: tuple[str, ...],
     slanted: bool,
     tolerance: float = 1.0,
     until: float = 0.9,
-) -> Lesson:
+) -> CurriculumStage:
     """On the table alone; or one world of three on the stand, to which the hand comes slanted."""
     table = Scene(objects={"target": spec})
     raised = dataclasses.replace(spec, on="stand", area=(0.02, 0.04))
     stand = Scene(fixtures=["stand"], objects={"target": raised})
-    return Lesson(
+    return CurriculumStage(
         name,
         noise=noise,
         hand=HAND,
@@ -83,7 +83,7 @@ def _lesson(
     )
 
 
-def lessons(slanted: bool = True, **changes: Any) -> tuple[Lesson, ...]:
+def stages(slanted: bool = True, **changes: Any) -> tuple[CurriculumStage, ...]:
     """The curriculum.
 
     Args:
@@ -92,9 +92,9 @@ def lessons(slanted: bool = True, **changes: Any) -> tuple[Lesson, ...]:
     """
     boxes, shapes = (dataclasses.replace(spec, **changes) for spec in (BOXES, SHAPES))
     return (
-        _lesson("near-boxes", boxes, ("fine", "original"), slanted, tolerance=3.0, until=0.6),
-        _lesson("all shapes", shapes, NOISE, slanted, tolerance=3.0, until=0.65),
-        _lesson("all shapes, held firmly", shapes, NOISE, slanted),
+        _stage("near-boxes", boxes, ("fine", "original"), slanted, tolerance=3.0, until=0.6),
+        _stage("all shapes", shapes, NOISE, slanted, tolerance=3.0, until=0.65),
+        _stage("all shapes, held firmly", shapes, NOISE, slanted),
     )
 
 
@@ -104,7 +104,7 @@ def scene(robot: str = "panda") -> Scene:
         robot,
         objects={"target": UNSEEN},
         goal=Goal("target", "table", relation="lifted", height=LIFT),
-        lessons=lessons(slanted=robot not in BROAD),
+        stages=stages(slanted=robot not in BROAD),
         name="grasp_then_pick",
     )
 

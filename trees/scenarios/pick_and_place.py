@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place, Release
 from bt_tasksim.scene import Goal, ObjectSpec, Scene, SpotSpec
-from concept_nodes import Bring, Grasp, Pick, Place, Release
-from trees.authoring import sequence
+from bt_tasksim.trees import sequence
 
 
 def scene(robot: str = "panda") -> Scene:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept_nodes import AtPose, Bring, Grasp, Holding, Pick, Place, Release, Wait
 from bt_tasksim.scene import Goal, ObjectSpec, Scene, SpotSpec
-from concept_nodes import AtPose, Bring, Grasp, Holding, Pick, Place, Release, Wait
-from trees.authoring import fallback, retry, sequence
+from bt_tasksim.trees import fallback, retry, sequence
 
 ATTEMPTS = 4
 
@@ -18,7 +18,7 @@ def scene(robot: str = "panda") -> Scene:
         objects={"cube": ObjectSpec(kinds=("cube",), on="table", centre=(0.0, -0.10), area=(0.06, 0.08))},
         spots=[SpotSpec("goal", on="table", centre=(0.0, 0.14), area=(0.06, 0.06), yaw=0.5)],
         goal=Goal("cube", "goal"),
-        knock="cube",
+        disturbed="cube",
         name="pick_and_place_recovering",
     )
 

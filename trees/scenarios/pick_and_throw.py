@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Release
 from bt_tasksim.scene import Goal, ObjectSpec, Scene
-from concept_nodes import Bring, Grasp, Pick, Release
-from trees.authoring import sequence
+from bt_tasksim.trees import sequence
 
 
 def scene(robot: str = "panda") -> Scene:

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
+import copy
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.poses import Array
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.urdf_visuals import read_urdf
 
+_ENDLESS = 1e3
+"""rad, which a joint without limits does not reach."""
 _XYZQUAT = np.array([0, 1, 2, 4, 5, 6, 3])
 
 
-def se3(pose: Array) -> Any:
+def se3(pose: Array) -> pin.SE3:
     """Pinocchio's form of a pose ``(7,)``; its quaternion is normalised.
 
     Raises:
@@ -31,14 +36,14 @@ def se3(pose: Array) -> Any:
     return pin.XYZQUATToSE3(p[_XYZQUAT])
 
 
-def full_model(robot: RobotDescription) -> tuple[Any, Array]:
+def full_model(robot: RobotDescription) -> tuple[pin.Model, Array]:
     """The whole robot with its root at the base link, and where each of ``robot.joints`` is in its ``q``.
 
     Raises:
         InputError: The description names what the URDF has not, or the URDF is unreadable.
     """
     try:
-        model = pin.buildModelFromUrdf(str(robot.urdf))
+        model = _model(robot.urdf)
     except (ValueError, RuntimeError) as error:
         raise InputError(
             f"robot file '{robot.source}': the URDF '{robot.urdf}' is unreadable: {error}"
@@ -65,16 +70,38 @@ def full_model(robot: RobotDescription) -> tuple[Any, Array]:
             )
         joint = model.joints[model.getJointId(name)]
         if joint.nq != 1:
-            raise InputError(
-                f"robot file '{robot.source}': joint '{name}' is not a hinge or slide with limits"
-            )
+            raise InputError(f"robot file '{robot.source}': joint '{name}' is not a hinge or slide")
         order.append(joint.idx_q)
     for name in [robot.wrist_link, *robot.pad_links, *(link for tip in robot.tips for link in tip.links)]:
         body_index(model, name, robot)
     return model, np.array(order)
 
 
-def arm_model(robot: RobotDescription, full: Any) -> Any:
+def _model(urdf: Path) -> pin.Model:
+    """Pinocchio's model, every joint of which has one coordinate.
+
+    Joints that turn without end would have two, cosine and sine. The robot's file gives limits to those that
+    it moves, so here they are hinges like others.
+    """
+    root = read_urdf(urdf)
+    endless = [joint for joint in root.findall("joint") if joint.get("type") == "continuous"]
+    if not endless:
+        return pin.buildModelFromUrdf(str(urdf))
+    root = copy.deepcopy(root)
+    for joint in root.findall("joint"):
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            if limit is None:
+                limit = ElementTree.SubElement(joint, "limit")
+            wide = {"lower": str(-_ENDLESS), "upper": str(_ENDLESS), "effort": "0", "velocity": "0"}
+            limit.attrib.update(
+                {**wide, **{k: v for k, v in limit.attrib.items() if k in ("effort", "velocity")}}
+            )
+    return pin.buildModelFromXML(ElementTree.tostring(root, encoding="unicode"))
+
+
+def arm_model(robot: RobotDescription, full: pin.Model) -> pin.Model:
     """The arm alone, with every other joint locked.
 
     Raises:
@@ -90,7 +117,7 @@ def arm_model(robot: RobotDescription, full: Any) -> Any:
     return model
 
 
-def body_index(model: Any, name: str, robot: RobotDescription) -> int:
+def body_index(model: pin.Model, name: str, robot: RobotDescription) -> int:
     """Index of a link's frame.
 
     Raises:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.pipeline import CameraModel
-from bt_tasksim.poses import Array
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.images import CameraModel
 
 
 @dataclass(frozen=True)

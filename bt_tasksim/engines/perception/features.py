@@ -7,12 +7,12 @@ from dataclasses import fields
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.shapes import Shape
-from bt_tasksim.world import Observation, WorldState
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Observation, WorldState
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.shapes import Shape
 
 TOUCH = 0.2
 """N on a fingertip that count as contact."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.poses import Array
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.poses import Array
 
 
 @dataclass(frozen=True)

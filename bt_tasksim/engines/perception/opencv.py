@@ -13,61 +13,64 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.camera_errors import CameraErrors, as_calibrated
-from bt_tasksim.engines.features import TOUCH, ObservationBuilder
-from bt_tasksim.engines.pipeline import Image
-from bt_tasksim.engines.pose_estimation import Target, estimate_pose, follow
-from bt_tasksim.engines.registration import Fit, View
-from bt_tasksim.engines.segmentation import NEUTRAL, SMALLEST, Segment, classify, find_segments
-from bt_tasksim.errors import MachineError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.world import Observation, PlaceModel, WorldModel, WorldState
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.world import Observation, PlaceModel, WorldModel, WorldState
+from bt_tasksim.engines.base import EngineSetup, PostProcessEngine
+from bt_tasksim.engines.images import Image
+from bt_tasksim.engines.perception.camera_errors import PERFECT, CameraErrors, as_calibrated
+from bt_tasksim.engines.perception.features import TOUCH, ObservationBuilder
+from bt_tasksim.engines.perception.pose_estimation import Target, estimate_pose, follow
+from bt_tasksim.engines.perception.registration import DepthView, Fit
+from bt_tasksim.engines.perception.segmentation import NEUTRAL, SMALLEST, Segment, classify, find_segments
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 REACH = 0.03
 """Metres between tool and object within which opposing contacts mean that the object is held."""
 APART = 3
 """Ticks in a row without contact after which the hand has let go (contacts flicker)."""
 WAIT = 0.25
-"""Seconds from the end of contact to a look, and from that to the next one."""
+"""Seconds from the end of contact to a capture, and from that to the next one."""
 HELD = (0.2, 1.0)
-"""Seconds from the beginning of a hold to a look, and from that to the next one: things slip in a hand."""
-LOOKS = 8
+"""Seconds from the beginning of a hold to a capture, and from that to the next one: things slip in a hand."""
+CAPTURES = 8
 """Looks after the end of contact, at most."""
 AGE = 0.1
 """Seconds by which a picture may be old while the hand holds something, which has moved since."""
 SAME = (0.006, np.deg2rad(6.0))
-"""Metres and radians within which two looks agree: the object is at rest."""
+"""Metres and radians within which two captures agree: the object is at rest."""
 
 
 @dataclass
-class Track:
+class TrackedObject:
     """What is remembered of one object.
 
     Attributes:
         grip: Pose ``(7,)`` in the tool frame while the hand holds it, or None.
         apart: Ticks in a row without the contacts that hold it or touch it.
         touched: The hand has touched it since it last was seen at rest.
-        due: Time of the next look, seconds; infinite for none.
-        looks: Looks that are left before it is given up.
-        note: Why it was not seen in the last look; empty when it was.
+        due: Time of the next capture, seconds; infinite for none.
+        captures: Captures that are left before it is given up.
+        note: Why it was not seen in the last capture; empty when it was.
     """
 
     grip: Array | None = None
     apart: int = 0
     touched: bool = False
     due: float = np.inf
-    looks: int = 0
+    captures: int = 0
     note: str = ""
 
 
 @dataclass(frozen=True)
-class Look:
+class Capture:
     """A picture, and what was believed when it came.
 
     Attributes:
@@ -83,13 +86,14 @@ class Look:
 
 @dataclass(frozen=True)
 class Found:
-    """What a look found: fits by object, and for each object a sentence in case that it has none."""
+    """What a capture found: fits by object, and for each object a sentence in case that it has none."""
 
     fits: Mapping[int, Fit]
     notes: tuple[str, ...]
 
 
-class CameraPostProcess:
+@register("engine/postprocess", "camera")
+class CameraPostProcess(PostProcessEngine):
     """A post-process engine with images.
 
     An object that was never seen has NaN for its estimated pose, and `unseen` says why; one that was seen and
@@ -101,10 +105,8 @@ class CameraPostProcess:
         camera: Name of the RGB-D camera.
         background: Look in a thread of its own, as a robot's control rate wants it. What was found counts
             once it is there, unless the hand has taken or let go the object since. Where an object was never
-            seen, a look is waited for all the same.
+            seen, a capture is waited for all the same.
     """
-
-    perception = "camera"
 
     def __init__(
         self,
@@ -117,7 +119,17 @@ class CameraPostProcess:
         self.errors = CameraErrors() if errors is None else errors
         self.camera = camera
         self._thread = ThreadPoolExecutor(1, "bt-tasksim-look") if background else None
-        self._pending: tuple[Look, Future[Found]] | None = None
+        self._pending: tuple[Capture, Future[Found]] | None = None
+
+    @classmethod
+    def create(cls, robot: RobotDescription, setup: EngineSetup) -> Self:
+        """See `Engine.create`; a real robot's images have errors of their own, and its rate does not wait."""
+        return cls(robot, PERFECT, background=True) if setup.real else cls(robot)
+
+    @property
+    def wants_images(self) -> bool:
+        """See `PostProcessEngine.wants_images`."""
+        return True
 
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> None:
         """See `PostProcessEngine.reset`."""
@@ -135,17 +147,17 @@ class CameraPostProcess:
         self._others = np.array([NEUTRAL, *sorted(fixtures)])
         self._rng = configuration.generator("camera")
         self._calibration = self.errors.calibration(self._rng)
-        self._tracks = [Track() for _ in range(n)]
+        self._tracks = [TrackedObject() for _ in range(n)]
         self._estimate = np.full((n, 7), np.nan)
         self._builder = ObservationBuilder(self.robot, configuration)
         self._next, self._taken = 0.0, -np.inf
 
-    def cameras(self, needed: bool) -> tuple[str, ...]:
-        """The camera, when a concept asks for a look or an object is to be looked at."""
+    def cameras(self, first: bool) -> tuple[str, ...]:
+        """The camera, at an episode's begin and when an object is to be looked at."""
         if self._pending is not None:
             return ()  # what is found now counts first
         due = any(track.due <= self._next + 1e-6 for track in self._tracks)
-        return (self.camera,) if self._tracks and (needed or due) else ()
+        return (self.camera,) if self._tracks and (first or due) else ()
 
     def observe(self, state: WorldState, images: Mapping[str, Image]) -> Observation:
         """See `PostProcessEngine.observe`.
@@ -157,9 +169,9 @@ class CameraPostProcess:
         self._next = time + self._model.control_period
         self._feel(state)
         if self._pending is not None and self._pending[1].done():
-            look, found = self._pending
+            capture, found = self._pending
             self._pending = None
-            self._conclude(look, found.result(), time)
+            self._conclude(capture, found.result(), time)
         for image in images.values():
             if self._shows_now(image, time):
                 self._look(image, time)
@@ -196,8 +208,8 @@ class CameraPostProcess:
                 if track.apart >= APART:
                     self._look_later(track, float(state.time))
 
-    def _look_later(self, track: Track, time: float) -> None:
-        track.touched, track.apart, track.due, track.looks = False, 0, time + WAIT, LOOKS
+    def _look_later(self, track: TrackedObject, time: float) -> None:
+        track.touched, track.apart, track.due, track.captures = False, 0, time + WAIT, CAPTURES
 
     def _in_reach(self, tool: Array) -> int:
         """Index of the object nearest to the tool, its nominal box within the fingers' reach; or -1."""
@@ -212,7 +224,7 @@ class CameraPostProcess:
         return found
 
     def _shows_now(self, image: Image, time: float) -> bool:
-        """Whether a picture is a new one, and what it shows still is; else a look waits for the next one."""
+        """Whether a picture is new and what it shows is still so; else a capture waits for the next one."""
         taken = image.taken
         if taken is None:
             return True
@@ -222,25 +234,25 @@ class CameraPostProcess:
             if track.grip is not None and time - taken > AGE:
                 return False
             if track.grip is None and np.isfinite(track.due) and taken < track.due - WAIT:
-                return False  # it had not been let go, or it is the last look's once more
+                return False  # it had not been let go, or it is the last capture's once more
         self._taken = taken
         return True
 
     def _look(self, image: Image, time: float) -> None:
         """Have a picture looked at, and believe what was found, now or later."""
-        look = Look(image, self._estimate.copy(), tuple(map(_handled, self._tracks)))
+        capture = Capture(image, self._estimate.copy(), tuple(map(_handled, self._tracks)))
         if self._thread is None or not np.all(np.isfinite(self._estimate)):
-            self._conclude(look, self._search(look), time)
+            self._conclude(capture, self._search(capture), time)
         elif self._pending is None:
-            self._pending = (look, self._thread.submit(self._search, look))
+            self._pending = (capture, self._thread.submit(self._search, capture))
 
-    def _search(self, look: Look) -> Found:
+    def _search(self, capture: Capture) -> Found:
         """Find the objects in a picture; changes nothing but the state of the generator.
 
         Raises:
             MachineError: The image has no depth.
         """
-        image, notes = look.image, []
+        image, notes = capture.image, []
         if image.depth is None:
             raise MachineError(f"camera '{image.camera.name}' gives no depth: poses need an RGB-D camera")
         camera = as_calibrated(image.camera, self._calibration)
@@ -259,8 +271,8 @@ class CameraPostProcess:
             )
             others = np.any([m for k, m in enumerate(masks) if k not in alike] or [0 * masks[i]], axis=0)
             for segment in segments[: 2 + len(alike)]:
-                view = View(camera, depth, self._rng.permutation(segment.points), others)
-                fit = self._estimated(i, view, look)
+                view = DepthView(camera, depth, self._rng.permutation(segment.points), others)
+                fit = self._estimated(i, view, capture)
                 if fit is not None:
                     fits.append((fit, i, segment))
             pixels = segments[0].pixels if segments else 0
@@ -277,27 +289,27 @@ class CameraPostProcess:
                 taken |= segment.mask
         return Found(found, tuple(notes))
 
-    def _conclude(self, look: Look, found: Found, time: float) -> None:
-        """Believe what a look has found, but for what the hand has taken or let go since."""
+    def _conclude(self, capture: Capture, found: Found, time: float) -> None:
+        """Believe what a capture has found, but for what the hand has taken or let go since."""
         for i, track in enumerate(self._tracks):
-            if _handled(track) != look.handled[i]:
+            if _handled(track) != capture.handled[i]:
                 continue
             track.note = "" if i in found.fits else found.notes[i]
             if i in found.fits:
-                self._accept(i, found.fits[i], look.estimate[i], time)
+                self._accept(i, found.fits[i], capture.estimate[i], time)
             else:
                 self._again(track, time, settled=False)
 
-    def _estimated(self, i: int, view: View, look: Look) -> Fit | None:
+    def _estimated(self, i: int, view: DepthView, capture: Capture) -> Fit | None:
         """The fit of object ``i`` to what may be it, or None."""
-        target, before = self._targets[i], look.estimate[i]
-        if look.handled[i][0]:
+        target, before = self._targets[i], capture.estimate[i]
+        if capture.handled[i][0]:
             fit = follow(target, view, before, self._model.places.values())
             moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
             turned = float(poses.angle_between(fit.pose[3:], before[3:]))
             return fit if fit.cost < 0.3 and moved < 0.02 and turned < 0.35 else None
         known = before if np.isfinite(before[0]) else None
-        places = [*self._model.places.values(), *self._tops(i, look.estimate)]
+        places = [*self._model.places.values(), *self._tops(i, capture.estimate)]
         return estimate_pose(target, view, places, known)
 
     def _tops(self, i: int, estimate: Array) -> list[PlaceModel]:
@@ -308,7 +320,7 @@ class CameraPostProcess:
             pose = estimate[k]
             if k == i or table is None or not np.isfinite(pose[0]):
                 continue
-            if poses.rotate(pose[3:], np.array([0.0, 0.0, 1.0]))[2] > 0.99:
+            if poses.z_axis(pose[3:])[2] > 0.99:
                 x, y, z = target.model.extent
                 top = poses.multiply(pose, poses.pose([0.0, 0.0, z / 2]))
                 tops.append(
@@ -327,18 +339,17 @@ class CameraPostProcess:
             self._again(track, time, settled=False)
             return
         moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
-        up = np.array([0.0, 0.0, 1.0])
-        tipped = float(np.linalg.norm(poses.rotate(fit.pose[3:], up) - poses.rotate(before[3:], up)))
+        tipped = float(np.linalg.norm(poses.z_axis(fit.pose[3:]) - poses.z_axis(before[3:])))
         self._again(track, time, settled=moved < SAME[0] and tipped < SAME[1])
 
-    def _again(self, track: Track, time: float, settled: bool) -> None:
+    def _again(self, track: TrackedObject, time: float, settled: bool) -> None:
         """Whether to look once more at something that the hand has let go."""
         if track.grip is not None:
             track.due = time + HELD[1]
         elif np.isfinite(track.due) and track.due <= time + 1e-6:
-            track.looks -= 1
-            track.due = np.inf if settled or track.looks <= 0 else time + WAIT
+            track.captures -= 1
+            track.due = np.inf if settled or track.captures <= 0 else time + WAIT
 
 
-def _handled(track: Track) -> tuple[bool, bool]:
+def _handled(track: TrackedObject) -> tuple[bool, bool]:
     return track.grip is not None, track.touched

@@ -13,20 +13,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.registration import (
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import ObjectModel, PlaceModel
+from bt_tasksim.engines.perception.registration import (
     FREE,
     UPRIGHT,
+    DepthView,
     Fit,
     ModelPoints,
-    View,
     judge_fit,
     register,
     sample_surface,
 )
-from bt_tasksim.poses import Array
-from bt_tasksim.shapes import Shape
-from bt_tasksim.world import ObjectModel, PlaceModel
+from bt_tasksim.scene.shapes import Shape
 
 GOOD = 0.2
 """Cost of a fit, see `Fit`, up to which a standing pose is taken without looking for others."""
@@ -58,7 +58,7 @@ class Target:
 
 
 def estimate_pose(
-    target: Target, view: View, places: Sequence[PlaceModel], before: Array | None = None
+    target: Target, view: DepthView, places: Sequence[PlaceModel], before: Array | None = None
 ) -> Fit | None:
     """The pose of an object.
 
@@ -80,14 +80,14 @@ def estimate_pose(
     return best if best.cost < POOR else None
 
 
-def follow(target: Target, view: View, start: Array, places: Iterable[PlaceModel] = ()) -> Fit:
+def follow(target: Target, view: DepthView, start: Array, places: Iterable[PlaceModel] = ()) -> Fit:
     """The pose near ``start (7,)``: for an object in the hand, of which little is seen.
 
     While it still stands on one of the places it only slides and turns there; else all motions are free.
     """
     points = sample_surface(target.shape)
     half = np.array([0.0, 0.0, -target.model.extent[2] / 2])
-    foot, up = poses.transform(start, half), poses.rotate(start[3:], np.array([0.0, 0.0, 1.0]))
+    foot, up = poses.transform(start, half), poses.z_axis(start[3:])
     stands = up[2] > 0.999 and any(abs(float(foot[2] - place.pose[2])) < 0.003 for place in places)
     free = UPRIGHT if stands else FREE
     pose = register(
@@ -98,7 +98,7 @@ def follow(target: Target, view: View, start: Array, places: Iterable[PlaceModel
 
 def stand_on(
     target: Target,
-    view: View,
+    view: DepthView,
     places: Sequence[PlaceModel],
     points: ModelPoints,
     before: Array | None = None,
@@ -109,7 +109,7 @@ def stand_on(
     best: Fit | None = None
     seen: set[int] = set()
     for place in places:
-        up = poses.rotate(place.pose[3:], np.array([0.0, 0.0, 1.0]))
+        up = poses.z_axis(place.pose[3:])
         local = poses.transform(poses.inverse(place.pose), middle)
         level = float(place.pose[2])
         inside = all(abs(local[i] - place.centre[i]) < place.extent[i] / 2 + 0.05 for i in range(2))
@@ -131,7 +131,7 @@ def stand_on(
 
 def lie_about(
     target: Target,
-    view: View,
+    view: DepthView,
     places: Sequence[PlaceModel],
     points: ModelPoints,
     before: Array | None = None,
@@ -148,7 +148,7 @@ def lie_about(
 def _best(
     target: Target,
     points: ModelPoints,
-    view: View,
+    view: DepthView,
     starts: Sequence[Array],
     free: Sequence[int],
     keep: int,
@@ -184,7 +184,7 @@ def _apart(a: Array, b: Array, model: ObjectModel) -> float:
     return min(float(poses.angle_between(a, poses.quat_multiply(b, turn))) for turn in turns)
 
 
-def _behind(middle: Array, view: View, target: Target) -> Array:
+def _behind(middle: Array, view: DepthView, target: Target) -> Array:
     """The object's likely centre: behind the middle of what is seen of it, as the camera looks."""
     ray = middle - view.camera.pose[:3]
     ray = ray / np.linalg.norm(ray)

@@ -14,11 +14,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from bt_tasksim import poses
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.cameras import project
-from bt_tasksim.engines.pipeline import CameraModel
-from bt_tasksim.poses import Array
-from bt_tasksim.shapes import Shape
+from bt_tasksim.engines.images import CameraModel
+from bt_tasksim.scene.shapes import Shape
 
 UPRIGHT = (0, 1, 5)
 """Free motions of a thing that stands on a plane: x, y, rotation about z."""
@@ -52,7 +52,7 @@ class ModelPoints:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class DepthView:
     """What is known of one object from one image.
 
     Attributes:
@@ -67,9 +67,9 @@ class View:
     points: Array
     others: Array | None = None
 
-    def thinned(self, n: int) -> View:
+    def thinned(self, n: int) -> DepthView:
         """With at most ``n`` points."""
-        return View(self.camera, self.depth, self.points[:n], self.others)
+        return DepthView(self.camera, self.depth, self.points[:n], self.others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ def sample_surface(shape: Shape, n: int = 3000) -> ModelPoints:
 
 def register(
     model: ModelPoints,
-    view: View,
+    view: DepthView,
     start: Array,
     free: Sequence[int],
     *,
@@ -160,7 +160,7 @@ def register(
     return pose
 
 
-def judge_fit(model: ModelPoints, view: View, pose: Array) -> Fit:
+def judge_fit(model: ModelPoints, view: DepthView, pose: Array) -> Fit:
     """How well a pose explains the object's points, and what is seen where the object should be."""
     surface, normal = _facing(model, pose, view.camera.pose[:3])
     if len(surface) < 10:
@@ -175,7 +175,7 @@ def judge_fit(model: ModelPoints, view: View, pose: Array) -> Fit:
     return Fit(pose, distance, _missing(surface, view))
 
 
-def _missing(surface: Array, view: View) -> float:
+def _missing(surface: Array, view: DepthView) -> float:
     """Share of the points ``(n, 3)`` of which neither the object nor anything before it is seen."""
     pixel, depth = project(view.camera, surface)
     column, row = np.floor(pixel).astype(int).T

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.cameras import unproject_pixels
-from bt_tasksim.engines.pipeline import CameraModel
-from bt_tasksim.poses import Array
-from bt_tasksim.world import Obstacle
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Obstacle
+from bt_tasksim.engines.cameras import unproject
+from bt_tasksim.engines.images import CameraModel
 
 NEUTRAL = (1.0, 1.0, 1.0)
 """The colour of robots, walls and highlights: any grey."""
@@ -124,7 +124,7 @@ def find_segments(
     rows, columns = np.nonzero(mask & (depth > 0))
     if len(rows) < smallest:
         return []
-    points = unproject_pixels(camera, rows, columns, depth[rows, columns])
+    points = unproject(camera, rows, columns, depth[rows, columns])
     free = outside(points, boxes, margin)
     rows, columns, points = rows[free], columns[free], points[free]
     kept = np.zeros(mask.shape, np.uint8)

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Self
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.features import ObservationBuilder
-from bt_tasksim.engines.noise import NoiseModel, noise_model
-from bt_tasksim.engines.pipeline import Image
-from bt_tasksim.errors import MachineError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.world import Observation, WorldModel, WorldState
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.world import Observation, WorldModel, WorldState
+from bt_tasksim.engines.base import EngineSetup, PostProcessEngine
+from bt_tasksim.engines.images import Image
+from bt_tasksim.engines.perception.features import ObservationBuilder
+from bt_tasksim.engines.perception.noise import NoiseModel, noise_model
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 
-class StatePostProcess:
+@register("engine/postprocess", "state")
+class StatePostProcess(PostProcessEngine):
     """A post-process engine for fast training and evaluation in simulation.
 
     Args:
@@ -25,11 +29,19 @@ class StatePostProcess:
         noise: Error of the estimate, where the world as drawn does not say otherwise.
     """
 
-    perception = "state"
-
     def __init__(self, robot: RobotDescription, noise: NoiseModel) -> None:
         self.robot = robot
         self.noise = noise
+
+    @classmethod
+    def create(cls, robot: RobotDescription, setup: EngineSetup) -> Self:
+        """See `Engine.create`; what tracks a real robot's objects has errors of its own."""
+        return cls(robot, noise_model("none" if setup.real else setup.noise))
+
+    @classmethod
+    def label(cls, setup: EngineSetup) -> str:
+        """See `Engine.label`: with the error of its estimates."""
+        return "tracked" if setup.real else f"state, noise {setup.noise}"
 
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> None:
         """See `PostProcessEngine.reset`."""
@@ -39,10 +51,6 @@ class StatePostProcess:
         self._error[:, :3] = _along_approach(self._error[:, :3], configuration)
         self._local: list[list[float]] | None = None
         self._builder = ObservationBuilder(self.robot, configuration)
-
-    def cameras(self, needed: bool) -> tuple[str, ...]:
-        """None."""
-        return ()
 
     def observe(self, state: WorldState, images: Mapping[str, Image]) -> Observation:
         """See `PostProcessEngine.observe`."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from bt_tasksim.poses import Array
-from bt_tasksim.scene import Disturbance
+from bt_tasksim.core.poses import Array
+from bt_tasksim.scene.configuration import Disturbance
 
 _WAITING, _PUSHING, _OVER = range(3)
 
 
-class Knock:
+class DisturbanceForce:
     """Pushes an object out of the hand, some time after the hand first held it clear of its support.
 
     Args:

@@ -7,20 +7,25 @@ is felt is read in `mujoco_sensing`.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.disturbance import Knock
-from bt_tasksim.engines.mujoco_contacts import FINE_STEP, TIMESTEP
-from bt_tasksim.engines.mujoco_model import World, build_world
-from bt_tasksim.engines.mujoco_sensing import ContactReader, Felt, Near, wrist_wrench
-from bt_tasksim.errors import MachineError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.world import Hidden, JointTarget, WorldState
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.world import Hidden, JointTarget, WorldState
+from bt_tasksim.engines.base import PhysicsEngine
+from bt_tasksim.engines.physics.disturbance import DisturbanceForce
+from bt_tasksim.engines.physics.mujoco_contacts import FINE_STEP, TIMESTEP
+from bt_tasksim.engines.physics.mujoco_model import World, build_world
+from bt_tasksim.engines.physics.mujoco_sensing import ContactReader, Felt, Near, wrist_wrench
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
+
+if TYPE_CHECKING:
+    import mujoco as mj
 
 FALLING = (0.1, 1.5)
 """Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are fine ones."""
@@ -29,7 +34,8 @@ WATCHED = 4
 every step; at other times at the period's end."""
 
 
-class MujocoPhysics:
+@register("engine/physics", "mujoco")
+class MujocoPhysics(PhysicsEngine):
     """The physics engine on MuJoCo.
 
     The same world as that of `SapienPhysics`, by another method: links carry no weight, drives follow the
@@ -59,7 +65,7 @@ class MujocoPhysics:
         mujoco, robot = self._mujoco, self.robot
         world = build_world(mujoco, robot, configuration)
         self._world: World = world
-        self._data: Any = mujoco.MjData(world.model)
+        self._data: mj.MjData = mujoco.MjData(world.model)
         self._period = 1.0 / configuration.control_frequency
         self._steps = math.ceil(self._period / TIMESTEP - 1e-9)
         share = configuration.control_frequency / configuration.physics_frequency
@@ -82,8 +88,8 @@ class MujocoPhysics:
         self._data.qpos[world.joint_qpos] = start
         self._data.xfrc_applied[world.object_body, 2] = -world.weight
         self._set_target(JointTarget(start, np.zeros_like(start)))
-        self._knock = Knock(configuration.disturbance)
-        self._knocked = (
+        self._disturbance = DisturbanceForce(configuration.disturbance)
+        self._pushed = (
             self._names.index(configuration.disturbance.object) if configuration.disturbance else -1
         )
         self._penetration, self._falling, self._watch = 0.0, False, 0
@@ -127,7 +133,7 @@ class MujocoPhysics:
         self._set_target(target)
         self._world.model.opt.timestep = self._period / self._steps
         self._samples = []
-        quiet = self._knock.over and not self._falling and self._watch == 0
+        quiet = self._disturbance.over and not self._falling and self._watch == 0
         if quiet:
             self._mujoco.mj_step(self._world.model, self._data, self._steps - self._sensed)
         for k in range(self._steps - self._sensed if quiet else 0, self._steps):
@@ -139,16 +145,16 @@ class MujocoPhysics:
     def _step(self, sensed: bool) -> None:
         """One ordinary step, in finer ones while something falls or is pushed."""
         model, data, mj_step = self._world.model, self._data, self._mujoco.mj_step
-        if not self._knock.over:
-            k = self._knocked
+        if not self._disturbance.over:
+            k = self._pushed
             held = bool(self._felt.hand_force[k] > 1.0 and not self._near.support[k].any())
-            self._knock.watch(float(data.time), held)
-            self._falling |= self._knock.pushing  # until the period's end, where it is looked at again
+            self._disturbance.watch(float(data.time), held)
+            self._falling |= self._disturbance.pushing  # until the period's end, where it is looked at again
         if self._falling:
             ordinary = model.opt.timestep
             model.opt.timestep = ordinary / self._finer
             for _ in range(self._finer):
-                if self._knock.pushing:
+                if self._disturbance.pushing:
                     self._push()
                 mj_step(model, data)
                 self._read_depth()
@@ -245,9 +251,9 @@ class MujocoPhysics:
 
     def _push(self) -> None:
         """Set the force of the disturbance for the next step."""
-        k, data = self._knocked, self._data
+        k, data = self._pushed, self._data
         touched = bool(self._reader.near(data).hand_distance[k] < np.inf)
-        force = self._knock.force(float(data.time), touched, self._object_velocities()[k, :3])
+        force = self._disturbance.force(float(data.time), touched, self._object_velocities()[k, :3])
         body = self._world.object_body[k]
         lever = data.xpos[body] - data.xipos[body]
         data.xfrc_applied[body, :3] = force - np.array([0.0, 0.0, self._world.weight[k]])

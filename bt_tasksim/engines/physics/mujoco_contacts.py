@@ -9,7 +9,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import mujoco as mj
 
 ROLES = ("base", "link", "object", "fixture")
 """What a shape belongs to: a link of the robot that stands still, any other link, an object, a fixture."""
@@ -43,8 +46,8 @@ HAND_SOLIMP = (0.98, 0.99, 0.001, 0.5, 2.0)
 IMPRATIO = 100.0
 """Impedance of friction over that of the normal force: what is held creeps by some 0.01 mm in 5 s."""
 ROLLING = 5e-4
-"""Metres: what an object rolls on resists with this lever times the normal force, as wood and plastic do.
-Without it a cup that leans in a corner rocks for ever."""
+"""Metres: what an object rolls on resists with this lever times the normal force, as wood and plastic do
+(`bt_tasksim.engines.physics.rolling` has the law). Without it a cup that leans in a corner rocks for ever."""
 FRICTION = 0.5
 """Friction of the robot's links other than the pads."""
 _NO_TWIST = 1e-5
@@ -70,7 +73,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Surface:
+class ContactSurface:
     """Friction, and radius in metres of the contact patch that resists twisting; 0: a point."""
 
     friction: float
@@ -83,7 +86,7 @@ class Solid:
 
     name: str
     body: Body
-    surface: Surface
+    surface: ContactSurface
 
 
 def touching_pairs(solids: Sequence[Solid]) -> Iterator[tuple[Solid, Solid]]:
@@ -110,7 +113,7 @@ def _can_touch(a: Body, b: Body) -> bool:
     return a.tip >= 0 or b.tip >= 0
 
 
-def add_pair(spec: Any, a: Solid, b: Solid) -> None:
+def add_pair(spec: mj.MjSpec, a: Solid, b: Solid) -> None:
     """State a pair in a ``mujoco.MjSpec``.
 
     Friction is Coulomb's with an elliptic cone, its coefficient the mean of both, as in PhysX. A pad's

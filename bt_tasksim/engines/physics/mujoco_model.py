@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bt_tasksim.engines.mujoco_contacts import IMPRATIO, Body, Solid, Surface, add_pair, touching_pairs
-from bt_tasksim.engines.mujoco_robot import add_hull, add_robot, set_inertia
-from bt_tasksim.errors import InputError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration, ObjectActor
-from bt_tasksim.shapes import BoxPiece
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.mujoco_contacts import (
+    IMPRATIO,
+    Body,
+    ContactSurface,
+    Solid,
+    add_pair,
+    touching_pairs,
+)
+from bt_tasksim.engines.physics.mujoco_robot import add_hull, add_robot, set_inertia
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
+from bt_tasksim.scene.shapes import BoxPiece
+
+if TYPE_CHECKING:
+    import mujoco as mj
 
 GRAVITY = 9.81
 """m/s^2."""
@@ -34,7 +45,7 @@ class World:
         weight: Weights ``(n_objects,)``, N.
     """
 
-    model: Any
+    model: mj.MjModel
     bodies: tuple[Body, ...]
     joint_qpos: Array
     joint_dof: Array
@@ -44,7 +55,7 @@ class World:
     weight: Array
 
 
-def build_world(mujoco: Any, robot: RobotDescription, configuration: ActorConfiguration) -> World:
+def build_world(mujoco: ModuleType, robot: RobotDescription, configuration: ActorConfiguration) -> World:
     """The model of a drawn world. Gravity is that on objects alone, which the engine applies.
 
     Raises:
@@ -70,7 +81,7 @@ def build_world(mujoco: Any, robot: RobotDescription, configuration: ActorConfig
         for j, box in enumerate(fixture.boxes):
             geom = carrier.add_geom(name=f"fixture/{k}/{j}", type=mujoco.mjtGeom.mjGEOM_BOX)
             _place(geom, box.pose, [s / 2 for s in box.size])
-            solids.append(Solid(geom.name, body, Surface(box.friction)))
+            solids.append(Solid(geom.name, body, ContactSurface(box.friction)))
     for a, b in touching_pairs(solids):
         add_pair(spec, a, b)
     try:
@@ -95,7 +106,7 @@ def build_world(mujoco: Any, robot: RobotDescription, configuration: ActorConfig
     )
 
 
-def _add_object(mujoco: Any, spec: Any, k: int, actor: ObjectActor) -> list[Solid]:
+def _add_object(mujoco: ModuleType, spec: mj.MjSpec, k: int, actor: ObjectActor) -> list[Solid]:
     geometry = actor.shape()
     carrier = spec.worldbody.add_body(name=f"object/{k}", pos=actor.pose[:3], quat=actor.pose[3:])
     carrier.add_joint(name=f"object/{k}", type=mujoco.mjtJoint.mjJNT_FREE)
@@ -111,10 +122,10 @@ def _add_object(mujoco: Any, spec: Any, k: int, actor: ObjectActor) -> list[Soli
             geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, geom.name
             geom.contype = geom.conaffinity = 0
             add_hull(spec, geom.name, piece.vertices)
-        solids.append(Solid(geom.name, body, Surface(actor.friction)))
+        solids.append(Solid(geom.name, body, ContactSurface(actor.friction)))
     return solids
 
 
-def _place(geom: Any, pose: Any, half_size: Any) -> None:
+def _place(geom: mj.MjsGeom, pose: Any, half_size: Any) -> None:
     geom.pos, geom.quat, geom.size = pose[:3], pose[3:], half_size
     geom.contype = geom.conaffinity = 0

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.mujoco_contacts import FRICTION, TIMESTEP, Body, Solid, Surface
-from bt_tasksim.engines.urdf_links import Inertial, LinkJoint, load_links, root_pose, still_links
-from bt_tasksim.engines.urdf_visuals import LinkVisual, load_collisions
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.mujoco_contacts import FRICTION, TIMESTEP, Body, ContactSurface, Solid
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.urdf_links import Inertial, LinkJoint, load_links, root_pose, still_links
+from bt_tasksim.robot.urdf_visuals import LinkVisual, load_collisions
+
+if TYPE_CHECKING:
+    import mujoco as mj
 
 MIMIC_SOLREF = (2 * TIMESTEP, 1.0)
 """Time constant in seconds and damping ratio of what ties a joint to the one that it follows."""
 MIMIC_SOLIMP = (0.99, 0.999, 0.001, 0.5, 2.0)
 
 
-def add_robot(mujoco: Any, spec: Any, robot: RobotDescription) -> list[Solid]:
+def add_robot(mujoco: ModuleType, spec: mj.MjSpec, robot: RobotDescription) -> list[Solid]:
     """Add a robot to a ``mujoco.MjSpec``; returns its shapes.
 
     Bodies are named ``robot/`` and the link, joints and drives by the joint. Links carry no weight, for
@@ -68,7 +72,7 @@ def drive_armature(robot: RobotDescription) -> Array:
     return np.maximum(np.concatenate([arm, hand]), robot.drive_array("damping") * TIMESTEP)
 
 
-def set_inertia(body: Any, mass: float, frame: Array, moments: Array) -> None:
+def set_inertia(body: mj.MjsBody, mass: float, frame: Array, moments: Array) -> None:
     """Set a body's mass (kg), inertial frame ``(7,)`` and principal moments ``(3,)`` (kg m^2)."""
     body.mass = mass
     body.ipos, body.iquat = frame[:3], frame[3:]
@@ -85,7 +89,7 @@ def _principal(inertial: Inertial) -> tuple[float, Array, Array]:
     return inertial.mass, poses.multiply(np.array(inertial.pose), turn), moments
 
 
-def _add_joint(mujoco: Any, body: Any, item: LinkJoint, armature: float) -> None:
+def _add_joint(mujoco: ModuleType, body: mj.MjsBody, item: LinkJoint, armature: float) -> None:
     slides = item.kind == "prismatic"
     joint = body.add_joint(
         name=item.joint, type=mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
@@ -97,7 +101,7 @@ def _add_joint(mujoco: Any, body: Any, item: LinkJoint, armature: float) -> None
         joint.range = item.limits
 
 
-def _add_mimic(mujoco: Any, spec: Any, item: LinkJoint) -> None:
+def _add_mimic(mujoco: ModuleType, spec: mj.MjSpec, item: LinkJoint) -> None:
     assert item.mimic is not None
     tie = spec.add_equality(name=f"mimic {item.joint}", type=mujoco.mjtEq.mjEQ_JOINT)
     tie.objtype = mujoco.mjtObj.mjOBJ_JOINT
@@ -106,7 +110,7 @@ def _add_mimic(mujoco: Any, spec: Any, item: LinkJoint) -> None:
     tie.solref, tie.solimp = list(MIMIC_SOLREF), list(MIMIC_SOLIMP)
 
 
-def _add_drives(mujoco: Any, spec: Any, robot: RobotDescription) -> None:
+def _add_drives(mujoco: ModuleType, spec: mj.MjSpec, robot: RobotDescription) -> None:
     """Drives: force = control - stiffness * position - damping * velocity, within the limit."""
     gains = (robot.drive_array(what).tolist() for what in ("stiffness", "damping", "force_limit"))
     for name, stiffness, damping, limit in zip(robot.joints, *gains, strict=True):
@@ -119,7 +123,11 @@ def _add_drives(mujoco: Any, spec: Any, robot: RobotDescription) -> None:
 
 
 def _add_shapes(
-    mujoco: Any, spec: Any, robot: RobotDescription, links: tuple[LinkJoint, ...], bodies: dict[str, Any]
+    mujoco: ModuleType,
+    spec: mj.MjSpec,
+    robot: RobotDescription,
+    links: tuple[LinkJoint, ...],
+    bodies: dict[str, Any],
 ) -> list[Solid]:
     still = still_links(links)
     tip_of = {name: i for i, tip in enumerate(robot.tips) for name in tip.links}
@@ -127,18 +135,18 @@ def _add_shapes(
     for item in links:
         if item.parent:
             neighbours[item.link].add(item.parent)
-    pads = Surface(robot.pads.friction, robot.pads.min_patch_radius)
+    pads = ContactSurface(robot.pads.friction, robot.pads.min_patch_radius)
     solids = []
     for k, part in enumerate(load_collisions(robot.urdf)):
         name = f"robot/{part.link}/{k}"
         _add_shape(mujoco, spec, bodies[part.link], name, part)
         role = "base" if part.link in still else "link"
         body = Body(role, -1, part.link, tip_of.get(part.link, -1), frozenset(neighbours[part.link]))
-        solids.append(Solid(name, body, pads if part.link in robot.pad_links else Surface(FRICTION)))
+        solids.append(Solid(name, body, pads if part.link in robot.pad_links else ContactSurface(FRICTION)))
     return solids
 
 
-def _add_shape(mujoco: Any, spec: Any, body: Any, name: str, part: LinkVisual) -> None:
+def _add_shape(mujoco: ModuleType, spec: mj.MjSpec, body: mj.MjsBody, name: str, part: LinkVisual) -> None:
     geom = body.add_geom(name=name, pos=part.pose[:3], quat=part.pose[3:], contype=0, conaffinity=0)
     kinds = mujoco.mjtGeom
     match part.kind:
@@ -156,7 +164,7 @@ def _add_shape(mujoco: Any, spec: Any, body: Any, name: str, part: LinkVisual) -
             add_hull(spec, name, mesh_hull(part.mesh, (x, y, z)))
 
 
-def add_hull(spec: Any, name: str, vertices: Array) -> None:
+def add_hull(spec: mj.MjSpec, name: str, vertices: Array) -> None:
     """Add the convex hull of points ``(n, 3)`` to a ``mujoco.MjSpec`` as a mesh."""
     spec.add_mesh(name=name, uservert=np.asarray(vertices, np.float32).ravel().tolist())
 

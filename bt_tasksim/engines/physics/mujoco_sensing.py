@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bt_tasksim.engines.mujoco_contacts import Body
-from bt_tasksim.poses import Array
+from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.mujoco_contacts import Body
+
+if TYPE_CHECKING:
+    import mujoco as mj
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +21,7 @@ class Near:
 
     Attributes:
         hand_distance: Metres ``(n_objects,)`` between the robot and each object; infinite out of reach.
-        support: ``(n_objects, n_bodies)`` boolean, see `bt_tasksim.world.Hidden`.
+        support: ``(n_objects, n_bodies)`` boolean, see `bt_tasksim.core.world.Hidden`.
     """
 
     hand_distance: Array
@@ -74,7 +77,7 @@ class ContactReader:
         self._tip = np.array([body.tip for body in bodies])
         self._n_tips, self._n_objects, self._n_bodies = n_tips, n_objects, n_objects + n_fixtures
 
-    def deeper(self, data: Any, than: float) -> tuple[float, str, str] | None:
+    def deeper(self, data: mj.MjData, than: float) -> tuple[float, str, str] | None:
         """The deepest overlap in metres and the names of the two bodies, if it is deeper than that.
 
         The robot's base does not count.
@@ -90,7 +93,7 @@ class ContactReader:
         a, b = geom[k]
         return -float(counted[k]), self._names[a], self._names[b]
 
-    def near(self, data: Any) -> Near:
+    def near(self, data: mj.MjData) -> Near:
         """What is near what, from the contacts that were last looked for."""
         distances = np.full(self._n_objects, np.inf)
         support = np.zeros((self._n_objects, self._n_bodies), bool)
@@ -105,7 +108,7 @@ class ContactReader:
                 support[self._index[me[on]], self._index[other[on]]] = True
         return Near(distances, support)
 
-    def forces(self, data: Any) -> tuple[Array, Array]:
+    def forces(self, data: mj.MjData) -> tuple[Array, Array]:
         """``tip_force`` and ``hand_force`` of `Felt`, from the contacts that forces were last computed for.
 
         With elliptic cones the solver's forces are those along the axes of the contact's frame; its first
@@ -129,7 +132,9 @@ class ContactReader:
         return tip_force, np.linalg.norm(by_link, axis=-1).sum(axis=0)
 
 
-def wrist_wrench(data: Any, root: int, wrist: int, tool: Sequence[float]) -> tuple[list[float], list[float]]:
+def wrist_wrench(
+    data: mj.MjData, root: int, wrist: int, tool: Sequence[float]
+) -> tuple[list[float], list[float]]:
     """External force and torque ``(3,)`` each at the tool origin, base frame.
 
     What the hand's own acceleration takes is in them, as a sensor at the wrist has it. MuJoCo gives torque

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 from dataclasses import dataclass
 
-from bt_tasksim.errors import InputError
+from bt_tasksim.core.errors import InputError
 
 PREFIX = "remote:"
 LOOPBACK = "127.0.0.1"
@@ -42,11 +42,6 @@ class Address:
         """As ZeroMQ takes it."""
         host = LOOPBACK if self.host == "localhost" else self.host
         return f"tcp://{Address(host, self.port)}"
-
-
-def is_remote(name: str) -> bool:
-    """An engine's name says that it is in another process."""
-    return name.startswith(PREFIX)
 
 
 def parse_remote(name: str) -> Address:

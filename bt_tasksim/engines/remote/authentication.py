@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
 
 import zmq
 from zmq.utils import z85
@@ -14,7 +13,7 @@ from bt_tasksim.engines.remote.keys import Key
 _ZAP = "inproc://zeromq.zap.01"
 
 
-class Gate:
+class KeyAuthenticator:
     """Lets the holders of one key in, in a thread of its own: clients connect while the engine works.
 
     It must be there before its context's server socket is bound: where nobody answers, every key comes in.
@@ -26,10 +25,12 @@ class Gate:
         refused: Called with one sentence, in that thread, for each client that is not let in.
     """
 
-    def __init__(self, context: Any, key: Key, refused: Callable[[str], None]) -> None:
+    def __init__(
+        self, context: zmq.Context[zmq.Socket[bytes]], key: Key, refused: Callable[[str], None]
+    ) -> None:
         self._socket, self._peer, self._refused = context.socket(zmq.REP), z85.decode(key.peer), refused
         self._socket.bind(_ZAP)
-        threading.Thread(target=self._answer, name="gate", daemon=True).start()
+        threading.Thread(target=self._answer, name="authentication", daemon=True).start()
 
     def _answer(self) -> None:
         try:

@@ -7,7 +7,7 @@ from dataclasses import fields
 from functools import lru_cache
 from typing import Any, TypeVar
 
-from bt_tasksim.poses import Array
+from bt_tasksim.core.poses import Array
 
 Bundle = TypeVar("Bundle")
 

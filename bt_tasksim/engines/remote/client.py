@@ -13,17 +13,18 @@ from typing import Any
 import zmq
 from zmq.utils.monitor import recv_monitor_message
 
-from bt_tasksim.engines.pipeline import Image
+from bt_tasksim.core.errors import InputError, LostEngine, MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.images import Image
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.remote.handshake import Identity, identity, mismatch
 from bt_tasksim.engines.remote.keys import Key
-from bt_tasksim.engines.remote.messages import Message, OtherProtocolError, decode, encode, sizes_of
+from bt_tasksim.engines.remote.messages import Message, OtherProtocolError, decode, encode
+from bt_tasksim.engines.remote.schema import Frame, sizes_of
 from bt_tasksim.engines.remote.session import error_of
 from bt_tasksim.engines.remote.sockets import end, prepare, receive, send
-from bt_tasksim.errors import InputError, LostEngine, MachineError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 _AGAIN = 100
 """Milliseconds between two tries to connect, while a server starts."""
@@ -86,10 +87,10 @@ class Connection:
             )
         self.address, self.role, self.robot, self.key = address, role, robot, key
         self.limits = limits or Limits()
-        self.engine = ""
+        self.engine, self.wants_images = "", False
         self._pictures = role == "rendering"
         self._sizes = sizes_of(robot)
-        self._end: Any = None
+        self._end: weakref.finalize[..., Connection] | None = None
         self._why = ""
         self.open()
 
@@ -123,7 +124,8 @@ class Connection:
             raise self._fail(f"{self.server} cannot be reached: {error.strerror}") from None
         reply = self.request("hello", "welcome", self.limits.connect, dataclasses.asdict(ours))
         self.engine = reply.fields["engine"]
-        theirs = Identity(**{k: v for k, v in reply.fields.items() if k != "engine"})
+        self.wants_images = reply.fields["wants_images"]
+        theirs = Identity(**{f.name: reply.fields[f.name] for f in dataclasses.fields(Identity)})
         if why := mismatch(theirs, ours):
             self.close()
             raise InputError(f"{self.server}: {why}")
@@ -150,7 +152,7 @@ class Connection:
         """Ask, and wait for the answer.
 
         Args:
-            kind: What is asked, see `messages.REQUESTS`.
+            kind: What is asked, see `schema.REQUESTS`.
             replies: The kind or kinds of answer that there may be.
             limit: Seconds to wait.
             fields: Fields of the message.
@@ -187,7 +189,9 @@ class Connection:
             self.close()
         raise error_of(reply)
 
-    def _exchange(self, frames: list[Any], kind: str, replies: Collection[str], limit: float) -> Message:
+    def _exchange(
+        self, frames: Sequence[Frame], kind: str, replies: Collection[str], limit: float
+    ) -> Message:
         deadline = time.monotonic() + limit
         self._look_at_connection()
         try:

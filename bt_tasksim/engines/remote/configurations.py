@@ -9,14 +9,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from bt_tasksim.engines.noise import noise_model
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.files import file_version
+from bt_tasksim.core.resources import asset
+from bt_tasksim.engines.perception.noise import noise_model
 from bt_tasksim.engines.remote.plain import shown
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.files import file_version
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import STREAMS, ActorConfiguration
-from bt_tasksim.shapes import KINDS
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import STREAMS, ActorConfiguration
+from bt_tasksim.scene.shapes import KINDS
 
 MOST_ACTORS = 128
 MOST_BOXES = 2048
@@ -136,7 +136,7 @@ def check(configuration: ActorConfiguration, robot: RobotDescription) -> None:
 
 def _check_object(actor: Any) -> None:
     where = f"object {shown(actor.name)}"
-    if actor.kind not in KINDS:
+    if actor.kind not in KINDS:  # whose own sentence would show what was sent as it is
         raise InputError(f"{where} is of unknown kind {shown(actor.kind)}{nearest(actor.kind, KINDS)}")
     _pose(actor.pose, where)
     _within(actor.size, _SIZES, f"{where}: size")

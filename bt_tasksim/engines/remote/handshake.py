@@ -10,10 +10,10 @@ from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 
-from bt_tasksim.engines.remote.messages import layout_digest
+from bt_tasksim.core.files import file_version
 from bt_tasksim.engines.remote.plain import shown, to_plain
-from bt_tasksim.files import file_version
-from bt_tasksim.robot import RobotDescription
+from bt_tasksim.engines.remote.schema import layout_digest
+from bt_tasksim.robot.description import RobotDescription
 
 _DIGESTED = {
     "robot": "the robot's data file",

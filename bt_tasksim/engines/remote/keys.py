@@ -15,8 +15,8 @@ from pathlib import Path
 import zmq
 from zmq.utils import z85
 
-from bt_tasksim.errors import InputError
-from bt_tasksim.files import whole_file
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.files import whole_file
 
 SERVER, CLIENT = "server", "client"
 _TITLE = "bt-tasksim key for"
@@ -94,7 +94,7 @@ def load_key(path: str | Path, side: str) -> Key:
         raise
     except OSError as error:
         raise InputError(f"key file '{file}' cannot be read: {error.strerror or error}") from None
-    except (ValueError, zmq.ZMQError):
+    except (ValueError, RecursionError, zmq.ZMQError):
         raise InputError(
             f"'{file}' does not hold a key: make a pair with 'bt-tasksim new-key FILE'"
         ) from None

@@ -1,15 +1,13 @@
-"""The messages between a client and a served engine: their schema, and bytes to messages and back.
+"""Bytes to messages and back.
 
 A message is some frames. The first is msgpack: ``[protocol, number, kind, fields, layout]``, where ``layout``
 lists name, dtype and shape of the arrays whose raw bytes are the other frames, in order. A reply carries the
-number of its request. `SCHEMA` says what each kind must hold; `decode` checks everything against it before
-anything is done with a message, so what it returns is well formed, finite and of the right shapes.
+number of its request. `decode` checks everything against `bt_tasksim.engines.remote.schema` before anything
+is done with a message, so what it returns is well formed, finite and of the right shapes.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,128 +16,26 @@ from typing import Any
 import msgpack
 import numpy as np
 
-from bt_tasksim.engines.pipeline import CameraModel, Image
-from bt_tasksim.engines.remote.plain import LARGEST, from_plain, shown, spelled, to_plain
-from bt_tasksim.errors import InputError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.images import CameraModel, Image
+from bt_tasksim.engines.remote.plain import LARGEST, from_plain, shown, to_plain
+from bt_tasksim.engines.remote.schema import (
+    DTYPES,
+    IMAGE,
+    LARGEST_HEADER,
+    LARGEST_SIDE,
+    MOST_FRAMES,
+    MOST_IMAGES,
+    PROTOCOL,
+    SCHEMA,
+    ArraySpec,
+    Frame,
+    array_specs,
+)
 
-PROTOCOL = 1
-LARGEST_HEADER = 1 << 20
-"""Bytes of the first frame, the drawn world in it."""
-MOST_FRAMES = 48
-MOST_IMAGES = 8
-LARGEST_SIDE = 8192
-"""Of what no message says beforehand, such as an image's width."""
 LARGE = 1 << 16
 """Bytes from which an array is sent and kept without a copy."""
-DTYPES: Mapping[str, Any] = {name: np.dtype(name) for name in ("<f8", "<f4", "|u1", "|b1")}
-"""The types that arrays may have: NumPy's names with their byte order."""
-
-
-@dataclass(frozen=True)
-class ArraySpec:
-    """What an array in a message must be.
-
-    Attributes:
-        shape: Numbers, or names of sizes that are the same throughout a message and an episode.
-        dtype: One of `DTYPES`.
-        values: ``finite`` (and within `LARGEST`), ``not NaN`` or ``any``.
-        optional: It may be missing.
-    """
-
-    shape: tuple[int | str, ...]
-    dtype: str = "<f8"
-    values: str = "finite"
-    optional: bool = False
-
-
-@dataclass(frozen=True)
-class MessageSpec:
-    """What a kind of message holds: fields with their types, arrays, and images by their cameras."""
-
-    fields: Mapping[str, Any] = field(default_factory=dict)
-    arrays: Mapping[str, ArraySpec] = field(default_factory=dict)
-    images: bool = False
-
-
-_STATE = {
-    "time": ArraySpec(()),
-    "joint_position": ArraySpec(("joints",)),
-    "joint_velocity": ArraySpec(("joints",)),
-    "joint_effort": ArraySpec(("joints",)),
-    "tip_force": ArraySpec(("tips", 3)),
-    "wrench": ArraySpec((6,)),
-    "tool_pose": ArraySpec((7,)),
-    "tips": ArraySpec(("tips", 3)),
-    "objects": ArraySpec(("objects", 7), optional=True),
-    "velocities": ArraySpec(("objects", 6), optional=True),
-}
-_HIDDEN = {
-    "time": ArraySpec(()),
-    "objects": ArraySpec(("objects", 7)),
-    "velocities": ArraySpec(("objects", 6)),
-    "hand_force": ArraySpec(("objects",)),
-    "hand_distance": ArraySpec(("objects",), values="not NaN"),
-    "support": ArraySpec(("objects", "bodies"), "|b1"),
-    "penetration": ArraySpec(()),
-    "tool_pose": ArraySpec((7,)),
-}
-_OBSERVATION = {
-    "time": ArraySpec(()),
-    "arm_position": ArraySpec(("arm",)),
-    "arm_velocity": ArraySpec(("arm",)),
-    "hand_position": ArraySpec(("hand",)),
-    "hand_effort": ArraySpec(("hand",)),
-    "closure": ArraySpec(()),
-    "tool_pose": ArraySpec((7,)),
-    "tips": ArraySpec(("tips", 3)),
-    "contacts": ArraySpec(("tips",), "|b1"),
-    "contact_force": ArraySpec(("tips", 3)),
-    "wrench": ArraySpec((6,)),
-    "objects": ArraySpec(("objects", 7), values="any"),
-    "contact_points": ArraySpec(("tips", 3)),
-    "motion": ArraySpec((6,)),
-}
-_TARGET = {"position": ArraySpec(("joints",)), "velocity": ArraySpec(("joints",))}
-_COMMAND = {"tool": ArraySpec((7,), optional=True), "hand": ArraySpec(("closures",), optional=True)}
-_IMAGE = {
-    "colour": ArraySpec(("height", "width", 3), "|u1"),
-    "depth": ArraySpec(("height", "width"), "<f4", optional=True),
-    "taken": ArraySpec((), optional=True),
-}
-
-REQUESTS: Mapping[str, MessageSpec] = {
-    "hello": MessageSpec({"role": str, "version": str, "robot": str, "digests": dict[str, str]}),
-    "reset": MessageSpec({"configuration": ActorConfiguration}),
-    "step": MessageSpec(arrays=_TARGET),
-    "hidden": MessageSpec(),
-    "solve": MessageSpec(arrays={**_STATE, **_COMMAND}),
-    "hand_start": MessageSpec(arrays={"start": ArraySpec((4,))}),
-    "render": MessageSpec({"camera": str, "depth": bool}, _STATE),
-    "cameras": MessageSpec({"needed": bool}),
-    "observe": MessageSpec(arrays=_STATE, images=True),
-}
-"""What a client may send: what it is for is in `bt_tasksim.engines.remote.session`."""
-REPLIES: Mapping[str, MessageSpec] = {
-    "welcome": MessageSpec(
-        {"role": str, "engine": str, "version": str, "robot": str, "digests": dict[str, str]}
-    ),
-    "done": MessageSpec(),
-    "state": MessageSpec(arrays=_STATE),
-    "truth": MessageSpec(arrays=_HIDDEN),
-    "no truth": MessageSpec(),
-    "target": MessageSpec(arrays=_TARGET),
-    "joints": MessageSpec(arrays={"position": ArraySpec(("joints",))}),
-    "image": MessageSpec(images=True),
-    "names": MessageSpec({"names": tuple[str, ...]}),
-    "observation": MessageSpec({"unseen": dict[str, str]}, _OBSERVATION),
-    "error": MessageSpec({"error": str, "sentence": str, "distance": float, "angle": float}),
-    "notice": MessageSpec(),
-}
-"""What a server may send; ``notice`` answers nothing, and finds out whether a client is still there."""
-SCHEMA: Mapping[str, MessageSpec] = {**REQUESTS, **REPLIES}
 
 
 class BadMessageError(InputError):
@@ -170,46 +66,13 @@ class Message:
     images: tuple[Image, ...] = ()
 
 
-def sizes_of(robot: RobotDescription, configuration: ActorConfiguration | None = None) -> dict[str, int]:
-    """The named sizes of arrays for a robot and, once it is known, a drawn world."""
-    sizes = {
-        "joints": len(robot.joints),
-        "arm": len(robot.arm_joints),
-        "hand": len(robot.hand_joints),
-        "tips": len(robot.tips),
-        "closures": 1 + len(robot.synergies),
-    }
-    if configuration is not None:
-        objects = len(configuration.objects)
-        sizes |= {"objects": objects, "bodies": objects + len(configuration.fixtures)}
-    return sizes
-
-
-def layout_digest() -> str:
-    """A hash of the whole schema: two sides that have the same one lay their messages out alike.
-
-    Every dataclass in it counts with all its fields, down to a drawn world's boxes.
-    """
-    whole = {"protocol": PROTOCOL, "kinds": {kind: _spelled(kind, spec) for kind, spec in SCHEMA.items()}}
-    return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()
-
-
-def _spelled(kind: str, spec: MessageSpec) -> dict[str, Any]:
-    """A kind of message as plain data, one image standing for all that it may have."""
-    return {
-        "fields": {name: spelled(t) for name, t in spec.fields.items()},
-        "arrays": to_plain(_array_specs(kind, 1 if spec.images else 0)),
-        "images": spelled(CameraModel) if spec.images else None,
-    }
-
-
-def encode(message: Message, sizes: Mapping[str, int]) -> list[Any]:
+def encode(message: Message, sizes: Mapping[str, int]) -> list[Frame]:
     """The frames of a message: bytes, or views of large arrays, which must not change until they are sent.
 
     Raises:
         InputError: It is not as the schema says, such as a state with NaN in it.
     """
-    specs = _array_specs(message.kind, len(message.images))
+    specs = array_specs(message.kind, len(message.images))
     arrays = {**message.arrays, **_image_arrays(message.images)}
     bound = dict(sizes)
     layout, frames = [], []
@@ -239,7 +102,7 @@ def encode(message: Message, sizes: Mapping[str, int]) -> list[Any]:
     return [header, *frames]
 
 
-def decode(frames: Sequence[Any], kinds: Collection[str], sizes: Mapping[str, int]) -> Message:
+def decode(frames: Sequence[Frame], kinds: Collection[str], sizes: Mapping[str, int]) -> Message:
     """The message in some frames (bytes or other buffers).
 
     Args:
@@ -259,13 +122,13 @@ def decode(frames: Sequence[Any], kinds: Collection[str], sizes: Mapping[str, in
         if not isinstance(plain, dict) or plain.keys() != spec.fields.keys():
             raise InputError(f"message '{kind}' should have the fields {sorted(spec.fields)}")
         fields = {name: from_plain(t, plain[name], f"'{kind}': {name}") for name, t in spec.fields.items()}
-        arrays = _arrays(kind, layout, frames[1:], _array_specs(kind, len(cameras)), dict(sizes))
+        arrays = _arrays(kind, layout, frames[1:], array_specs(kind, len(cameras)), dict(sizes))
         return Message(number, kind, fields, arrays, tuple(_images(cameras, arrays)))
     except InputError as error:
         raise BadMessageError(str(error), number) from None
 
 
-def _header(frames: Sequence[Any]) -> tuple[int, str, Any, list[Any]]:
+def _header(frames: Sequence[Frame]) -> tuple[int, str, Any, list[Any]]:
     if not 1 <= len(frames) <= MOST_FRAMES:
         raise BadMessageError(f"a message has 1 to {MOST_FRAMES} frames, found {len(frames)}")
     if len(frames[0]) > LARGEST_HEADER:
@@ -293,21 +156,11 @@ def _header(frames: Sequence[Any]) -> tuple[int, str, Any, list[Any]]:
     return number, kind, plain, layout
 
 
-def _array_specs(kind: str, images: int) -> dict[str, ArraySpec]:
-    specs = dict(SCHEMA[kind].arrays)
-    for i in range(images):
-        named = {"height": f"height {i}", "width": f"width {i}"}
-        for part, spec in _IMAGE.items():
-            shape = tuple(named.get(n, n) if isinstance(n, str) else n for n in spec.shape)
-            specs[f"{part} {i}"] = ArraySpec(shape, spec.dtype, spec.values, spec.optional)
-    return specs
-
-
 def _image_arrays(images: Sequence[Image]) -> dict[str, Array]:
-    return {f"{part} {i}": getattr(image, part) for i, image in enumerate(images) for part in _IMAGE}
+    return {f"{part} {i}": getattr(image, part) for i, image in enumerate(images) for part in IMAGE}
 
 
-def _cameras(plain: Any) -> tuple[CameraModel, ...]:
+def _cameras(plain: object) -> tuple[CameraModel, ...]:
     """The cameras of a message's images, taken out of its fields."""
     cameras = plain.pop("cameras", []) if isinstance(plain, dict) else None
     if not isinstance(cameras, list) or len(cameras) > MOST_IMAGES:
@@ -318,7 +171,7 @@ def _cameras(plain: Any) -> tuple[CameraModel, ...]:
 def _images(cameras: Sequence[CameraModel], arrays: dict[str, Array]) -> list[Image]:
     found = []
     for i, camera in enumerate(cameras):
-        colour, depth, taken = (arrays.pop(f"{part} {i}", None) for part in _IMAGE)
+        colour, depth, taken = (arrays.pop(f"{part} {i}", None) for part in IMAGE)
         assert colour is not None, "an image without colour was refused"
         if colour.shape[:2] != (camera.height, camera.width):
             raise InputError(f"an image of {colour.shape} is not what its camera {shown(camera.name)} gives")
@@ -329,7 +182,7 @@ def _images(cameras: Sequence[CameraModel], arrays: dict[str, Array]) -> list[Im
 def _arrays(
     kind: str,
     layout: list[Any],
-    buffers: Sequence[Any],
+    buffers: Sequence[Frame],
     specs: Mapping[str, ArraySpec],
     sizes: dict[str, int],
 ) -> dict[str, Array]:
@@ -354,7 +207,7 @@ def _arrays(
     return found
 
 
-def _array(name: str, buffer: Any, spec: ArraySpec, shape: tuple[int, ...]) -> Array:
+def _array(name: str, buffer: Frame, spec: ArraySpec, shape: tuple[int, ...]) -> Array:
     dtype, size = DTYPES[spec.dtype], len(buffer)
     expected = math.prod(shape) * dtype.itemsize
     if size != expected:
@@ -372,7 +225,7 @@ def _array(name: str, buffer: Any, spec: ArraySpec, shape: tuple[int, ...]) -> A
     return array if size >= LARGE and array.flags.aligned else array.copy()
 
 
-def _contiguous(value: Any, dtype: Any) -> Array:
+def _contiguous(value: Array | float, dtype: np.dtype[Any]) -> Array:
     """An array of this type with its numbers in order, which is the given one where that is so."""
     if isinstance(value, np.ndarray) and value.dtype is dtype and value.flags.c_contiguous:
         return value

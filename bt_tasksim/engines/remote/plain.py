@@ -15,7 +15,8 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from bt_tasksim.errors import InputError
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.renamed import former_names, with_present_names
 
 LONGEST_TEXT = 2000
 LONGEST_LIST = 4096
@@ -134,6 +135,8 @@ def _tuple(inner: tuple[Any, ...], data: Any, where: str) -> tuple[Any, ...]:
 
 def _dataclass(kind: Any, data: Any, where: str) -> Any:
     hints = _hints(kind)
+    if isinstance(data, dict) and (former := former_names(kind)):
+        data = with_present_names(data, former)
     if not isinstance(data, dict) or data.keys() != hints.keys():
         known = set(data) if isinstance(data, dict) else set()
         odd = sorted(str(k) for k in known.symmetric_difference(hints))

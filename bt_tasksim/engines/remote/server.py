@@ -1,7 +1,7 @@
 """The process that serves an engine: one socket, one loop, one message after the other.
 
-Two small threads work while the engine does: one answers who may connect (`bt_tasksim.engines.remote.gate`),
-one looks after the memory that unfinished messages take up.
+Two small threads work while the engine does: one says who may connect
+(`bt_tasksim.engines.remote.authentication`), one looks after the memory that unfinished messages take up.
 """
 
 from __future__ import annotations
@@ -9,19 +9,19 @@ from __future__ import annotations
 import threading
 import time
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 import zmq
 from zmq.utils.monitor import recv_monitor_message
 
+from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.engines.remote.address import Address
-from bt_tasksim.engines.remote.gate import Gate
+from bt_tasksim.engines.remote.authentication import KeyAuthenticator
 from bt_tasksim.engines.remote.keys import Key
+from bt_tasksim.engines.remote.schema import Frame
 from bt_tasksim.engines.remote.session import Session
 from bt_tasksim.engines.remote.sockets import end, prepare, receive, send
-from bt_tasksim.errors import InputError, MachineError
 
 _WAKE = 200
 """Milliseconds after which the loop looks whether it should stop, and after which the memory is looked at."""
@@ -74,7 +74,7 @@ class EngineServer:
         address = self.address
         try:
             if self.key is not None:
-                Gate(context, self.key, self._refused)
+                KeyAuthenticator(context, self.key, self._refused)
             prepare(self._socket, self.key, pictures=self._pictures, server=True)
             self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
             self._socket.bind(address.url)
@@ -114,7 +114,7 @@ class EngineServer:
         """Let go of the port and of every client."""
         self._end()
 
-    def _next(self) -> tuple[bytes, list[Any]]:
+    def _next(self) -> tuple[bytes, Sequence[Frame]]:
         """A message and who sent it; no frames where none has come for a while."""
         if not self._end.alive:
             self._open()
@@ -127,7 +127,7 @@ class EngineServer:
         client, *frames = receive(self._socket, self._pictures)
         return bytes(client), frames
 
-    def _send(self, client: bytes, frames: list[Any]) -> bool:
+    def _send(self, client: bytes, frames: Sequence[Frame]) -> bool:
         """Send to a client that is still there and listens; says whether it could be."""
         try:
             with self._using:

@@ -10,32 +10,18 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
-from bt_tasksim.engines.remote.bundles import arrays_of, bundle_of
+from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, UnreachableError
+from bt_tasksim.engines.base import Engine, PostProcessEngine
+from bt_tasksim.engines.remote.answers import answers_of, reset
 from bt_tasksim.engines.remote.configurations import as_received
 from bt_tasksim.engines.remote.handshake import Identity, identity, mismatch
 from bt_tasksim.engines.remote.memory import MemoryWatch
-from bt_tasksim.engines.remote.messages import (
-    REQUESTS,
-    BadMessageError,
-    Message,
-    decode,
-    encode,
-    sizes_of,
-)
+from bt_tasksim.engines.remote.messages import BadMessageError, Message, decode, encode
 from bt_tasksim.engines.remote.plain import LARGEST, LONGEST_TEXT
-from bt_tasksim.errors import BtTasksimError, InputError, LostEngine, MachineError, UnreachableError
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.world import Command, JointTarget, WorldState
+from bt_tasksim.engines.remote.schema import Frame, sizes_of
+from bt_tasksim.robot.description import RobotDescription
 
-ROLES = {
-    "kinematics": ("solve", "hand_start"),
-    "physics": ("step", "hidden"),
-    "rendering": ("render",),
-    "postprocess": ("cameras", "observe"),
-}
-"""Roles, and the requests that each answers besides ``hello`` and ``reset``."""
 ERRORS: tuple[type[BtTasksimError], ...] = (UnreachableError, InputError, LostEngine, MachineError)
 """Errors that travel by name, those of a narrower kind first."""
 
@@ -45,7 +31,7 @@ class Session:
 
     Args:
         engine: The engine.
-        role: Its role, one of `ROLES`.
+        role: Its role, see `bt_tasksim.engines.base.ROLES`.
         name: Its name, for sentences.
         robot: The robot it is for.
         objects: Folder of mesh files, besides the bundled ones.
@@ -55,7 +41,7 @@ class Session:
 
     def __init__(
         self,
-        engine: Any,
+        engine: Engine,
         role: str,
         name: str,
         robot: RobotDescription,
@@ -68,11 +54,12 @@ class Session:
         self.owner: bytes | None = None
         self.identity = identity(role, robot)
         self._refused = refused
-        self._kinds = ("hello", "reset", *ROLES[role])
+        self._answers = answers_of(engine)
+        self._kinds = ("hello", "reset", *self._answers)
         self._in_episode = False
         self._sizes = sizes_of(robot)
 
-    def answer(self, client: bytes, frames: Sequence[Any], there: Callable[[bytes], bool]) -> list[Any]:
+    def answer(self, client: bytes, frames: Sequence[Frame], there: Callable[[bytes], bool]) -> list[Frame]:
         """The frames of the reply to a client's message.
 
         Args:
@@ -97,14 +84,14 @@ class Session:
             sentence = f"the {self.role} engine '{self.name}' raised {type(error).__name__}: {error}"
             return self._error(MachineError(sentence), number, refused=True)
 
-    def _encoded(self, reply: Message) -> list[Any]:
+    def _encoded(self, reply: Message) -> list[Frame]:
         try:
             return encode(reply, self._sizes)
         except InputError as error:  # such as NaN, after which nothing of the episode is worth anything
             self._in_episode = False
             raise MachineError(f"the {self.role} engine '{self.name}' has gone astray: {error}") from error
 
-    def notice(self) -> list[Any]:
+    def notice(self) -> list[Frame]:
         """The frames of a message that answers nothing."""
         return encode(Message(0, "notice"), {})
 
@@ -124,8 +111,7 @@ class Session:
             return self._reset(request)
         if not self._in_episode:
             raise MachineError(f"there is no episode in the {self.role} engine: it has to be reset first")
-        call: Callable[[Message], Message] = getattr(self, f"_{request.kind}")
-        return call(request)
+        return self._answers[request.kind](request)
 
     def _hello(self, client: bytes, request: Message, there: Callable[[bytes], bool]) -> Message:
         wanted = Identity(**request.fields)
@@ -137,53 +123,20 @@ class Session:
             )
         self.owner = client
         self._leave()
-        return Message(0, "welcome", {**dataclasses.asdict(self.identity), "engine": self.name})
-
-    # ---- what each role answers ---------------------------------------------------------------------------
+        images = isinstance(self.engine, PostProcessEngine) and self.engine.wants_images
+        about = {**dataclasses.asdict(self.identity), "engine": self.name, "wants_images": images}
+        return Message(0, "welcome", about)
 
     def _reset(self, request: Message) -> Message:
         self._leave()
         configuration = as_received(request.fields["configuration"], self.robot, self.objects)
         with self.watch.own():
-            if self.role == "postprocess":
-                tips = [tip.name for tip in self.robot.tips]
-                state = self.engine.reset(configuration, configuration.world_model(tips, self.robot.opening))
-            else:
-                state = self.engine.reset(configuration)
+            reply = reset(self.engine, self.robot, configuration)
         self._sizes = sizes_of(self.robot, configuration)
         self._in_episode = True
-        return Message(0, "state", arrays=arrays_of(state)) if self.role == "physics" else Message(0, "done")
+        return reply
 
-    def _step(self, request: Message) -> Message:
-        return Message(0, "state", arrays=arrays_of(self.engine.step(bundle_of(JointTarget, request.arrays))))
-
-    def _hidden(self, request: Message) -> Message:
-        truth = self.engine.hidden()
-        return Message(0, "no truth") if truth is None else Message(0, "truth", arrays=arrays_of(truth))
-
-    def _solve(self, request: Message) -> Message:
-        command, state = bundle_of(Command, request.arrays), bundle_of(WorldState, request.arrays)
-        return Message(0, "target", arrays=arrays_of(self.engine.solve(command, state)))
-
-    def _hand_start(self, request: Message) -> Message:
-        joints = self.engine.joints_of_hand_start(tuple(request.arrays["start"].tolist()))
-        return Message(0, "joints", arrays={"position": joints})
-
-    def _render(self, request: Message) -> Message:
-        state, camera = bundle_of(WorldState, request.arrays), request.fields["camera"]
-        image = self.engine.render(state, camera, depth=request.fields["depth"])
-        return Message(0, "image", images=(image,))
-
-    def _cameras(self, request: Message) -> Message:
-        return Message(0, "names", {"names": self.engine.cameras(request.fields["needed"])})
-
-    def _observe(self, request: Message) -> Message:
-        images = {image.camera.name: image for image in request.images}
-        observation = self.engine.observe(bundle_of(WorldState, request.arrays), images)
-        say: Callable[[], dict[str, str]] = getattr(self.engine, "unseen", dict)
-        return Message(0, "observation", {"unseen": say()}, arrays_of(observation))
-
-    def _error(self, error: BtTasksimError, number: int, refused: bool = False) -> list[Any]:
+    def _error(self, error: BtTasksimError, number: int, refused: bool = False) -> list[Frame]:
         sentence = plain_sentence(str(error))
         if refused:
             self._refused(sentence)
@@ -209,6 +162,3 @@ def plain_sentence(text: str) -> str:
     """Text on one line, without what a terminal would obey, and no longer than a message may hold."""
     line = "".join(c if c.isprintable() else " " for c in " ".join(text.split()))
     return line if len(line) <= LONGEST_TEXT else f"{line[: LONGEST_TEXT - 3]}..."
-
-
-assert all(kind in REQUESTS for kinds in ROLES.values() for kind in kinds)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import zmq
 
 from bt_tasksim.engines.remote.keys import Key
-from bt_tasksim.engines.remote.messages import LARGEST_HEADER, LARGEST_SIDE
+from bt_tasksim.engines.remote.schema import LARGEST_HEADER, LARGEST_SIDE, Frame
 
 HEARTBEAT = (2000, 8000)
 """Milliseconds between signs of life, and without one until a peer counts as gone (a pulled cable)."""
@@ -16,7 +16,7 @@ QUEUE = 16
 _PICTURES = 7 * LARGEST_SIDE * LARGEST_SIDE
 
 
-def prepare(socket: Any, key: Key | None, pictures: bool, server: bool) -> None:
+def prepare(socket: zmq.Socket[bytes], key: Key | None, pictures: bool, server: bool) -> None:
     """Set what has to be set before a socket connects or is bound.
 
     Args:
@@ -42,7 +42,9 @@ def prepare(socket: Any, key: Key | None, pictures: bool, server: bool) -> None:
         socket.curve_serverkey = key.peer
 
 
-def end(context: Any, socket: Any, *others: Any) -> None:
+def end(
+    context: zmq.Context[zmq.Socket[bytes]], socket: zmq.Socket[bytes], *others: zmq.Socket[bytes]
+) -> None:
     """Close sockets and their context, without waiting for any peer.
 
     Called through `weakref.finalize`, which keeps them together until then: a context that is collected
@@ -56,19 +58,18 @@ def end(context: Any, socket: Any, *others: Any) -> None:
     context.term()  # which a socket in another thread sees, and closes
 
 
-def send(socket: Any, frames: list[Any], flags: int = 0) -> None:
+def send(socket: zmq.Socket[bytes], frames: Sequence[Frame], flags: int = 0) -> None:
     """Send frames as one message; views of large arrays go without a copy."""
     last = len(frames) - 1
     for i, frame in enumerate(frames):
         socket.send(frame, flags | (zmq.SNDMORE if i < last else 0), copy=isinstance(frame, bytes))
 
 
-def receive(socket: Any, pictures: bool) -> list[Any]:
+def receive(socket: zmq.Socket[bytes], pictures: bool) -> Sequence[Frame]:
     """The frames of a waiting message: buffers that share ZeroMQ's memory where there are pictures in it.
 
     Small frames are copied, which is quicker.
     """
     if not pictures:
-        frames: list[Any] = socket.recv_multipart(zmq.NOBLOCK)
-        return frames
+        return socket.recv_multipart(zmq.NOBLOCK)
     return [frame.buffer for frame in socket.recv_multipart(zmq.NOBLOCK, copy=False)]

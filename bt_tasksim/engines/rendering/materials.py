@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.meshes import TriangleMesh, shaded
-from bt_tasksim.poses import Array
+from bt_tasksim.core.poses import Array
+from bt_tasksim.scene.meshes import TriangleMesh, shaded
 
 AMBIENT = (0.34, 0.35, 0.37)
 """Light from everywhere, and the colour of the background (linear RGB)."""
@@ -57,16 +57,16 @@ def add_lights(scene: Any, shadow_size: int) -> None:
         scene.add_entity(entity)
 
 
-def material(colour: tuple[float, float, float], look: str = "matte") -> Any:
+def material(colour: tuple[float, float, float], material: str = "matte") -> Any:
     """A ``RenderMaterial``.
 
     Args:
         colour: sRGB, 0 to 1.
-        look: ``matte`` (plastic), ``wood`` or ``metal``.
+        material: ``matte`` (plastic), ``wood`` or ``metal``.
     """
     from sapien import render
 
-    match look:
+    match material:
         case "metal":
             return render.RenderMaterial(
                 base_color=linear(colour), metallic=0.35, roughness=0.38, specular=0.5

@@ -6,23 +6,26 @@ stand before it.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from bt_tasksim import meshes
-from bt_tasksim.engines import looks
+from bt_tasksim.core.errors import InputError, MachineError, nearest
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.world import PlaceModel, WorldState
+from bt_tasksim.engines.base import EngineSetup, RenderingEngine
 from bt_tasksim.engines.cameras import CAMERAS, CameraSpec
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.engines.pipeline import CameraModel, Image
-from bt_tasksim.engines.urdf_visuals import LinkVisual, load_visuals
+from bt_tasksim.engines.images import CameraModel, Image
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.engines.rendering import materials
 from bt_tasksim.engines.vulkan import use_software_driver
-from bt_tasksim.errors import InputError, MachineError, nearest
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription, load_robot
-from bt_tasksim.scene import ActorConfiguration, ObjectActor
-from bt_tasksim.world import PlaceModel, WorldState
+from bt_tasksim.robot.description import RobotDescription, load_robot
+from bt_tasksim.robot.urdf_visuals import LinkVisual, load_visuals
+from bt_tasksim.scene import meshes
+from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 
 ALIASES = {"perception": "scene"}
 _FLOOR = -0.75
@@ -30,7 +33,8 @@ _MAT = 0.0005
 _NEAR, _FAR = 0.02, 20.0
 
 
-class SapienRendering:
+@register("engine/rendering", "sapien")
+class SapienRendering(RenderingEngine):
     """A `RenderingEngine`; one instance serves any number of episodes.
 
     Args:
@@ -71,8 +75,13 @@ class SapienRendering:
         self._fixtures: list[Any] = []
         self._spots: list[Any] = []
         self._drawn: tuple[Any, ...] = ()
-        looks.add_lights(self._scene, shadow_size)
+        materials.add_lights(self._scene, shadow_size)
         self._add_room()
+
+    @classmethod
+    def create(cls, robot: RobotDescription, setup: EngineSetup) -> Self:
+        """See `Engine.create`; the robot is that of each episode."""
+        return cls()
 
     def reset(self, configuration: ActorConfiguration) -> None:
         """Prepare for an episode: its robot, fixtures and objects.
@@ -88,7 +97,7 @@ class SapienRendering:
             for fixture in configuration.fixtures:
                 shapes = []
                 for box in fixture.boxes:
-                    shape = looks.plank_shape(box.size, looks.material(box.colour, box.look))
+                    shape = materials.plank_shape(box.size, materials.material(box.colour, box.material))
                     shape.local_pose = self._pose(np.array(box.pose))
                     shapes.append(shape)
                 self._fixtures.append(self._add(fixture.name, shapes, fixture.pose_array()))
@@ -127,8 +136,15 @@ class SapienRendering:
             for entity, pose in zip(self._objects, state.objects, strict=True):
                 entity.set_pose(self._pose(pose))
         self._scene.update_render()
-        component.take_picture()
-        colour = component.get_picture("Color")
+        try:
+            component.take_picture()
+            colour = component.get_picture("Color")
+        except (
+            BaseException
+        ):  # an interrupt: a scene that is let go of while it is drawn takes the process down
+            with contextlib.suppress(RuntimeError):
+                component.get_picture("Color")  # waits until it is drawn
+            raise
         pixels = np.round(255 * np.clip(colour[..., :3], 0, 1)).astype(np.uint8)
         if not depth:
             return Image(model, pixels, None)
@@ -190,7 +206,7 @@ class SapienRendering:
 
     def _link_shape(self, visual: LinkVisual) -> Any:
         render = self._render
-        coat = looks.material(visual.colour or (0.75, 0.75, 0.76))
+        coat = materials.material(visual.colour or (0.75, 0.75, 0.76))
         size = np.array(visual.size)
         pose = self._pose(np.array(visual.pose))
         match visual.kind:
@@ -209,27 +225,27 @@ class SapienRendering:
         return shape
 
     def _add_object(self, actor: ObjectActor) -> Any:
-        shape = looks.mesh_shape(actor.shape().visual, looks.material(actor.colour))
+        shape = materials.mesh_shape(actor.shape().visual, materials.material(actor.colour))
         return self._add(actor.name, [shape], np.array(actor.pose))
 
     def _add_spot(self, place: PlaceModel) -> Any:
         """A thin mat that marks where something is to stand."""
         x, y = place.extent
         outline = meshes.rounded_rectangle(x / 2, y / 2, min(x, y) / 6)
-        mat = looks.mesh_shape(meshes.prism(outline, 2 * _MAT), looks.material((0.97, 0.96, 0.90)))
+        mat = materials.mesh_shape(meshes.prism(outline, 2 * _MAT), materials.material((0.97, 0.96, 0.90)))
         return self._add(place.name, [mat], np.asarray(place.pose, float))
 
     def _add_room(self) -> None:
         # They shine evenly: a light background whichever way a camera looks, and beyond the edge of the
         # shadow map, where SAPIEN takes everything to be in the shade.
         floor = self._render.RenderMaterial(base_color=[0, 0, 0, 1], roughness=1, specular=0)
-        floor.emission = [*looks.linear((0.83, 0.845, 0.86))[:3], 1.0]
+        floor.emission = [*materials.linear((0.83, 0.845, 0.86))[:3], 1.0]
         wall = self._render.RenderMaterial(base_color=[0, 0, 0, 1], roughness=1, specular=0)
-        wall.emission = [*looks.linear((0.90, 0.915, 0.93))[:3], 1.0]
+        wall.emission = [*materials.linear((0.90, 0.915, 0.93))[:3], 1.0]
         half, height = 6.0, 8.0
-        parts = [looks.plank_shape((2 * half, 2 * half, 0.02), floor)]
+        parts = [materials.plank_shape((2 * half, 2 * half, 0.02), floor)]
         for x, y in ((half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
-            part = looks.plank_shape((0.02 if x else 2 * half, 0.02 if y else 2 * half, height), wall)
+            part = materials.plank_shape((0.02 if x else 2 * half, 0.02 if y else 2 * half, height), wall)
             part.local_pose = self._sapien.Pose([x, y, height / 2])
             parts.append(part)
         self._add("room", parts, np.array([0.0, 0.0, _FLOOR - 0.01, 1, 0, 0, 0]))

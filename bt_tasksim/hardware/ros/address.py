@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.engines.remote.address import PREFIX as REMOTE
 from bt_tasksim.engines.remote.address import Address, parse_remote
-from bt_tasksim.errors import InputError
 
 PREFIX = "ros:"
 DEFAULT_PORT = 9090
-
-
-def is_ros(name: str) -> bool:
-    """An engine's name says that it is a robot."""
-    return name.startswith(PREFIX)
 
 
 def parse_ros(name: str) -> Address:

@@ -6,12 +6,12 @@ import math
 import time
 from typing import Any
 
-from bt_tasksim.engines.ros import messages
-from bt_tasksim.engines.ros.link import LOG
-from bt_tasksim.safety.engine import EmergencyStop
+from bt_tasksim.hardware.ros import messages
+from bt_tasksim.hardware.ros.link import LOG
+from bt_tasksim.hardware.safety.engine import EmergencyStop
 
 
-class Button:
+class EmergencyStopTopic:
     """Feeds an emergency stop from a topic.
 
     Attributes:
@@ -35,7 +35,7 @@ class Button:
         """Take a std_msgs/Bool.
 
         Raises:
-            RefusedError: It is none.
+            UnusableMessageError: It is none.
         """
         pressed = messages.flag(message)
         before, self.pressed, self._heard = self.pressed, pressed, arrived

@@ -6,19 +6,18 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
-from bt_tasksim.engines.pipeline import CameraModel, Image
-from bt_tasksim.engines.ros import messages
-from bt_tasksim.engines.ros.link import PATIENCE, Link
-from bt_tasksim.engines.ros.messages import Calibration, RefusedError
-from bt_tasksim.engines.ros.setting import CameraTopics
-from bt_tasksim.errors import InputError, MachineError, nearest
-from bt_tasksim.world import WorldState
-
-if TYPE_CHECKING:
-    from bt_tasksim.engines.ros.engine import RosRobot
-    from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.core.errors import InputError, MachineError, nearest
+from bt_tasksim.core.world import WorldState
+from bt_tasksim.engines.base import RenderingEngine
+from bt_tasksim.engines.images import CameraModel, Image
+from bt_tasksim.hardware.ros import messages
+from bt_tasksim.hardware.ros.joints import JointFeed
+from bt_tasksim.hardware.ros.link import PATIENCE, Link
+from bt_tasksim.hardware.ros.messages import Calibration, UnusableMessageError
+from bt_tasksim.hardware.ros.setting import CameraTopics, RosSetting
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 STALE = 1.0
 """Seconds after which a picture shows what was, not what is."""
@@ -58,14 +57,30 @@ class Pictures:
                     yield colour, metres
 
 
-class RosCameras:
+class ConnectedRobot(Protocol):
+    """What the cameras need of the robot's engine: its connection and its clock.
+
+    Attributes:
+        setting: Topics and names.
+        link: The connection, where there is one.
+        joints: Converts stamps of the robot's clock.
+        began: When the run began, seconds of `time.monotonic`.
+    """
+
+    setting: RosSetting
+    link: Link | None
+    joints: JointFeed
+    began: float
+
+
+class RosCameras(RenderingEngine):
     """A rendering engine that draws nothing: it hands on the newest pictures.
 
     Args:
         robot: The robot's engine, whose connection it uses.
     """
 
-    def __init__(self, robot: RosRobot) -> None:
+    def __init__(self, robot: ConnectedRobot) -> None:
         if not robot.setting.cameras:
             raise InputError(f"'{robot.setting.source}' names no cameras; perception 'camera' needs some")
         self._robot = robot
@@ -149,6 +164,6 @@ class RosCameras:
                 image = Image(model, pixels, far, min(taken, other) - self._robot.began)
                 pictures.unpacked = (which, image)
                 return image
-            except RefusedError as error:
+            except UnusableMessageError as error:
                 why = str(error)
         raise MachineError(f"camera '{camera}': {why}")

@@ -2,7 +2,7 @@
 
 Every command is a trajectory that ends at rest, so that it expires by itself in any controller that carries
 trajectories out. Nothing here waits but `reset`, and nothing judges: the guard does
-(`bt_tasksim.safety.guarded_robot`).
+(`bt_tasksim.hardware.safety.guarded_robot`).
 """
 
 from __future__ import annotations
@@ -12,29 +12,31 @@ import time
 import uuid
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import ClassVar, Self
 
 import numpy as np
 
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.world import JointTarget, WorldState
+from bt_tasksim.engines.base import EngineSetup
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.remote.address import Address
-from bt_tasksim.engines.ros import messages
-from bt_tasksim.engines.ros.button import Button
-from bt_tasksim.engines.ros.joints import JointFeed
-from bt_tasksim.engines.ros.link import PATIENCE, Link
-from bt_tasksim.engines.ros.messages import Point
-from bt_tasksim.engines.ros.sensors import Sensors
-from bt_tasksim.engines.ros.setting import RosSetting
-from bt_tasksim.engines.ros.start import WayToStart
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.safety import checks
-from bt_tasksim.safety.engine import ChannelSpec, EmergencyStop, JointReading
-from bt_tasksim.world import JointTarget, WorldState
-
-if TYPE_CHECKING:
-    from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-    from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.hardware.ros import messages
+from bt_tasksim.hardware.ros.address import parse_ros
+from bt_tasksim.hardware.ros.button import EmergencyStopTopic
+from bt_tasksim.hardware.ros.cameras import RosCameras
+from bt_tasksim.hardware.ros.joints import JointFeed
+from bt_tasksim.hardware.ros.link import PATIENCE, Link
+from bt_tasksim.hardware.ros.messages import Point
+from bt_tasksim.hardware.ros.sensors import Sensors
+from bt_tasksim.hardware.ros.setting import RosSetting, load_setting
+from bt_tasksim.hardware.ros.start import WayToStart
+from bt_tasksim.hardware.safety import checks
+from bt_tasksim.hardware.safety.engine import ChannelSpec, EmergencyStop, JointReading, RealEngine
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 MATCH = 0.3
 """Seconds after which whoever listens to a topic has found whoever publishes there."""
@@ -43,7 +45,8 @@ ANNOUNCED = 2.0
 TRAJECTORY, TEXT = "trajectory_msgs/JointTrajectory", "std_msgs/String"
 
 
-class RosRobot:
+@register("engine/physics", "ros")
+class RosRobot(RealEngine):
     """A `RealEngine` through rosbridge.
 
     Attributes:
@@ -58,6 +61,8 @@ class RosRobot:
         kinematics: For the poses of tool and fingertips.
         tracked: Objects' poses come from a tracking system; else perception has images.
     """
+
+    takes_address: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -80,7 +85,7 @@ class RosRobot:
         self.tracked = tracked
         self.limits = robot.safety
         self.emergency = EmergencyStop()
-        self.button = Button(setting.emergency_stop, setting.emergency_every, self.emergency)
+        self.button = EmergencyStopTopic(setting.emergency_stop, setting.emergency_every, self.emergency)
         self.emergency.held_down = lambda: self.button.pressed
         self.link: Link | None = None
         self._lock = threading.RLock()
@@ -90,6 +95,29 @@ class RosRobot:
         self.sensors = Sensors(robot, setting, self.joints.convert)
         self._forget()
 
+    @classmethod
+    def create(cls, robot: RobotDescription, setup: EngineSetup) -> Self:
+        """See `Engine.create`; objects are tracked where perception does not work on images.
+
+        Raises:
+            InputError: The robot's files are no good, or name nothing that tracks objects.
+        """
+        setting = load_setting(robot, setup.ros)
+        return cls(robot, setting, parse_ros(setup.name), PinocchioKinematics(robot), not setup.images)
+
+    @classmethod
+    def check_name(cls, name: str) -> None:
+        """See `Engine.check_name`."""
+        parse_ros(name)
+
+    def rendering(self) -> RosCameras:
+        """See `RealEngine.rendering`.
+
+        Raises:
+            InputError: The robot's files name no cameras.
+        """
+        return RosCameras(self)
+
     def _forget(self) -> None:
         """Only what arrives from now on counts."""
         self.joints.forget()
@@ -98,7 +126,7 @@ class RosRobot:
 
     # ---- a run begins -----------------------------------------------------------------------------------
 
-    def reset(self, configuration: ActorConfiguration, beat: Callable[[], None]) -> None:
+    def reset(self, configuration: ActorConfiguration, heartbeat: Callable[[], None]) -> None:
         """See `RealEngine.reset`: connect where need be, end a hold, bring the arm to its start.
 
         Raises:
@@ -120,7 +148,7 @@ class RosRobot:
         goal = np.array(
             configuration.joint_position or np.concatenate([self.robot.rest, self.robot.hand_open])
         )
-        self._way().go(goal, beat)
+        self._way().go(goal, heartbeat)
         self.began = time.monotonic()
 
     def _way(self) -> WayToStart:
@@ -266,7 +294,7 @@ class RosRobot:
         """See `RealEngine.hold_channel`: a connection of its own to the same bridge."""
         setting, limits = self.setting, self.limits
         return ChannelSpec(
-            "bt_tasksim.engines.ros.hold:RosHold",
+            "bt_tasksim.hardware.ros.hold:RosHold",
             {
                 "host": self.address.host,
                 "port": self.address.port,

@@ -9,7 +9,7 @@ import threading
 import time
 from typing import Any, NamedTuple
 
-from bt_tasksim.engines.ros.websocket import WebSocket
+from bt_tasksim.hardware.ros.websocket import WebSocket
 
 FRESH = 0.1
 """Seconds for which a position counts as the robot's present one."""
@@ -19,9 +19,11 @@ AGAIN = 0.5
 """Seconds between two attempts to connect again."""
 EVERY = 20
 """Milliseconds between two joint states that are looked at."""
+UNUSABLE = (ValueError, TypeError, KeyError, OverflowError, RecursionError)
+"""What a message leads to that is none: no JSON, none of these fields, deep, or numbers of 400 digits."""
 
 
-class Motion(NamedTuple):
+class JointSample(NamedTuple):
     """Joints at a time, seconds of `time.monotonic`: position in rad, velocity in rad/s."""
 
     time: float
@@ -63,7 +65,7 @@ class RosHold:
         self._states, self._command, self._joints, self._word = states, command, joints, word
         self._lock = threading.Lock()
         self._socket: WebSocket | None = None
-        self._known: Motion | None = None
+        self._known: JointSample | None = None
 
     def open(self) -> None:
         """See `HoldChannel.open`."""
@@ -120,18 +122,24 @@ class RosHold:
             except OSError:
                 self._connect_again(socket)
                 return
-            self._known = _motion(text, self._joints, time.monotonic(), self._known) or self._known
+            try:
+                found = _motion(text, self._joints, time.monotonic(), self._known)
+            except Exception:  # whatever it was: who listens here outlives every message
+                continue
+            self._known = found or self._known
 
     def _connect_again(self, lost: WebSocket) -> None:
         """A bridge that was started anew is connected to, so that a hold need not wait for that."""
         while self._socket is lost:
             time.sleep(AGAIN)
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(Exception):  # the next attempt may do better
                 if self._socket is lost:
                     self.open()
 
 
-def _motion(text: str | None, joints: list[str], now: float, before: Motion | None) -> Motion | None:
+def _motion(
+    text: str | None, joints: list[str], now: float, before: JointSample | None
+) -> JointSample | None:
     """Joints as a message of rosbridge says them; None where it does not.
 
     Where it says no speeds they follow from the way since the last message.
@@ -145,21 +153,27 @@ def _motion(text: str | None, joints: list[str], now: float, before: Motion | No
     try:
         message = json.loads(text or "")["msg"]
         found = dict(zip(message["name"], message["position"], strict=True))
-        position = [float(found[name]) for name in joints]
-    except (ValueError, TypeError, KeyError):
+        position = [_number(found[name]) for name in joints]
+    except UNUSABLE:
         return None
     try:
         found = dict(zip(message["name"], message["velocity"], strict=True))
-        velocity = [float(found[name]) for name in joints]
-    except (ValueError, TypeError, KeyError):
+        velocity = [_number(found[name]) for name in joints]
+    except UNUSABLE:
         velocity = [0.0] * len(joints)
         if before is not None and EVERY / 2000 < now - before.time < FRESH:
             way = zip(position, before.position, strict=True)
             velocity = [(a - b) / (now - before.time) for a, b in way]
-    return Motion(now, position, velocity) if all(map(math.isfinite, position + velocity)) else None
+    return JointSample(now, position, velocity) if all(map(math.isfinite, position + velocity)) else None
 
 
-def _standing(motion: Motion, limits: list[tuple[float, float, float, float]]) -> dict[str, Any]:
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError
+    return float(value)
+
+
+def _standing(motion: JointSample, limits: list[tuple[float, float, float, float]]) -> dict[str, Any]:
     """The point of a trajectory where joints that brake evenly come to stand; see `messages.standing`.
 
     Args:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.engines.ros import messages
-from bt_tasksim.engines.ros.messages import RefusedError
-from bt_tasksim.engines.ros.setting import RosSetting
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.safety.engine import JointReading, RobotClock
+from bt_tasksim.hardware.ros import messages
+from bt_tasksim.hardware.ros.messages import UnusableMessageError
+from bt_tasksim.hardware.ros.setting import RosSetting
+from bt_tasksim.hardware.safety.engine import JointReading, RobotClock
+from bt_tasksim.robot.description import RobotDescription
 
 
 class JointFeed:
@@ -63,12 +63,14 @@ class JointFeed:
             arrived: Seconds of `time.monotonic`.
 
         Raises:
-            RefusedError: They are none, or not newer than the last ones.
+            UnusableMessageError: They are none, or not newer than the last ones.
         """
         came, setting = messages.joint_states(message), self._setting
         if came.stamp <= self._stamp:
             behind = 1000.0 * (self._stamp - came.stamp)
-            raise RefusedError(f"joint states: stamped {behind:.0f} ms before the last ones, not after them")
+            raise UnusableMessageError(
+                f"joint states: stamped {behind:.0f} ms before the last ones, not after them"
+            )
         stamp = self._clock.convert(came.stamp, arrived)
         self._stamp, self.offset, self.heard = came.stamp, stamp - came.stamp, came.names
         if came.names == setting.wire:

@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from bt_tasksim.core.errors import MachineError
 from bt_tasksim.engines.remote.address import Address
-from bt_tasksim.engines.ros.messages import RefusedError
-from bt_tasksim.errors import MachineError
+from bt_tasksim.hardware.ros.messages import UnusableMessageError
 
 LOG = logging.getLogger("bt_tasksim.ros")
 PATIENCE = 5.0
@@ -93,14 +93,14 @@ class Link:
         Args:
             topic: Its name.
             kind: Its type, such as ``sensor_msgs/JointState``.
-            handle: Takes the message; raises `RefusedError` where it is not one.
+            handle: Takes the message; raises `UnusableMessageError` where it is not one.
             throttle: Least milliseconds between two messages; the newest one counts.
         """
 
         def arrived(message: Any) -> None:
             try:
                 handle(message, time.monotonic())
-            except RefusedError as error:
+            except UnusableMessageError as error:
                 self._complaints.about(topic, str(error))
             except Exception as error:  # a message must never end the connection's thread
                 self._complaints.about(topic, f"{type(error).__name__}: {error}")

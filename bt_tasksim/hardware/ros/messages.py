@@ -1,8 +1,8 @@
 """ROS messages as rosbridge writes them in JSON: from plain data to checked arrays, and back.
 
 Every function takes whatever has arrived. What is not a message of its type, of the expected frame and of a
-sane size is `RefusedError` with one sentence. JSON has no NaN: rosbridge writes null, which joint states keep
-as NaN, since the guard says what that means for a robot; elsewhere it is refused.
+sane size is an `UnusableMessageError` with one sentence. JSON has no NaN: rosbridge writes null, which joint
+states keep as NaN, since the guard says what that means for a robot; elsewhere it is refused.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.poses import Array
-from bt_tasksim.safety.motion import Motion, resting
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.hardware.safety.motion import JointMotion, resting
 
 MOST_JOINTS = 256
 MOST_BYTES = 8_000_000
@@ -32,7 +32,7 @@ SHORTEST = 0.1
 _LARGEST = 1e9
 
 
-class RefusedError(ValueError):
+class UnusableMessageError(ValueError):
     """A message that is not used, and why."""
 
 
@@ -52,12 +52,12 @@ def joint_states(message: Any) -> JointStates:
     data = _mapping(message, "joint states")
     raw = _get(data, "name", "joint states")
     if not isinstance(raw, list) or not raw or not all(isinstance(n, str) for n in raw):
-        raise RefusedError(f"joint states: 'name' should be a list of names, found {_shown(raw)}")
+        raise UnusableMessageError(f"joint states: 'name' should be a list of names, found {_shown(raw)}")
     if len(raw) > MOST_JOINTS:
-        raise RefusedError(f"joint states: {len(raw)} joints, more than {MOST_JOINTS}")
+        raise UnusableMessageError(f"joint states: {len(raw)} joints, more than {MOST_JOINTS}")
     names = tuple(raw)
     if len(set(names)) < len(names):
-        raise RefusedError("joint states: a joint is named twice")
+        raise UnusableMessageError("joint states: a joint is named twice")
     n = len(names)
 
     def optional(key: str) -> Array:
@@ -87,7 +87,7 @@ def pose(message: Any, frame: str) -> tuple[Array, float]:
     q = np.array([_number(_get(turn, k, "pose"), f"pose: orientation {k}") for k in ("w", "x", "y", "z")])
     length = float(np.linalg.norm(q))
     if abs(length - 1.0) > 0.01:
-        raise RefusedError(f"pose: the quaternion has length {length:.3g} instead of 1")
+        raise UnusableMessageError(f"pose: the quaternion has length {length:.3g} instead of 1")
     return np.concatenate([place, q / length]), stamp(data, "pose")
 
 
@@ -95,7 +95,7 @@ def flag(message: Any) -> bool:
     """A std_msgs/Bool."""
     value = _get(_mapping(message, "flag"), "data", "flag")
     if not isinstance(value, bool):
-        raise RefusedError(f"flag: 'data' should be true or false, found {_shown(value)}")
+        raise UnusableMessageError(f"flag: 'data' should be true or false, found {_shown(value)}")
     return value
 
 
@@ -103,7 +103,7 @@ def text(message: Any, longest: int = 500) -> str:
     """A std_msgs/String of a sane length."""
     value = _get(_mapping(message, "text"), "data", "text")
     if not isinstance(value, str) or len(value) > longest:
-        raise RefusedError(f"text: 'data' should be a text of at most {longest} characters")
+        raise UnusableMessageError(f"text: 'data' should be a text of at most {longest} characters")
     return value
 
 
@@ -122,13 +122,13 @@ def camera_info(message: Any) -> Calibration:
     size = [_get(data, key, "camera info") for key in ("width", "height")]
     for value in size:
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_PIXELS:
-            raise RefusedError(f"camera info: a size of {_shown(value)} pixels")
+            raise UnusableMessageError(f"camera info: a size of {_shown(value)} pixels")
     matrix = _finite(_get(data, "k", "camera info"), 9, "camera info: 'k'").reshape(3, 3)
     if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0 or matrix[2].tolist() != [0.0, 0.0, 1.0]:
-        raise RefusedError("camera info: 'k' is no intrinsic matrix")
+        raise UnusableMessageError("camera info: 'k' is no intrinsic matrix")
     distortion = data.get("d") or []
     if not isinstance(distortion, list) or any(v not in (0, 0.0) for v in distortion):
-        raise RefusedError("camera info: the images are distorted ('d'); publish rectified ones")
+        raise UnusableMessageError("camera info: the images are distorted ('d'); publish rectified ones")
     return Calibration(size[0], size[1], matrix)
 
 
@@ -152,24 +152,24 @@ def image_content(
     data = _mapping(message, what)
     kind = data.get("format", "")
     if not isinstance(kind, str):
-        raise RefusedError(f"{what}: 'format' should be a text, found {_shown(kind)}")
+        raise UnusableMessageError(f"{what}: 'format' should be a text, found {_shown(kind)}")
     encoding, separator, _ = kind.partition(";")
     if encodings and separator and encoding.strip() not in encodings:
-        raise RefusedError(f"{what}: in format {_shown(kind)}; publish {encodings[0]}")
+        raise UnusableMessageError(f"{what}: in format {_shown(kind)}; publish {encodings[0]}")
     raw = _get(data, "data", what)
     if not isinstance(raw, str) or len(raw) > MOST_BYTES * 4 // 3 + 4:
-        raise RefusedError(f"{what}: 'data' holds no bytes, or too many")
+        raise UnusableMessageError(f"{what}: 'data' holds no bytes, or too many")
     try:
         content = base64.b64decode(raw, validate=True)
     except (binascii.Error, ValueError):
-        raise RefusedError(f"{what}: 'data' is not base64") from None
+        raise UnusableMessageError(f"{what}: 'data' is not base64") from None
     if content[12:20] == _PNG and not content.startswith(_PNG):
         content = content[12:]
     found = _size(content)
     if found is None:
-        raise RefusedError(f"{what}: neither PNG nor JPEG")
+        raise UnusableMessageError(f"{what}: neither PNG nor JPEG")
     if found != size:
-        raise RefusedError(
+        raise UnusableMessageError(
             f"{what}: {found[0]} x {found[1]} pixels, and the camera has {size[0]} x {size[1]}"
         )
     return content, stamp(data, what)
@@ -181,7 +181,7 @@ def colours(content: bytes) -> Array:
 
     pixels = _unpacked(content, cv2.IMREAD_COLOR, "colour image")
     if pixels.ndim != 3 or pixels.dtype != np.uint8:
-        raise RefusedError("colour image: no colours of 8 bits")
+        raise UnusableMessageError("colour image: no colours of 8 bits")
     return np.ascontiguousarray(pixels[:, :, ::-1])
 
 
@@ -191,7 +191,7 @@ def metres(content: bytes) -> Array:
 
     pixels = _unpacked(content, cv2.IMREAD_UNCHANGED, "depth image")
     if pixels.ndim != 2 or pixels.dtype != np.uint16:
-        raise RefusedError(f"depth image: should be one channel of 16 bits, found {pixels.dtype}")
+        raise UnusableMessageError(f"depth image: should be one channel of 16 bits, found {pixels.dtype}")
     return pixels.astype(np.float32) / np.float32(1000.0)
 
 
@@ -201,9 +201,9 @@ def _unpacked(content: bytes, how: int, what: str) -> Array:
     try:
         pixels = cv2.imdecode(np.frombuffer(content, np.uint8), how)
     except cv2.error as error:
-        raise RefusedError(f"{what}: cannot be read ({error.err})") from None
+        raise UnusableMessageError(f"{what}: cannot be read ({error.err})") from None
     if pixels is None or pixels.shape[1::-1] != _size(content):
-        raise RefusedError(f"{what}: cannot be read")
+        raise UnusableMessageError(f"{what}: cannot be read")
     return np.asarray(pixels)
 
 
@@ -284,7 +284,7 @@ def ending_at_rest(
     still = np.zeros_like(position)
     if not np.any(np.abs(velocity) > 1e-9):
         return (Point(position, still, period),)
-    rest, braking = resting(Motion(position, velocity), acceleration, max(validity - period, 0.01))
+    rest, braking = resting(JointMotion(position, velocity), acceleration, max(validity - period, 0.01))
     rest = np.minimum(np.maximum(rest, np.minimum(lower, position)), np.maximum(upper, position))
     return Point(position, velocity, period), Point(rest, still, period + braking)
 
@@ -299,7 +299,7 @@ def standing(position: Array, velocity: Array, acceleration: Array, lower: Array
         lower: Position limits ``(n,)``.
         upper: Position limits ``(n,)``.
     """
-    rest, braking = resting(Motion(position, velocity), acceleration, SHORTEST)
+    rest, braking = resting(JointMotion(position, velocity), acceleration, SHORTEST)
     rest = np.minimum(np.maximum(rest, np.minimum(lower, position)), np.maximum(upper, position))
     return Point(rest, np.zeros_like(rest), braking)
 
@@ -314,25 +314,25 @@ def stamp(data: Mapping[str, Any], what: str) -> float:
     sec, nanosec = _get(time, "sec", what), _get(time, "nanosec", what)
     for value in (sec, nanosec):
         if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**40:
-            raise RefusedError(f"{what}: a stamp of {_shown(sec)} s and {_shown(nanosec)} ns")
+            raise UnusableMessageError(f"{what}: a stamp of {_shown(sec)} s and {_shown(nanosec)} ns")
     return float(sec) + 1e-9 * float(nanosec)
 
 
 def _check_frame(data: Mapping[str, Any], frame: str, what: str) -> None:
     header = _mapping(_get(data, "header", what), f"{what}: 'header'")
     if header.get("frame_id") != frame:
-        raise RefusedError(f"{what}: in frame {_shown(header.get('frame_id'))}, expected '{frame}'")
+        raise UnusableMessageError(f"{what}: in frame {_shown(header.get('frame_id'))}, expected '{frame}'")
 
 
 def _mapping(value: Any, what: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        raise RefusedError(f"{what}: no message, but {_shown(value)}")
+        raise UnusableMessageError(f"{what}: no message, but {_shown(value)}")
     return value
 
 
 def _get(data: Mapping[str, Any], key: str, what: str) -> Any:
     if key not in data:
-        raise RefusedError(f"{what}: '{key}' is missing")
+        raise UnusableMessageError(f"{what}: '{key}' is missing")
     return data[key]
 
 
@@ -343,7 +343,7 @@ def _xyz(data: Mapping[str, Any], key: str, what: str) -> Array:
 
 def _number(value: Any, what: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < _LARGEST:
-        raise RefusedError(f"{what} should be a number, found {_shown(value)}")
+        raise UnusableMessageError(f"{what} should be a number, found {_shown(value)}")
     return float(value)
 
 
@@ -351,7 +351,7 @@ def _numbers(values: Any, n: int, what: str) -> Array:
     """``(n,)``, NaN for null."""
     if not isinstance(values, list) or len(values) != n:
         found = f"{len(values)}" if isinstance(values, list) else _shown(values)
-        raise RefusedError(f"{what} should be {n} numbers, found {found}")
+        raise UnusableMessageError(f"{what} should be {n} numbers, found {found}")
     out = np.empty(n)
     for i, value in enumerate(values):
         if value is None or (isinstance(value, float) and math.isnan(value)):
@@ -364,7 +364,7 @@ def _numbers(values: Any, n: int, what: str) -> Array:
 def _finite(values: Any, n: int, what: str) -> Array:
     array = _numbers(values, n, what)
     if not np.all(np.isfinite(array)):
-        raise RefusedError(f"{what} is not finite")
+        raise UnusableMessageError(f"{what} is not finite")
     return array
 
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.engines.ros import messages
-from bt_tasksim.engines.ros.link import Link
-from bt_tasksim.engines.ros.setting import RosSetting
-from bt_tasksim.errors import MachineError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.hardware.ros import messages
+from bt_tasksim.hardware.ros.link import Link
+from bt_tasksim.hardware.ros.setting import RosSetting
+from bt_tasksim.robot.description import RobotDescription
 
 STALE = 0.3
 """Seconds after which forces are too old to act on; joint states and the wrench have a limit of their own."""

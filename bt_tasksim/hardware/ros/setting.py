@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 
-from bt_tasksim.data_file import check_keys, names, positive, vector
-from bt_tasksim.errors import InputError, nearest
-from bt_tasksim.poses import Array
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import RobotDescription
-
-_TOPIC = re.compile(r"/[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
-_NAME = "{name}"
+from bt_tasksim.core import poses
+from bt_tasksim.core.document import located
+from bt_tasksim.core.errors import FieldError, InputError, nearest
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.resources import asset
+from bt_tasksim.core.typed_file import load_typed
+from bt_tasksim.hardware.ros.schema import (
+    NAME,
+    TOPIC,
+    CameraEntry,
+    CellFile,
+    GroupEntry,
+    TipEffort,
+    TipTopics,
+)
+from bt_tasksim.robot.description import RobotDescription
 
 
 @dataclass(frozen=True)
@@ -126,7 +131,13 @@ class RosSetting:
             raise InputError(
                 f"'{self.source}' names no topic for the poses of objects: use --perception camera"
             )
-        return _topic(self.objects.topic.replace(_NAME, name), f"the topic of object '{name}'")
+        topic = self.objects.topic.replace(NAME, name)
+        if not TOPIC.fullmatch(topic):
+            raise InputError(
+                f"the topic of object '{name}' should be one such as '/arm/state' (letters, digits, _), "
+                f"found {topic!r}"
+            )
+        return topic
 
 
 def load_setting(robot: RobotDescription, file: str = "") -> RosSetting:
@@ -148,149 +159,86 @@ def load_setting(robot: RobotDescription, file: str = "") -> RosSetting:
             f"no file says how '{robot.name}' speaks ROS{nearest(robot.name, known)}; write one as "
             f"docs/connect_a_robot.md shows, and name it with --ros FILE"
         )
-    try:
-        data = yaml.safe_load(path.read_text())
-        check_keys(data, "", _KEYS, _OPTIONAL)
-        return _setting(data, robot, path)
-    except yaml.YAMLError as error:
-        raise InputError(f"ROS file '{path}' is not YAML: {' '.join(str(error).split())}") from error
-    except (InputError, TypeError, ValueError, AttributeError, OSError) as error:
-        raise InputError(f"ROS file '{path}': {error}") from error
+    content, document = load_typed(CellFile, path, "ROS file")
+    with located(document):
+        return _setting(content, robot, path)
 
 
-_KEYS: Mapping[str, Any] = {
-    "robot": None,
-    "joint_states": {"topic": None, "joints": None},
-    "arm": {"command": None, "joints": None},
-    "hand": {"command": None, "joints": None},
-    "wrench": {"topic": None, "frame": None},
-    "tips": None,
-    "emergency_stop": None,
-}
-_OPTIONAL: Mapping[str, Any] = {
-    **dict.fromkeys(("objects", "begin", "hold", "approach", "cameras")),
-    "wrench": {"pose": None},
-}
-
-
-def _setting(data: Mapping[str, Any], robot: RobotDescription, path: Path) -> RosSetting:
-    if data["robot"] != robot.name:
-        raise InputError(f"it is for robot '{data['robot']}', and the robot is '{robot.name}'")
-    wire = names(data["joint_states"]["joints"], "joint_states.joints")
+def _setting(data: CellFile, robot: RobotDescription, path: Path) -> RosSetting:
+    if data.robot != robot.name:
+        raise FieldError(f"it is for robot '{data.robot}', and the robot is '{robot.name}'", "robot")
+    wire = data.joint_states.joints
     if len(set(wire)) < len(wire):
-        raise InputError("joint_states.joints names a joint twice")
-    arm = _group(data["arm"], "arm", robot.arm_joints, wire)
-    hand = _group(data["hand"], "hand", robot.hand_joints, wire)
+        raise FieldError("'joint_states.joints' names a joint twice", "joint_states", "joints")
+    arm = _group(data.arm, "arm", robot.arm_joints, wire)
+    hand = _group(data.hand, "hand", robot.hand_joints, wire)
     if both := set(arm.joints) & set(hand.joints):
-        raise InputError(f"'{sorted(both)[0]}' is in arm.joints and in hand.joints")
-    approach = positive(data.get("approach", 0.3), "approach")
-    if approach > 1.0:
-        raise InputError(f"approach should be a share of at most 1, found {approach:g}")
-    objects = data.get("objects")
-    stop, every = _emergency_stop(data["emergency_stop"])
+        raise FieldError(f"'{sorted(both)[0]}' is in 'arm.joints' and in 'hand.joints'", "hand", "joints")
+    if data.hold and not data.begin:
+        raise FieldError("'hold' needs 'begin' beside it: without a new run nothing would end a hold", "hold")
+    stop = data.emergency_stop
     setting = RosSetting(
         robot=robot.name,
-        joint_states=_topic(data["joint_states"]["topic"], "joint_states.topic"),
+        joint_states=data.joint_states.topic,
         wire=wire,
         order=np.array([wire.index(name) for name in arm.joints + hand.joints]),
         arm=arm,
         hand=hand,
-        wrench=_sensor(data["wrench"], "wrench"),
-        tips=_tips(data["tips"], robot),
-        objects=None if objects is None else _objects(objects),
-        emergency_stop=stop,
-        emergency_every=every,
-        begin=_topic(data["begin"], "begin") if data.get("begin") else "",
-        hold=_topic(data["hold"], "hold") if data.get("hold") else "",
-        approach=approach,
-        cameras={str(k): _camera(v, f"cameras.{k}") for k, v in (data.get("cameras") or {}).items()},
+        wrench=Sensor(data.wrench.topic, data.wrench.frame, poses.unit_pose(data.wrench.pose)),
+        tips=_tips(data.tips, robot),
+        objects=None if data.objects is None else Stamped(data.objects.topic, data.objects.frame),
+        emergency_stop=stop if isinstance(stop, str) else stop.topic,
+        emergency_every=math.inf if isinstance(stop, str) else stop.every,
+        begin=data.begin or "",
+        hold=data.hold or "",
+        approach=data.approach,
+        cameras={name: _camera(camera) for name, camera in (data.cameras or {}).items()},
         source=path,
     )
-    if setting.hold and not setting.begin:
-        raise InputError("'hold' needs 'begin' beside it: without a new run nothing would end a hold")
     _no_topic_twice(setting)
     return setting
 
 
-def _group(data: Mapping[str, Any], what: str, own: tuple[str, ...], wire: tuple[str, ...]) -> Group:
-    joints, n = names(data["joints"], f"{what}.joints"), len(own)
+def _group(data: GroupEntry, what: str, own: tuple[str, ...], wire: tuple[str, ...]) -> Group:
+    joints, n = data.joints, len(own)
     if len(joints) != n or len(set(joints)) != n:
-        raise InputError(
-            f"{what}.joints should name the {n} joints of the robot's {what}, found {list(joints)}"
+        raise FieldError(
+            f"'{what}.joints' should name the {n} joints of the robot's {what}, found {list(joints)}",
+            what,
+            "joints",
         )
-    for name in joints:
+    for i, name in enumerate(joints):
         if name not in wire:
-            raise InputError(
-                f"{what}.joints names '{name}', which joint_states.joints lacks{nearest(name, wire)}"
+            raise FieldError(
+                f"'{what}.joints' names '{name}', which 'joint_states.joints' lacks{nearest(name, wire)}",
+                *(what, "joints", i),
             )
-    for name, here in zip(joints, own, strict=True):
+    for i, (name, here) in enumerate(zip(joints, own, strict=True)):
         if name != here and name in own:
-            raise InputError(
-                f"{what}.joints has the robot's joints in another order, '{name}' where '{here}' should be: "
-                "the n-th name here is the n-th joint of the robot's file"
+            raise FieldError(
+                f"'{what}.joints' has the robot's joints in another order, '{name}' where '{here}' should "
+                "be: the n-th name here is the n-th joint of the robot's file",
+                *(what, "joints", i),
             )
-    return Group(_topic(data["command"], f"{what}.command"), joints)
+    return Group(data.command, joints)
 
 
-def _tips(data: Any, robot: RobotDescription) -> Tips:
-    if isinstance(data, dict) and "effort" in data:
-        check_keys(data, "tips.", {"effort": None})
-        return Tips((), "", positive(data["effort"], "tips.effort"))
-    check_keys(data, "tips.", {"frame": None, "topics": dict.fromkeys(tip.name for tip in robot.tips)})
-    topics = tuple(_topic(data["topics"][tip.name], f"tips.topics.{tip.name}") for tip in robot.tips)
-    return Tips(topics, _frame(data["frame"], "tips.frame"), 0.0)
+def _tips(data: TipTopics | TipEffort, robot: RobotDescription) -> Tips:
+    if isinstance(data, TipEffort):
+        return Tips((), "", data.effort)
+    known = [tip.name for tip in robot.tips]
+    for name in data.topics:
+        if name not in known:
+            said = f"unknown field 'tips.topics.{name}'{nearest(name, known)}"
+            raise FieldError(said, "tips", "topics", name)
+    for name in known:
+        if name not in data.topics:
+            raise FieldError(f"'tips.topics.{name}' is missing", "tips", "topics")
+    return Tips(tuple(data.topics[name] for name in known), data.frame, 0.0)
 
 
-def _emergency_stop(data: Any) -> tuple[str, float]:
-    """Its topic, and how often it speaks (`RosSetting.emergency_every`)."""
-    if not isinstance(data, dict):
-        return _topic(data, "emergency_stop"), math.inf
-    check_keys(data, "emergency_stop.", {"topic": None, "every": None})
-    every = positive(data["every"], "emergency_stop.every")
-    return _topic(data["topic"], "emergency_stop.topic"), every
-
-
-def _objects(data: Any) -> Stamped:
-    check_keys(data, "objects.", {"topic": None, "frame": None})
-    topic = data["topic"]
-    if not isinstance(topic, str) or topic.count(_NAME) != 1:
-        raise InputError(f"objects.topic should hold '{_NAME}' once, found {topic!r}")
-    _topic(topic.replace(_NAME, "x"), "objects.topic")
-    return Stamped(topic, _frame(data["frame"], "objects.frame"))
-
-
-def _sensor(data: Mapping[str, Any], what: str) -> Sensor:
-    pose = _pose(data.get("pose", [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), f"{what}.pose")
-    return Sensor(_topic(data["topic"], f"{what}.topic"), _frame(data["frame"], f"{what}.frame"), pose)
-
-
-def _camera(data: Any, what: str) -> CameraTopics:
-    check_keys(data, f"{what}.", dict.fromkeys(("colour", "depth", "info", "pose")))
-    colour, depth, info = (_topic(data[key], f"{what}.{key}") for key in ("colour", "depth", "info"))
-    return CameraTopics(colour, depth, info, _pose(data["pose"], f"{what}.pose"))
-
-
-def _pose(values: Any, what: str) -> Array:
-    pose = np.array(vector(values, 7, what))
-    length = float(np.linalg.norm(pose[3:]))
-    if abs(length - 1.0) > 1e-3:
-        raise InputError(f"{what} should end with a unit quaternion (w x y z), found {values!r}")
-    pose[3:] /= length
-    return pose
-
-
-def _topic(value: Any, what: str) -> str:
-    if not isinstance(value, str) or not _TOPIC.fullmatch(value):
-        raise InputError(
-            f"{what} should be a topic such as '/arm/state' (letters, digits, _), found {value!r}"
-        )
-    return value
-
-
-def _frame(value: Any, what: str) -> str:
-    if not isinstance(value, str) or not value:
-        raise InputError(f"{what} should be the name of a frame, found {value!r}")
-    return value
+def _camera(data: CameraEntry) -> CameraTopics:
+    return CameraTopics(data.colour, data.depth, data.info, poses.unit_pose(data.pose))
 
 
 def _no_topic_twice(setting: RosSetting) -> None:

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bt_tasksim.engines.ros.setting import RosSetting
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.safety.engine import JointReading
-from bt_tasksim.safety.limits import SafetyLimits
-from bt_tasksim.safety.motion import approach
-from bt_tasksim.world import JointTarget
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import JointTarget
+from bt_tasksim.hardware.ros.setting import RosSetting
+from bt_tasksim.hardware.safety.engine import JointReading
+from bt_tasksim.hardware.safety.motion import approach
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.limits import SafetyLimits
 
 if TYPE_CHECKING:
-    from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+    from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 
 PERIOD = 0.05
 """Seconds between two commands."""
@@ -58,12 +58,12 @@ class WayToStart:
         self._robot, self._limits, self._setting, self._kinematics = robot, limits, setting, kinematics
         self._checked, self._send = checked, send
 
-    def go(self, goal: Array, beat: Callable[[], None]) -> None:
+    def go(self, goal: Array, heartbeat: Callable[[], None]) -> None:
         """Go there and wait until the arm stands.
 
         Args:
             goal: Where the joints are to be ``(n_joints,)``.
-            beat: Called before every command, for whoever watches.
+            heartbeat: Called before every command, for whoever watches.
 
         Raises:
             InputError: The tool may not be there.
@@ -71,7 +71,7 @@ class WayToStart:
         """
         n = len(self._robot.arm_joints)
         self._check_posture(goal)
-        start = self._begin_hand(beat)
+        start = self._begin_hand(heartbeat)
         speed, acceleration = self._gentle()
         motions = approach(start, goal, speed, acceleration, PERIOD)
         way = list(itertools.islice(motions, int(LONGEST / PERIOD)))
@@ -84,7 +84,7 @@ class WayToStart:
         following = time.monotonic()
         for motion in way:
             following = max(following, time.monotonic())  # what was late is not made up for
-            beat()
+            heartbeat()
             self._send(JointTarget(motion.position, motion.velocity, self._limits.validity), PERIOD, PERIOD)
             following += PERIOD
             time.sleep(max(following - time.monotonic(), 0.0))
@@ -95,7 +95,7 @@ class WayToStart:
                 )
         end = time.monotonic() + SETTLE
         while True:
-            beat()
+            heartbeat()
             reading = self._checked()
             off = np.abs(reading.position - goal)[:n]
             if np.all(off < STILL[1]) and np.all(np.abs(reading.velocity[:n]) < STILL[0]):
@@ -120,7 +120,7 @@ class WayToStart:
                 f"rest posture in '{self._robot.source}'"
             )
 
-    def _begin_hand(self, beat: Callable[[], None]) -> Array:
+    def _begin_hand(self, heartbeat: Callable[[], None]) -> Array:
         """Have the hand's controller follow from where the hand is, and say where everything is.
 
         It may have been told to close on something that is in the way, and what is commanded next must not be
@@ -131,7 +131,7 @@ class WayToStart:
         start[n:] = np.clip(start[n:], low, high)
         stand = JointTarget(start, np.zeros_like(start), self._limits.validity)
         for k in reversed(range(math.ceil(1.0 / (self._robot.hand_speed * PERIOD)))):
-            beat()
+            heartbeat()
             self._send(stand, PERIOD, (k + 1) * PERIOD)
             time.sleep(PERIOD)
             self._checked()

@@ -29,7 +29,7 @@ class WebSocket:
 
     def __init__(self, host: str, port: int, patience: float = 1.0) -> None:
         self._socket = socket.create_connection((host, port), patience)
-        self._data = b""
+        self._data = bytearray()
         try:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._shake_hands(host, port)
@@ -104,6 +104,8 @@ class WebSocket:
         while True:
             self._fill(need)
             head, length = self._data[0:2], self._data[1] & 0x7F
+            if head[0] & 0x70 or head[1] & 0x80:
+                raise OSError("the server sends frames that no server may send")
             at = 2
             if length == 126:
                 self._fill(4)
@@ -114,7 +116,8 @@ class WebSocket:
             if length > 1 << 26:
                 raise OSError(f"a frame of {length} bytes")
             self._fill(at + length)
-            content, self._data = self._data[at : at + length], self._data[at + length :]
+            content = bytes(self._data[at : at + length])
+            del self._data[: at + length]
             return bool(head[0] & 0x80), head[0] & 0x0F, content
 
     def _fill(self, n: int) -> None:

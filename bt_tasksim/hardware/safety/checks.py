@@ -1,104 +1,134 @@
 """Checks of what is sent to a robot and of what it reports: pure functions, one a limit.
 
-Each returns None where all is well, or a `Breach` that names the limit, the place and the numbers.
+Each returns None where all is well, or an outcome that says which limit is exceeded, where and by how much.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.poses import Array
-from bt_tasksim.safety.limits import SafetyLimits
-from bt_tasksim.safety.motion import Motion
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import Outcome, Reason, register_reason
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.units import METRES, MILLISECONDS, Unit
+from bt_tasksim.hardware.safety.motion import JointMotion
+from bt_tasksim.hardware.safety.stop import M_PER_S, M_PER_S2, NM, RAD, RAD_PER_S, RAD_PER_S2, M, N
+from bt_tasksim.robot.limits import SafetyLimits
 
 TOLERANCE = 1e-6
 """Share of a limit by which rounding may exceed it."""
 JUMP = 0.05
 """Metres or radians that a measured joint may be off by noise and by rounding, besides its motion."""
-IMPLAUSIBLE = 1.5
+FASTEST = 1.5
 """A measured joint does not move faster than so many times its limit."""
 
 
-@dataclass(frozen=True)
-class Breach:
-    """A limit that would be, or is, exceeded.
-
-    Attributes:
-        limit: Its name, such as ``joint_velocity``.
-        sentence: What, where and by how much.
-    """
-
-    limit: str
-    sentence: str
+def _limit(name: str, template: str, unit: Unit) -> Reason:
+    """A reason with a value, its limit, and the excess of the one over the other."""
+    excess = "{value}, {excess} over its limit of {limit}"
+    return register_reason(name, f"{template} {excess}", value=unit, excess=unit, limit=unit)
 
 
-def _over(limit: str, what: str, value: float, bound: float, unit: str) -> Breach:
-    more = f"{value - bound:.3g} {unit} over its limit of {bound:.3g} {unit}"
-    return Breach(limit, f"{limit.replace('_', ' ')}: {what} {value:.3g} {unit}, {more}")
+JOINT_POSITION = register_reason(
+    "joint_position_limit",
+    "joint position: {joint} {what} {value:.4g}, {excess:.2g} beyond its limit of {limit:.4g}",
+    value=RAD,
+    excess=RAD,
+    limit=RAD,
+)
+JOINT_VELOCITY = _limit("joint_velocity_limit", "joint velocity: {joint} would move at", RAD_PER_S)
+JOINT_ACCELERATION = _limit(
+    "joint_acceleration_limit", "joint acceleration: {joint} would change speed by", RAD_PER_S2
+)
+JOINT_STEP = _limit("joint_step_limit", "step: {joint} would step by", RAD)
+TOOL_SPEED = _limit("tool_speed_limit", "tool velocity: the tool would move at", M_PER_S)
+TOOL_TURN = _limit("tool_turn_limit", "tool velocity: the tool would turn at", RAD_PER_S)
+TOOL_ACCELERATION = _limit(
+    "tool_acceleration_limit", "tool acceleration: the tool would change speed by", M_PER_S2
+)
+TOOL_TURN_ACCELERATION = _limit(
+    "tool_turn_acceleration_limit", "tool acceleration: the tool would change its turning by", RAD_PER_S2
+)
+OUTSIDE_WORKSPACE = register_reason(
+    "outside_workspace",
+    "workspace: {what} at ({x:.3f}, {y:.3f}, {z:.3f}), {excess} outside the box in {axis}",
+    x=M,
+    y=M,
+    z=M,
+    excess=METRES,
+)
+WRONG_JOINTS = register_reason("wrong_joints", "joint names: {found}")
+NOT_FINITE = register_reason("not_finite", "not finite: {what}")
+STALE = register_reason(
+    "stale_joint_states",
+    "stale: joint states are {age} old, the limit is {limit}",
+    age=MILLISECONDS,
+    limit=MILLISECONDS,
+)
+IMPLAUSIBLE = _limit("implausible_joint_states", "implausible: {joint} is reported to have jumped by", RAD)
+TRACKING = _limit("tracking_error", "tracking: {joint} is off its command by", RAD)
+FORCE = _limit("force_limit", "wrench: force on the tool", N)
+TORQUE = _limit("torque_limit", "wrench: torque on the tool", NM)
 
 
-def _worst(
-    limit: str, what: str, values: Array, bounds: Array, names: Sequence[str], unit: str
-) -> Breach | None:
+def _over(reason: Reason, value: float, bound: float, **names: str) -> Outcome:
+    return reason(value=value, excess=value - bound, limit=bound, **names)
+
+
+def _worst(reason: Reason, values: Array, bounds: Array, names: Sequence[str]) -> Outcome | None:
     """The joint that exceeds its bound the most, relative to it."""
     excess = values - bounds * (1.0 + TOLERANCE)
     if not np.any(excess > 0.0):
         return None
     i = int(np.argmax(np.where(excess > 0.0, values / bounds, -np.inf)))
-    return _over(limit, f"{names[i]} {what}", float(values[i]), float(bounds[i]), unit)
+    return _over(reason, float(values[i]), float(bounds[i]), joint=names[i])
 
 
 # ---- what is sent -----------------------------------------------------------------------------------------
 
 
-def shape_and_numbers(position: Array, velocity: Array, names: Sequence[str]) -> Breach | None:
+def shape_and_numbers(position: Array, velocity: Array, names: Sequence[str]) -> Outcome | None:
     """A command has one finite position and velocity a joint ``(n,)``."""
     for part, values in (("positions", position), ("velocities", velocity)):
         if np.shape(values) != (len(names),):
             found = f"{np.shape(values)} {part} commanded for {len(names)} joints"
-            return Breach("joint_names", f"joint names: {found}")
+            return WRONG_JOINTS(found=found)
         if not np.all(np.isfinite(values)):
             i = int(np.argmin(np.isfinite(values)))
-            return Breach("not_finite", f"not finite: {part} commanded, {names[i]} at {values[i]}")
+            return NOT_FINITE(what=f"{part} commanded, {names[i]} at {values[i]}")
     return None
 
 
 def joint_position(
     position: Array, lower: Array, upper: Array, names: Sequence[str], what: str = "would be at"
-) -> Breach | None:
+) -> Outcome | None:
     """Joints ``(n,)`` are within their limits, rad or m."""
     over = np.maximum(position - upper, lower - position)
     i = int(np.argmax(over))
     if over[i] <= TOLERANCE:
         return None
     bound = float(upper[i] if position[i] > upper[i] else lower[i])
-    found = f"{names[i]} {what} {float(position[i]):.4g} rad"
-    return Breach(
-        "joint_position",
-        f"joint position: {found}, {float(over[i]):.2g} rad beyond its limit of {bound:.4g} rad",
-    )
+    return JOINT_POSITION(joint=names[i], what=what, value=position[i], excess=over[i], limit=bound)
 
 
-def joint_velocity(velocity: Array, limit: Array, names: Sequence[str]) -> Breach | None:
+def joint_velocity(velocity: Array, limit: Array, names: Sequence[str]) -> Outcome | None:
     """Joint speeds ``(n,)`` of the commanded motion, rad/s."""
-    return _worst("joint_velocity", "would move at", np.abs(velocity), limit, names, "rad/s")
+    return _worst(JOINT_VELOCITY, np.abs(velocity), limit, names)
 
 
 def joint_acceleration(
-    before: Motion, after: Motion, limit: Array, period: float, names: Sequence[str]
-) -> Breach | None:
+    before: JointMotion, after: JointMotion, limit: Array, period: float, names: Sequence[str]
+) -> Outcome | None:
     """Change of joint speeds ``(n,)`` between two periods, rad/s^2."""
     change = np.abs(after.velocity - before.velocity) / period
-    return _worst("joint_acceleration", "would change speed by", change, limit, names, "rad/s^2")
+    return _worst(JOINT_ACCELERATION, change, limit, names)
 
 
-def joint_step(before: Array, after: Array, limit: Array, names: Sequence[str]) -> Breach | None:
+def joint_step(before: Array, after: Array, limit: Array, names: Sequence[str]) -> Outcome | None:
     """Step between successive commands ``(n,)``, rad."""
-    return _worst("step", "would step by", np.abs(after - before), limit, names, "rad")
+    return _worst(JOINT_STEP, np.abs(after - before), limit, names)
 
 
 def twist(before: Array, after: Array, period: float) -> Array:
@@ -107,53 +137,41 @@ def twist(before: Array, after: Array, period: float) -> Array:
     return np.concatenate([after[:3] - before[:3], turn]) / period
 
 
-def tool_velocity(twist: Array, limits: SafetyLimits) -> Breach | None:
+def tool_velocity(twist: Array, limits: SafetyLimits) -> Outcome | None:
     """Speed of the tool, of a twist ``(6,)``."""
-    return _first_over(
-        "tool_velocity",
-        (
-            ("the tool would move at", twist[:3], limits.tool_speed, "m/s"),
-            ("the tool would turn at", twist[3:], limits.tool_turn, "rad/s"),
-        ),
+    return _longer(TOOL_SPEED, twist[:3], limits.tool_speed) or _longer(
+        TOOL_TURN, twist[3:], limits.tool_turn
     )
 
 
-def tool_acceleration(before: Array, after: Array, period: float, limits: SafetyLimits) -> Breach | None:
+def tool_acceleration(before: Array, after: Array, period: float, limits: SafetyLimits) -> Outcome | None:
     """Change of the tool's speed between the twists ``(6,)`` of successive periods."""
     change = (after - before) / period
-    return _first_over(
-        "tool_acceleration",
-        (
-            ("the tool would change speed by", change[:3], limits.tool_acceleration, "m/s^2"),
-            ("the tool would change its turning by", change[3:], limits.tool_turn_acceleration, "rad/s^2"),
-        ),
+    return _longer(TOOL_ACCELERATION, change[:3], limits.tool_acceleration) or _longer(
+        TOOL_TURN_ACCELERATION, change[3:], limits.tool_turn_acceleration
     )
 
 
-def _first_over(limit: str, parts: Sequence[tuple[str, Array, float, str]]) -> Breach | None:
-    """The first vector that is longer than its bound."""
-    for what, vector, bound, unit in parts:
-        length = float(np.linalg.norm(vector))
-        if length > bound * (1.0 + TOLERANCE):
-            return _over(limit, what, length, bound, unit)
-    return None
+def _longer(reason: Reason, vector: Array, bound: float) -> Outcome | None:
+    """A vector ``(3,)`` is longer than its bound."""
+    length = float(np.linalg.norm(vector))
+    return _over(reason, length, bound) if length > bound * (1.0 + TOLERANCE) else None
 
 
-def workspace(position: Array, box: Array, what: str = "the tool would be") -> Breach | None:
+def workspace(position: Array, box: Array, what: str = "the tool would be") -> Outcome | None:
     """The tool's origin ``(3,)`` is in the box ``(2, 3)``, metres."""
     over = np.maximum(box[0] - position, position - box[1])
     i = int(np.argmax(over))
     if over[i] <= TOLERANCE:
         return None
     x, y, z = position.tolist()
-    excess = f"{1000 * float(over[i]):.0f} mm outside the box in {'xyz'[i]}"
-    return Breach("workspace", f"workspace: {what} at ({x:.3f}, {y:.3f}, {z:.3f}) m, {excess}")
+    return OUTSIDE_WORKSPACE(what=what, x=x, y=y, z=z, excess=over[i], axis="xyz"[i])
 
 
 # ---- what is reported -------------------------------------------------------------------------------------
 
 
-def joint_names(found: Sequence[str], expected: Sequence[str]) -> Breach | None:
+def joint_names(found: Sequence[str], expected: Sequence[str]) -> Outcome | None:
     """Joint states name the robot's joints in their order."""
     if tuple(found) == tuple(expected):
         return None
@@ -166,53 +184,45 @@ def joint_names(found: Sequence[str], expected: Sequence[str]) -> Breach | None:
         how = f"name '{more[0]}', which is no joint of the robot"
     else:
         how = "name a joint twice"
-    return Breach("joint_names", f"joint names: joint states {how}")
+    return WRONG_JOINTS(found=f"joint states {how}")
 
 
-def reported_numbers(arrays: Sequence[Array], names: Sequence[str]) -> Breach | None:
+def reported_numbers(arrays: Sequence[Array], names: Sequence[str]) -> Outcome | None:
     """Joint positions and velocities: one finite number a joint ``(n,)``."""
     for part, values in zip(("positions", "velocities"), arrays, strict=True):
         if np.shape(values) != (len(names),):
             found = f"{np.shape(values)} {part} reported for {len(names)} joints"
-            return Breach("joint_names", f"joint names: {found}")
+            return WRONG_JOINTS(found=found)
         if not np.all(np.isfinite(values)):
             i = int(np.argmin(np.isfinite(values)))
-            return Breach("not_finite", f"not finite: {part} reported, {names[i]} at {values[i]}")
+            return NOT_FINITE(what=f"{part} reported, {names[i]} at {values[i]}")
     return None
 
 
-def fresh(age: float, limit: float) -> Breach | None:
+def fresh(age: float, limit: float) -> Outcome | None:
     """Seconds since joint states were measured."""
     if age <= limit:
         return None
-    return Breach(
-        "stale", f"stale: joint states are {1000 * age:.0f} ms old, the limit is {1000 * limit:.0f} ms"
-    )
+    return STALE(age=age, limit=limit)
 
 
 def plausible(
     before: Array, after: Array, elapsed: float, velocity: Array, names: Sequence[str]
-) -> Breach | None:
+) -> Outcome | None:
     """Measured joints ``(n,)`` moved no farther in the time between two reports than they can."""
     way = np.abs(after - before)
-    can = IMPLAUSIBLE * velocity * max(elapsed, 0.0) + JUMP
-    return _worst("implausible", "is reported to have jumped by", way, can, names, "rad")
+    can = FASTEST * velocity * max(elapsed, 0.0) + JUMP
+    return _worst(IMPLAUSIBLE, way, can, names)
 
 
-def tracking(commanded: Array, measured: Array, limit: float, names: Sequence[str]) -> Breach | None:
+def tracking(commanded: Array, measured: Array, limit: float, names: Sequence[str]) -> Outcome | None:
     """Measured arm joints ``(n,)`` are where they were told to be, within a limit in rad."""
     off = np.abs(commanded - measured)
-    return _worst("tracking", "is off its command by", off, np.full(len(off), limit), names, "rad")
+    return _worst(TRACKING, off, np.full(len(off), limit), names)
 
 
-def wrench(measured: Array, force: float, torque: float) -> Breach | None:
+def wrench(measured: Array, force: float, torque: float) -> Outcome | None:
     """External wrench ``(6,)`` at the tool, N and Nm."""
     if not np.all(np.isfinite(measured)):
-        return Breach("not_finite", "not finite: the wrist's wrench as reported")
-    return _first_over(
-        "wrench",
-        (
-            ("force on the tool", measured[:3], force, "N"),
-            ("torque on the tool", measured[3:], torque, "Nm"),
-        ),
-    )
+        return NOT_FINITE(what="the wrist's wrench as reported")
+    return _longer(FORCE, measured[:3], force) or _longer(TORQUE, measured[3:], torque)

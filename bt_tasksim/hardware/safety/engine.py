@@ -1,21 +1,21 @@
-"""What an engine of a real robot implements besides the methods of a `PhysicsEngine`.
+"""What an engine of a real robot implements, in place of the methods of a `PhysicsEngine`.
 
 An engine that is real is never stepped by the pipeline itself: the guard sends, waits for the period to end,
-and reads (`bt_tasksim.safety.guard`).
+and reads (`bt_tasksim.hardware.safety.guard`).
 """
 
 from __future__ import annotations
 
 import threading
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol
 
-from bt_tasksim.poses import Array
-from bt_tasksim.world import JointTarget, WorldState
-
-if TYPE_CHECKING:
-    from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import JointTarget, WorldState
+from bt_tasksim.engines.base import Engine, RenderingEngine
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,30 +110,33 @@ class EmergencyStop:
             self._listeners.append(listener)
 
 
-@runtime_checkable
-class RealEngine(Protocol):
-    """The physics role, played by a real robot.
+class RealEngine(Engine):
+    """The physics role, played by a real robot; registered as ``engine/physics``, like any other.
 
     Attributes:
         emergency: Its emergency stop.
     """
 
+    role: ClassVar[str] = "physics"
+    real: ClassVar[bool] = True
     emergency: EmergencyStop
 
-    def reset(self, configuration: ActorConfiguration, beat: Callable[[], None]) -> None:
+    @abstractmethod
+    def reset(self, configuration: ActorConfiguration, heartbeat: Callable[[], None]) -> None:
         """Begin a run: connect, end a hold, bring the arm to where an episode starts, wait until it is still.
 
-        The guard does not see this motion: `bt_tasksim.safety.motion.approach` makes one within limits.
+        The guard does not see this motion; `bt_tasksim.hardware.safety.motion.approach` keeps to limits.
 
         Args:
             configuration: The world.
-            beat: To be called all the time that the arm moves, as often as a command follows another:
+            heartbeat: To be called all the time that the arm moves, as often as a command follows another:
                 the watchdog holds the arm when it is called no more.
 
         Raises:
-            MachineError: There is no robot, it does not come to rest, or `beat` says to stop.
+            MachineError: There is no robot, it does not come to rest, or `heartbeat` says to stop.
         """
 
+    @abstractmethod
     def send(self, target: JointTarget) -> None:
         """Send one command, which the robot gives up ``target.validity`` seconds after it was sent.
 
@@ -144,6 +147,7 @@ class RealEngine(Protocol):
             MachineError: The connection is lost.
         """
 
+    @abstractmethod
     def latest(self) -> JointReading:
         """The newest joint states, without waiting.
 
@@ -151,6 +155,7 @@ class RealEngine(Protocol):
             MachineError: There are none, or the connection is lost.
         """
 
+    @abstractmethod
     def state(self, reading: JointReading) -> WorldState:
         """The state of this instant: these joint states, which were checked, and the newest of all else.
 
@@ -158,6 +163,7 @@ class RealEngine(Protocol):
             MachineError: Something has not been heard of for too long, or the connection is lost.
         """
 
+    @abstractmethod
     def hold(self, why: str, here: bool) -> None:
         """Stop, and carry out nothing more until `reset`; on any thread, and more than once.
 
@@ -170,7 +176,12 @@ class RealEngine(Protocol):
         """
 
     def hold_channel(self) -> ChannelSpec | None:
-        """How the watchdog stops this robot; None where there is no second way to it."""
+        """How the watchdog stops this robot; None, the default, where there is no second way to it."""
+        return None
+
+    def rendering(self) -> RenderingEngine | None:
+        """The pictures of the robot's cameras; None, the default, where it has none."""
+        return None
 
 
 class RobotClock:

@@ -10,16 +10,25 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bt_tasksim.errors import InputError, SafetyStop
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.safety import checks
-from bt_tasksim.safety.checks import Breach
-from bt_tasksim.safety.engine import JointReading
-from bt_tasksim.safety.limits import MARGIN, REACTION, SafetyLimits
-from bt_tasksim.safety.motion import Motion, braked, followed, moved, resting
-from bt_tasksim.world import JointTarget
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.outcomes import Outcome, register_reason
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.units import MILLISECONDS
+from bt_tasksim.core.world import JointTarget
+from bt_tasksim.hardware.safety import checks
+from bt_tasksim.hardware.safety.engine import JointReading
+from bt_tasksim.hardware.safety.motion import JointMotion, braked, followed, moved, resting
+from bt_tasksim.hardware.safety.stop import RAD, SafetyStop
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.limits import MARGIN, REACTION, SafetyLimits
 
+ENDED = register_reason("run_ended", "{why}")
+FROZEN = register_reason(
+    "frozen_joint_states",
+    "stale: joint states have not changed for {time}, while commands moved by {way}",
+    time=MILLISECONDS,
+    way=RAD,
+)
 _HALVINGS = 8
 """Steps in which the fastest motion that fits is looked for."""
 _MOVED = 0.01
@@ -65,7 +74,7 @@ class Guard:
         self.stopped = None
         still, begin, n = np.zeros_like(position), np.array(position, float), self._n
         begin[n:] = np.clip(begin[n:], self.lower[n:], self.upper[n:])  # measured, and so beside its range
-        self.motion = Motion(begin, still)
+        self.motion = JointMotion(begin, still)
         self._reference = self.motion
         self._tool = self.forward(self.motion.position)
         self._twist = np.zeros(6)
@@ -76,8 +85,8 @@ class Guard:
         """See that the limits' times suit the seconds between two commands; nothing else happens.
 
         Raises:
-            InputError: Commands would expire, or beats be missed, between two of them, or old joint states
-                would be noticed too late.
+            InputError: Commands would expire, or heartbeats be missed, between two of them, or old joint
+                states would be noticed too late.
         """
         limits = self.limits
         for most, what, how in (
@@ -131,11 +140,11 @@ class Guard:
         position = rest - (rest - self.motion.position) * share**2
         velocity[self._n :] = 0.0  # a hand goes where it was told, and no further
         position[self._n :] = self.motion.position[self._n :]
-        self.motion, self._tool = Motion(position, velocity), self.forward(position)
+        self.motion, self._tool = JointMotion(position, velocity), self.forward(position)
         before = self.forward(position - self.period * velocity)
         self._twist = checks.twist(before, self._tool, self.period)
 
-    def _refused(self, wanted: Motion) -> Breach | None:
+    def _refused(self, wanted: JointMotion) -> Outcome | None:
         """Limits that stop, and that the command itself exceeds, whatever clipping would make of it."""
         limits, n = self.limits, self._n
         found = None
@@ -147,7 +156,7 @@ class Guard:
             ) or checks.joint_velocity(wanted.velocity, self.velocity, self.names)
         return found
 
-    def _clipped(self, wanted: Motion) -> Motion:
+    def _clipped(self, wanted: JointMotion) -> JointMotion:
         """The wanted motion, within those joint limits that clip."""
         clips, endless = self.limits.clips, np.full(len(self.names), np.inf)
         if not (clips("joint_position") or clips("joint_velocity") or clips("joint_acceleration")):
@@ -156,7 +165,7 @@ class Guard:
         velocity = np.where(inside == wanted.position, wanted.velocity, 0.0)
         return followed(
             self.motion,
-            Motion(inside, velocity),
+            JointMotion(inside, velocity),
             self.velocity,
             self.acceleration if clips("joint_acceleration") else endless,
             self.lower,
@@ -164,11 +173,11 @@ class Guard:
             self.period,
         )
 
-    def _rest(self, motion: Motion) -> Array:
+    def _rest(self, motion: JointMotion) -> Array:
         """Where joints ``(n_joints,)`` stand if no command follows."""
         return resting(motion, self.acceleration, self._shortest)[0]
 
-    def _stoppable(self, motion: Motion) -> Motion:
+    def _stoppable(self, motion: JointMotion) -> JointMotion:
         """The fastest motion between braking and this one that ends within the position limits."""
         clips = self.limits.clips
         if not (clips("joint_position") or clips("joint_acceleration")) or self._ends_inside(motion):
@@ -176,34 +185,34 @@ class Guard:
         slowest = braked(self.motion, self.acceleration, self.period)
         return self._between(slowest.velocity, motion.velocity, self._ends_inside) or slowest
 
-    def _ends_inside(self, motion: Motion) -> bool:
+    def _ends_inside(self, motion: JointMotion) -> bool:
         return checks.joint_position(self._rest(motion), self.lower, self.upper, self.names) is None
 
-    def _gentler(self, motion: Motion) -> Motion:
+    def _gentler(self, motion: JointMotion) -> JointMotion:
         """The motion whose change of joint speeds is the largest share that keeps the tool's acceleration."""
 
-        def gentle(tried: Motion) -> bool:
+        def gentle(tried: JointMotion) -> bool:
             twist = self._tool_motion(tried)[1]
             return checks.tool_acceleration(self._twist, twist, self.period, self.limits) is None
 
         return self._between(self.motion.velocity, motion.velocity, gentle) or motion
 
-    def _between(self, slow: Array, fast: Array, fits: Callable[[Motion], bool]) -> Motion | None:
+    def _between(self, slow: Array, fast: Array, fits: Callable[[JointMotion], bool]) -> JointMotion | None:
         """The motion nearest to the fast one, of those between two velocities ``(n_joints,)``, that fits."""
         share, step, found = 0.0, 0.5, None
         for _ in range(_HALVINGS):
             velocity = slow + (share + step) * (fast - slow)
-            tried = Motion(self.motion.position + self.period * velocity, velocity)
+            tried = JointMotion(self.motion.position + self.period * velocity, velocity)
             if fits(tried):
                 share, found = share + step, tried
             step /= 2.0
         return found
 
-    def _tool_motion(self, motion: Motion) -> tuple[Array, Array]:
+    def _tool_motion(self, motion: JointMotion) -> tuple[Array, Array]:
         tool = self.forward(motion.position)
         return tool, checks.twist(self._tool, tool, self.period)
 
-    def _exceeded(self, motion: Motion, tool: Array, twist: Array) -> Breach | None:
+    def _exceeded(self, motion: JointMotion, tool: Array, twist: Array) -> Outcome | None:
         """What would be sent exceeds a limit."""
         limits, names, n = self.limits, self.names, self._n
         rest = self._rest(motion)
@@ -248,7 +257,7 @@ class Guard:
         self._stop_at(checks.tracking(self.motion.position[:n], arm, limits.tracking, names))
         self._reading = reading
 
-    def _frozen(self, reading: JointReading, now: float) -> Breach | None:
+    def _frozen(self, reading: JointReading, now: float) -> Outcome | None:
         """Joint states arrive and do not change, while commands do."""
         commanded, n = self.motion.position, self._n
         before, arm = self._reading, reading.position[:n]
@@ -261,11 +270,7 @@ class Guard:
             self._changed = (now, then)
         if now - since < self.limits.stale or way <= _MOVED:
             return None
-        return Breach(
-            "stale",
-            f"stale: joint states have not changed for {1000 * (now - since):.0f} ms, while commands moved "
-            f"by {way:.3g} rad",
-        )
+        return FROZEN(time=now - since, way=way)
 
     def wrench(self, wrench: Array) -> None:
         """Look at the external wrench ``(6,)`` on the tool.
@@ -279,15 +284,15 @@ class Guard:
 
     # ---- stopping ---------------------------------------------------------------------------------------
 
-    def stop(self, limit: str, sentence: str) -> SafetyStop:
+    def stop(self, outcome: Outcome) -> SafetyStop:
         """Stop for good, and return what to raise; the first reason is the one that counts."""
         if self.stopped is None:
-            self.stopped = SafetyStop(sentence, limit)
+            self.stopped = SafetyStop(outcome)
         return self.stopped
 
-    def _stop_at(self, breach: Breach | None) -> None:
+    def _stop_at(self, breach: Outcome | None) -> None:
         if breach is not None:
-            raise self.stop(breach.limit, breach.sentence)
+            raise self.stop(breach)
 
     def brake(self) -> JointTarget:
         """The next target of an arm that slows down as fast as it may, for a simulation."""

@@ -8,26 +8,36 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Any
+from typing import ClassVar
 
-from bt_tasksim.errors import MachineError, SafetyStop
-from bt_tasksim.pacing import Clock
-from bt_tasksim.safety.engine import RealEngine
-from bt_tasksim.safety.guard import Guard
-from bt_tasksim.safety.watchdog import Watchdog
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.world import Hidden, JointTarget, WorldState
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.outcomes import register_reason
+from bt_tasksim.core.units import MILLISECONDS
+from bt_tasksim.core.world import JointTarget, WorldState
+from bt_tasksim.engines.base import PhysicsEngine
+from bt_tasksim.engines.clock import Clock
+from bt_tasksim.hardware.safety.checks import FORCE, TORQUE, TRACKING
+from bt_tasksim.hardware.safety.engine import RealEngine
+from bt_tasksim.hardware.safety.guard import ENDED, Guard
+from bt_tasksim.hardware.safety.stop import SafetyStop
+from bt_tasksim.hardware.safety.watchdog import Watchdog
+from bt_tasksim.scene.configuration import ActorConfiguration
 
-_WHERE_IT_IS = ("wrench", "tracking", "watchdog")
+EMERGENCY_STOP = register_reason("emergency_stop", "emergency stop: {by}")
+CHECKED_LATE = register_reason(
+    "checked_late", "late: checked {early} before it could be sent", early=MILLISECONDS
+)
+COMMAND_LATE = register_reason(
+    "command_late", "late: no command for {time}, and the last one has expired", time=MILLISECONDS
+)
+ENGINE_FAILED = register_reason("robot_engine_failed", "the robot's engine failed: {error}")
+WATCHDOG_STOPPED = register_reason("watchdog_stop", "{trouble}")
+_WHERE_IT_IS = (FORCE, TORQUE, TRACKING, WATCHDOG_STOPPED)
 """Reasons to stop where the arm is: it pushes against something, or somebody has stopped it already."""
 
 
-class GuardedRobot:
+class GuardedRobot(PhysicsEngine):
     """The physics engine that a pipeline gets for a real robot.
-
-    Attributes:
-        real: What it moves is no simulation.
-        told: The last hold was said to the robot, or to a watchdog that is there.
 
     Args:
         engine: The robot's engine.
@@ -35,9 +45,11 @@ class GuardedRobot:
         clock: A clock of real time.
     """
 
+    real: ClassVar[bool] = True
+
     def __init__(self, engine: RealEngine, guard: Guard, clock: Clock) -> None:
         self.engine, self.guard, self.clock = engine, guard, clock
-        self.real = self.told = True
+        self._hold_delivered = True
         self.watchdog: Watchdog | None = None
         self._lock = threading.RLock()  # an interrupt during a hold leads to another one
         self._held = True
@@ -72,14 +84,14 @@ class GuardedRobot:
             self.watchdog.rest()
         self.guard.begin(self.engine.latest().position, period)
         if why := self.engine.emergency.why:  # meanwhile, and `begin` has forgotten the stop
-            raise self.guard.stop("emergency_stop", f"emergency stop: {why}")
+            raise self.guard.stop(EMERGENCY_STOP(by=why))
         state = self._read()
         self._sent = 0.0
         self.clock.start(period)
         return state
 
     def begin(self) -> WorldState:
-        """The run begins now, after a `reset` and whatever else it took: the clock starts, from this state.
+        """See `PhysicsEngine.begin`: the clock starts, from this state.
 
         Raises:
             SafetyStop: The robot's state is not to be trusted.
@@ -113,9 +125,10 @@ class GuardedRobot:
                 raise
             raise stop from error
 
-    def hidden(self) -> Hidden | None:
-        """Nobody knows the truth."""
-        return None
+    @property
+    def hold_delivered(self) -> bool:
+        """The last hold was said to the robot, or to a watchdog that is there."""
+        return self._hold_delivered
 
     def hold(self, why: str) -> None:
         """The arm holds, and nothing moves it until `reset`; a second call does nothing.
@@ -125,13 +138,13 @@ class GuardedRobot:
         with self._lock:
             if self._held:
                 return
-            here = self.guard.stop("ended", why).limit in _WHERE_IT_IS
+            here = self.guard.stop(ENDED(why=why)).reason in _WHERE_IT_IS
             try:
                 self.engine.hold(why, here)
             except Exception:  # whatever it is, there is another way
-                self.told = self.watchdog is not None and self.watchdog.hold()
+                self._hold_delivered = self.watchdog is not None and self.watchdog.hold()
             else:
-                self.told = True
+                self._hold_delivered = True
                 if self.watchdog is not None:
                     self.watchdog.rest()
             self._held = True
@@ -142,9 +155,7 @@ class GuardedRobot:
         if self.watchdog is not None:
             self.watchdog.close()
             self.watchdog = None
-        close: Any = getattr(self.engine, "close", None)
-        if close is not None:
-            close()
+        self.engine.close()
 
     def _start_watchdog(self) -> None:
         if self.watchdog is not None:
@@ -162,7 +173,7 @@ class GuardedRobot:
             if self.guard.stopped is not None:
                 raise self.guard.stopped
             if (late := time.monotonic() - checked) > self.guard.period:
-                raise self.guard.stop("late", f"late: checked {1000 * late:.0f} ms before it could be sent")
+                raise self.guard.stop(CHECKED_LATE(early=late))
             self.engine.send(target)
             self._sent = time.monotonic()
 
@@ -173,8 +184,7 @@ class GuardedRobot:
             raise guard.stopped
         self._beat()
         if self._sent and now - self._sent > guard.limits.validity:
-            said = f"late: no command for {1000 * (now - self._sent):.0f} ms, and the last one has expired"
-            raise guard.stop("late", said)
+            raise guard.stop(COMMAND_LATE(time=now - self._sent))
         guard.reading(self.engine.latest(), now)
         if self._sent and (late := now - self._sent - guard.period) > 0.0:
             guard.late(late)
@@ -182,7 +192,7 @@ class GuardedRobot:
     def _reason(self, error: MachineError) -> SafetyStop:
         if isinstance(error, SafetyStop):
             return error
-        return self.guard.stop("engine", f"the robot's engine failed: {error}")
+        return self.guard.stop(ENGINE_FAILED(error=error))
 
     def _read(self) -> WorldState:
         reading = self.engine.latest()
@@ -193,13 +203,13 @@ class GuardedRobot:
         return state
 
     def _beat(self) -> None:
-        with self._lock:  # a beat after a hold would begin the watch again
+        with self._lock:  # a heartbeat after a hold would begin the watch again
             if self.watchdog is not None and not self._held:
                 if trouble := self.watchdog.trouble():
-                    raise self.guard.stop("watchdog", trouble)
-                self.watchdog.beat()
+                    raise self.guard.stop(WATCHDOG_STOPPED(trouble=trouble))
+                self.watchdog.heartbeat()
 
     def _emergency(self, why: str) -> None:
         """On the thread of whatever pressed it: the arm holds at once."""
-        stop = self.guard.stop("emergency_stop", f"emergency stop: {why}")
+        stop = self.guard.stop(EMERGENCY_STOP(by=why))
         self.hold(str(stop))

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-from bt_tasksim.errors import SafetyStop
-from bt_tasksim.safety.engine import JointReading
-from bt_tasksim.safety.guard import Guard
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.world import Hidden, JointTarget, WorldState
-
-if TYPE_CHECKING:
-    from bt_tasksim.engines.pipeline import PhysicsEngine
+from bt_tasksim.core.world import JointTarget, WorldState
+from bt_tasksim.engines.base import PhysicsEngine, PhysicsWrapper
+from bt_tasksim.hardware.safety.engine import JointReading
+from bt_tasksim.hardware.safety.guard import ENDED, Guard
+from bt_tasksim.hardware.safety.stop import SafetyStop
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 
-class GuardedSimulation:
+class GuardedSimulation(PhysicsWrapper):
     """A physics engine whose every command and state is checked; after a stop it brakes and holds.
 
     Args:
@@ -23,7 +19,8 @@ class GuardedSimulation:
     """
 
     def __init__(self, inner: PhysicsEngine, guard: Guard) -> None:
-        self.inner, self.guard = inner, guard
+        super().__init__(inner)
+        self.guard = guard
 
     def reset(self, configuration: ActorConfiguration) -> WorldState:
         """See `PhysicsEngine.reset`."""
@@ -51,16 +48,6 @@ class GuardedSimulation:
         guard.wrench(state.wrench)
         return state
 
-    def hidden(self) -> Hidden | None:
-        """See `PhysicsEngine.hidden`."""
-        return self.inner.hidden()
-
     def hold(self, why: str) -> None:
-        """Accept no more targets."""
-        self.guard.stop("ended", why)
-
-    def close(self) -> None:
-        """Close the simulation."""
-        close: Any = getattr(self.inner, "close", None)
-        if close is not None:
-            close()
+        """See `PhysicsEngine.hold`: no more targets are accepted."""
+        self.guard.stop(ENDED(why=why))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bt_tasksim.poses import Array
+from bt_tasksim.core.poses import Array
 
 RESERVE = 0.2
 """Share of the acceleration limits with which joints that lag may catch up."""
@@ -20,7 +20,7 @@ _SLACK = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class JointMotion:
     """Where the joints were last told to be, and how fast they went there.
 
     Attributes:
@@ -32,26 +32,16 @@ class Motion:
     velocity: Array
 
 
-def moved(before: Motion, position: Array, period: float) -> Motion:
+def moved(before: JointMotion, position: Array, period: float) -> JointMotion:
     """The motion to a position ``(n,)`` within one period."""
-    return Motion(position, (position - before.position) / period)
-
-
-def braking_distance(velocity: Array, acceleration: Array, period: float) -> Array:
-    """How far joints get ``(n,)`` after the last period, slowing down by a T in each until they stand.
-
-    Speeds v - a T, v - 2 a T, ... are summed up while they are positive.
-    """
-    speed, change = np.abs(velocity), acceleration * period
-    n = np.where(np.isfinite(change), np.floor(speed / change), 0.0)
-    return period * (n * speed - np.where(n > 0.0, change, 0.0) * n * (n + 1.0) / 2.0)
+    return JointMotion(position, (position - before.position) / period)
 
 
 def stopping_speed(room: Array, acceleration: Array, period: float) -> Array:
     """Greatest speed ``(n,)`` of the next period from which joints come to stand within ``room (n,)``.
 
-    The inverse of v T + `braking_distance` (v): at v = m a T that is a T^2 m (m + 1) / 2, between them it
-    rises straight.
+    With v the joints get v T + (v - a T) T + (v - 2 a T) T + ... as long as the terms are positive: at
+    v = m a T that is a T^2 m (m + 1) / 2, between them it rises straight. This is its inverse.
     """
     endless = np.isinf(room)
     room = np.where(endless, 0.0, np.maximum(room, 0.0))
@@ -62,7 +52,7 @@ def stopping_speed(room: Array, acceleration: Array, period: float) -> Array:
     return np.where(endless, np.inf, speed)
 
 
-def resting(motion: Motion, acceleration: Array, shortest: float) -> tuple[Array, float]:
+def resting(motion: JointMotion, acceleration: Array, shortest: float) -> tuple[Array, float]:
     """Where joints come to stand ``(n,)`` that slow down evenly in the time of the slowest, and that time.
 
     This is the end of every command: what an engine sends, and what the guard looks at.
@@ -78,22 +68,22 @@ def resting(motion: Motion, acceleration: Array, shortest: float) -> tuple[Array
     ) * braking / 2.0, braking
 
 
-def braked(before: Motion, acceleration: Array, period: float) -> Motion:
+def braked(before: JointMotion, acceleration: Array, period: float) -> JointMotion:
     """The next motion of joints that slow down as fast as they may."""
     slower = np.maximum(np.abs(before.velocity) - acceleration * period, 0.0)
     velocity = np.sign(before.velocity) * slower
-    return Motion(before.position + period * velocity, velocity)
+    return JointMotion(before.position + period * velocity, velocity)
 
 
 def followed(
-    before: Motion,
-    reference: Motion,
+    before: JointMotion,
+    reference: JointMotion,
     velocity: Array,
     acceleration: Array,
     lower: Array,
     upper: Array,
     period: float,
-) -> Motion:
+) -> JointMotion:
     """The next motion of joints that follow a reference as closely as limits allow.
 
     Where the reference keeps the limits and the joints are on it, the result is the reference. Joints that
@@ -125,7 +115,7 @@ def followed(
         wanted = np.minimum(np.maximum(wanted, least), most)
     position = before.position + period * wanted
     near = np.abs(position - reference.position) <= _SLACK
-    return Motion(np.where(near, reference.position, position), wanted)
+    return JointMotion(np.where(near, reference.position, position), wanted)
 
 
 def _least_ratio(a: Array, b: Array) -> float:
@@ -136,7 +126,7 @@ def _least_ratio(a: Array, b: Array) -> float:
 
 def approach(
     start: Array, goal: Array, velocity: Array, acceleration: Array, period: float
-) -> Iterator[Motion]:
+) -> Iterator[JointMotion]:
     """The way from standing at ``start (n,)`` to standing at ``goal (n,)``, one motion a period.
 
     Args:
@@ -146,7 +136,7 @@ def approach(
         acceleration: Limits ``(n,)``.
         period: Seconds.
     """
-    motion, still = Motion(start, np.zeros_like(start)), Motion(goal, np.zeros_like(goal))
+    motion, still = JointMotion(start, np.zeros_like(start)), JointMotion(goal, np.zeros_like(goal))
     endless = np.full_like(start, np.inf)
     while np.any(motion.position != goal) or np.any(motion.velocity):
         motion = followed(motion, still, velocity, acceleration, -endless, endless, period)

@@ -12,9 +12,9 @@ import sys
 import time
 from dataclasses import asdict
 
-from bt_tasksim.errors import MachineError
-from bt_tasksim.safety.engine import ChannelSpec
-from bt_tasksim.safety.watchdog_process import BEAT, DONE, ECHO, HOLD, RECORD
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.hardware.safety.engine import ChannelSpec
+from bt_tasksim.hardware.safety.watchdog_process import DONE, ECHO, HEARTBEAT, HOLD, RECORD
 
 START = 20.0
 """Longest time in seconds that the process may take to start."""
@@ -27,7 +27,7 @@ class Watchdog:
 
     Args:
         channel: How it stops the robot.
-        deadline: Seconds without a beat.
+        deadline: Seconds without a heartbeat.
 
     Raises:
         MachineError: It cannot start, or cannot reach the robot.
@@ -35,7 +35,7 @@ class Watchdog:
 
     def __init__(self, channel: ChannelSpec, deadline: float) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "bt_tasksim.safety.watchdog_process"],
+            [sys.executable, "-m", "bt_tasksim.hardware.safety.watchdog_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             bufsize=0,
@@ -67,13 +67,13 @@ class Watchdog:
         """Number of its process."""
         return self._process.pid
 
-    def beat(self) -> None:
+    def heartbeat(self) -> None:
         """Give a sign of life; the first one begins the watch."""
         self._unanswered = min(self._unanswered, time.monotonic())
-        self._write(BEAT)
+        self._write(HEARTBEAT)
 
     def rest(self) -> None:
-        """End the watch, until the next beat."""
+        """End the watch, until the next heartbeat."""
         self._unanswered = math.inf
         self._write(DONE)
 

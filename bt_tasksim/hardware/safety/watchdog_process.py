@@ -1,9 +1,9 @@
 """The watchdog's own process: no sign of life from the runner for some time, or no runner: the robot holds.
 
 It reads from its standard input one JSON line that says how to reach the robot, and then records of nine
-bytes: a letter and a time of the monotonic clock. ``B`` is a beat, and the first one begins the watch; ``D``
-ends it, ``H`` asks for a hold at once. The end of the input is the end of the runner. On its standard output
-it answers what it has read with the byte `ECHO`, and says what it did, one line each, beginning with
+bytes: a letter and a time of the monotonic clock. ``B`` is a heartbeat, and the first one begins the watch;
+``D`` ends it, ``H`` asks for a hold at once. The end of the input is the end of the runner. On its standard
+output it answers what it has read with the byte `ECHO`, and says what it did, one line each, beginning with
 ``ready``, ``held`` or ``failed``. It imports the standard library and what the channel needs, and nothing
 else, so that whatever happens to the runner, this goes on.
 """
@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import json
+import math
 import os
 import select
 import signal
@@ -22,7 +23,7 @@ import time
 from typing import Any
 
 RECORD = struct.Struct("<cd")
-BEAT, DONE, HOLD = b"B", b"D", b"H"
+HEARTBEAT, DONE, HOLD = b"B", b"D", b"H"
 ECHO = b"\x06"
 
 
@@ -30,7 +31,7 @@ class Watch:
     """When to hold; time comes from outside.
 
     Args:
-        deadline: Seconds without a beat.
+        deadline: Seconds without a heartbeat.
     """
 
     def __init__(self, deadline: float) -> None:
@@ -40,13 +41,16 @@ class Watch:
         self._rest = b""
 
     def feed(self, data: bytes) -> bool:
-        """Take in what the runner wrote; says whether it asks for a hold."""
+        """Take in what the runner wrote; says whether it asks for a hold, as a record that is none does."""
         data = self._rest + data
         whole = len(data) - len(data) % RECORD.size
         self._rest = data[whole:]
         asked = False
         for kind, when in RECORD.iter_unpack(data[:whole]):
-            self.watching = kind == BEAT
+            if kind not in (HEARTBEAT, DONE, HOLD) or not math.isfinite(when):
+                asked = True
+                continue
+            self.watching = kind == HEARTBEAT
             self._last = when
             asked = asked or kind == HOLD
         return asked
@@ -56,7 +60,7 @@ class Watch:
         return self._last + self.deadline - now if self.watching else None
 
     def silence(self, now: float) -> float:
-        """Seconds since the last beat."""
+        """Seconds since the last heartbeat."""
         return now - self._last
 
 
@@ -79,7 +83,7 @@ def main() -> int:
         watch.watching = False
         try:
             channel.hold(why)
-        except OSError as error:
+        except Exception as error:  # whatever a channel raises, the watch goes on
             _say(f"failed {why}, and the robot cannot be told: {error}")
         else:
             _say(f"held {why}")

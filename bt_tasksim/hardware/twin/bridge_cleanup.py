@@ -14,7 +14,7 @@ PATIENCE = 3.0
 _FILE = "bridge"
 
 
-def is_orphan(parent: int) -> bool:
+def parent_has_ended(parent: int) -> bool:
     """The process that started this one has ended; never where its number is not known (0)."""
     return parent > 0 and os.getppid() != parent
 

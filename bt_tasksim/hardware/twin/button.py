@@ -9,7 +9,7 @@ FORGOTTEN = 1.0
 """Seconds after which the twin will not hear its own word any more."""
 
 
-class Button:
+class ReleaseAnnouncer:
     """Says when to speak, and tells the twin's own word from others', since it hears both on one topic.
 
     Its own word must not undo what another one has pressed meanwhile, so as many releases as it has said

@@ -1,8 +1,8 @@
 """The twin's camera: pictures drawn from the twin's true state, published through rosbridge like a driver's.
 
 A process of its own in this project's environment, since the twin's has no renderer:
-``python -m bt_tasksim.twin.camera --robot R --ros FILE --port P --evaluation-port P --rate HZ``. It draws
-what SAPIEN draws, with the errors of depth that perception has in simulation.
+``python -m bt_tasksim.hardware.twin.camera --robot R --ros FILE --port P --evaluation-port P --rate HZ``. It
+draws what SAPIEN draws, with the errors of depth that perception has in simulation.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import argparse
 import base64
 import json
 import math
+import os
 import sys
 import time
 from collections.abc import Mapping
@@ -19,17 +20,17 @@ from typing import Any
 import cv2
 import numpy as np
 
-from bt_tasksim.engines.camera_errors import CameraErrors
-from bt_tasksim.engines.pipeline import Image
-from bt_tasksim.engines.rendering_sapien import SapienRendering
-from bt_tasksim.engines.ros.setting import CameraTopics, RosSetting, load_setting
-from bt_tasksim.engines.ros.websocket import WebSocket
-from bt_tasksim.errors import BtTasksimError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription, load_robot
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.twin.evaluation import EvaluationClient
-from bt_tasksim.world import WorldState
+from bt_tasksim.core.errors import BtTasksimError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import WorldState
+from bt_tasksim.engines.images import Image
+from bt_tasksim.engines.perception.camera_errors import CameraErrors
+from bt_tasksim.engines.rendering.sapien import SapienRendering
+from bt_tasksim.hardware.ros.setting import CameraTopics, RosSetting, load_setting
+from bt_tasksim.hardware.ros.websocket import WebSocket
+from bt_tasksim.hardware.twin.evaluation import SECRET, EvaluationClient
+from bt_tasksim.robot.description import RobotDescription, load_robot
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 TYPES = {
     "colour": "sensor_msgs/CompressedImage",
@@ -45,12 +46,14 @@ class TwinCamera:
         robot: The robot.
         setting: The topics of its cameras.
         port: Of rosbridge, on this machine.
-        evaluation_port: Of the twin.
+        twin: The twin's evaluation channel.
     """
 
-    def __init__(self, robot: RobotDescription, setting: RosSetting, port: int, evaluation_port: int) -> None:
+    def __init__(
+        self, robot: RobotDescription, setting: RosSetting, port: int, twin: EvaluationClient
+    ) -> None:
         self._robot, self._setting = robot, setting
-        self._twin = EvaluationClient(evaluation_port)
+        self._twin = twin
         self._bridge = WebSocket("127.0.0.1", port, patience=5.0)
         self._renderer, self._errors = SapienRendering(), CameraErrors()
         self._rng = np.random.default_rng(0)
@@ -129,7 +132,8 @@ def main() -> int:
     try:
         robot = load_robot(options.robot)
         setting = load_setting(robot, options.ros)
-        camera = TwinCamera(robot, setting, options.port, options.evaluation_port)
+        twin = EvaluationClient(options.evaluation_port, os.environ.pop(SECRET, ""))
+        camera = TwinCamera(robot, setting, options.port, twin)
         camera.publish()
         print("ready", flush=True)
         due = time.monotonic()

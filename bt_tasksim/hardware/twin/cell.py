@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.physics_mujoco import MujocoPhysics
-from bt_tasksim.engines.ros.messages import in_tool_frame
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.twin.controller import Controller, RefusedError, Trajectory
-from bt_tasksim.twin.gap import Gap, displaced, error_in_object
-from bt_tasksim.world import Hidden, JointTarget, WorldState
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Hidden, JointTarget, WorldState
+from bt_tasksim.engines.physics.mujoco import MujocoPhysics
+from bt_tasksim.hardware.ros.messages import in_tool_frame
+from bt_tasksim.hardware.twin.controller import Controller, RefusedTrajectoryError, Trajectory
+from bt_tasksim.hardware.twin.gap import Gap, displaced, error_in_object
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 STILL = 0.03
 """rad/s below which the arm stands."""
@@ -125,16 +125,16 @@ class Cell:
         """A trajectory for ``arm`` or ``hand``, which takes its latency.
 
         Raises:
-            RefusedError: It is not carried out.
+            RefusedTrajectoryError: It is not carried out.
         """
         try:
             if self.stopped:
-                raise RefusedError(f"it holds: {self.stopped}")
+                raise RefusedTrajectoryError(f"it holds: {self.stopped}")
             if self.announced and trajectory.run != self._run:
-                raise RefusedError("it belongs to another run")
+                raise RefusedTrajectoryError("it belongs to another run")
             controller = self._arm if group == "arm" else self._hand
             controller.check(trajectory, self.time)
-        except RefusedError:
+        except RefusedTrajectoryError:
             self.refused += 1
             self.unfit += not self.stopped
             raise
@@ -145,7 +145,7 @@ class Cell:
         try:
             controller.accept(trajectory, self.time)
             self.accepted += 1
-        except RefusedError:
+        except RefusedTrajectoryError:
             self.refused += 1
             self.unfit += 1
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bt_tasksim.poses import Array
+from bt_tasksim.core.poses import Array
 
 MOST_POINTS = 500
 LONGEST = 20.0
@@ -22,7 +22,7 @@ FASTER = 1.5
 _SLACK = 1e-3
 
 
-class RefusedError(ValueError):
+class RefusedTrajectoryError(ValueError):
     """A command that is not carried out, and why."""
 
 
@@ -73,7 +73,7 @@ class Controller:
         """Take a trajectory over.
 
         Raises:
-            RefusedError: See `check`; the last one goes on.
+            RefusedTrajectoryError: See `check`; the last one goes on.
         """
         times, positions, velocities = self.check(trajectory, now)
         here, speed = self.setpoint(now)
@@ -89,7 +89,7 @@ class Controller:
         """Times ``(k,)``, positions ``(k, n)`` and, where given, velocities of what may begin now.
 
         Raises:
-            RefusedError: It is none for these joints, or beyond their limits.
+            RefusedTrajectoryError: It is none for these joints, or beyond their limits.
         """
         times, positions, velocities = self._checked(trajectory)
         here, _ = self.setpoint(now)
@@ -98,36 +98,40 @@ class Controller:
         if np.any(rate > FASTER * self._speed + _SLACK):
             k = int(np.argmax(np.max(rate / self._speed, axis=0)))
             fast = float(np.max(rate[:, k]))
-            raise RefusedError(f"{self.joints[k]} would have to move at {fast:.3g}, faster than it can")
+            raise RefusedTrajectoryError(
+                f"{self.joints[k]} would have to move at {fast:.3g}, faster than it can"
+            )
         return times, positions, velocities
 
     def _checked(self, trajectory: Trajectory) -> tuple[Array, Array, Array | None]:
         """Times ``(k,)``, positions and velocities ``(k, n)`` in the controller's order of joints."""
         n, k = len(self.joints), len(trajectory.positions)
         if sorted(trajectory.joints) != sorted(self.joints):
-            raise RefusedError(f"names {len(trajectory.joints)} joints, not those of this controller")
+            raise RefusedTrajectoryError(
+                f"names {len(trajectory.joints)} joints, not those of this controller"
+            )
         if not 1 <= k <= MOST_POINTS:
-            raise RefusedError(f"{k} points; there should be 1 to {MOST_POINTS}")
+            raise RefusedTrajectoryError(f"{k} points; there should be 1 to {MOST_POINTS}")
         order = [list(trajectory.joints).index(name) for name in self.joints]
         if len(trajectory.times) != k or len(trajectory.velocities) != k:
             found = f"{len(trajectory.velocities)} velocities and {len(trajectory.times)} times"
-            raise RefusedError(f"{k} points, {found}")
+            raise RefusedTrajectoryError(f"{k} points, {found}")
         times = np.asarray(trajectory.times, float)
         if not np.all(np.diff(times, prepend=0.0) > 0.0) or not times[-1] <= LONGEST:
-            raise RefusedError(f"times should rise from above 0 to at most {LONGEST:g} s")
+            raise RefusedTrajectoryError(f"times should rise from above 0 to at most {LONGEST:g} s")
         positions = _matrix(trajectory.positions, n, "positions")[:, order]
         given = [len(v) for v in trajectory.velocities]
         velocities = None
         if any(given):
             velocities = _matrix(trajectory.velocities, n, "velocities")[:, order]
             if np.any(np.abs(velocities) > FASTER * self._speed + _SLACK):
-                raise RefusedError("a velocity is beyond what the joint can do")
+                raise RefusedTrajectoryError("a velocity is beyond what the joint can do")
             if np.any(np.abs(velocities[-1]) > _SLACK):
-                raise RefusedError("it does not end at rest")
+                raise RefusedTrajectoryError("it does not end at rest")
         outside = (positions < self._lower - _SLACK) | (positions > self._upper + _SLACK)
         if np.any(outside):
             joint = int(np.argmax(np.any(outside, axis=0)))
-            raise RefusedError(f"{self.joints[joint]} would leave its range")
+            raise RefusedTrajectoryError(f"{self.joints[joint]} would leave its range")
         return times, positions, velocities
 
     def stop(self, now: float, acceleration: Array) -> None:
@@ -178,8 +182,8 @@ class Controller:
 def _matrix(rows: Sequence[Sequence[float]], n: int, what: str) -> Array:
     """``(k, n)`` finite numbers."""
     if any(len(row) != n for row in rows):
-        raise RefusedError(f"{what}: a point has not {n} numbers")
+        raise RefusedTrajectoryError(f"{what}: a point has not {n} numbers")
     matrix = np.array([list(row) for row in rows], float)
     if not np.all(np.isfinite(matrix)):
-        raise RefusedError(f"{what}: not every number is finite")
+        raise RefusedTrajectoryError(f"{what}: not every number is finite")
     return matrix

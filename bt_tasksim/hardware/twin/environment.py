@@ -8,16 +8,16 @@ import sys
 import sysconfig
 from pathlib import Path
 
-from bt_tasksim.errors import MachineError
-from bt_tasksim.resources import asset
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.resources import HOME
 
 FOLDER = ".twin"
 MAKER = Path("tools") / "make_twin.py"
 
 
 def root() -> Path:
-    """The folder that holds the packages, and in a checkout the tools."""
-    return asset().parent
+    """The folder that holds the package, and in a checkout the tools."""
+    return HOME.parent
 
 
 def environment(build: bool = False) -> Path:

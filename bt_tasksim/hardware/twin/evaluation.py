@@ -1,10 +1,13 @@
 """The evaluation channel of the twin: set a world, inject a fault, read the truth. JSON lines over TCP.
 
 It has nothing to do with ROS: trees, policies and engines never see it. The node answers between two steps.
+A client's first line is a secret that the twin's starter and its node share: any page in a browser of this
+machine may post to a port of it, but does not know that line.
 """
 
 from __future__ import annotations
 
+import hmac
 import json
 import queue
 import socket
@@ -15,12 +18,16 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.errors import MachineError
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.world import Hidden
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.world import Hidden
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 LONGEST = 4_000_000
 """Bytes of a line."""
+SECRET = "BT_TASKSIM_TWIN_SECRET"
+"""Environment variable that hands on the secret; a command line is seen by everybody."""
+GREETING = 5.0
+"""Seconds within which a client says the secret."""
 
 
 class EvaluationServer:
@@ -28,12 +35,16 @@ class EvaluationServer:
 
     Args:
         port: Its port; 0 for a free one.
+        secret: The first line of every client that is listened to.
 
     Attributes:
         port: The port.
     """
 
-    def __init__(self, port: int = 0) -> None:
+    def __init__(self, port: int, secret: str) -> None:
+        if len(secret) < 16:
+            raise ValueError("a secret of the evaluation channel has at least 16 characters")
+        self._secret = secret.encode()
         self._listening = socket.create_server(("127.0.0.1", port))
         self.port = int(self._listening.getsockname()[1])
         self._questions: queue.SimpleQueue[tuple[dict[str, Any], socket.socket]] = queue.SimpleQueue()
@@ -69,9 +80,13 @@ class EvaluationServer:
             threading.Thread(target=self._read, args=(peer,), daemon=True).start()
 
     def _read(self, peer: socket.socket) -> None:
-        """Questions of one client, until it goes away or writes what is none."""
+        """Questions of one client that knows the secret, until it goes away."""
         try:
             with peer, peer.makefile("rb") as lines:
+                peer.settimeout(GREETING)
+                if not hmac.compare_digest(lines.readline(len(self._secret) + 2).strip(), self._secret):
+                    return
+                peer.settimeout(None)
                 while line := lines.readline(LONGEST):
                     try:
                         question = json.loads(line)
@@ -94,14 +109,16 @@ class EvaluationClient:
 
     Args:
         port: Port of the twin's evaluation channel, on this machine.
+        secret: The twin's, see `EvaluationServer`.
 
     Raises:
         MachineError: There is no twin.
     """
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, secret: str) -> None:
         try:
             self._socket = socket.create_connection(("127.0.0.1", port), 30.0)
+            self._socket.sendall(secret.encode() + b"\n")
         except OSError as error:
             raise MachineError(f"no twin answers at evaluation port {port}: {error}") from error
         self._lines = self._socket.makefile("rb")

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 
-from bt_tasksim import poses
-from bt_tasksim.data_file import check_keys, number, positive, vector
-from bt_tasksim.errors import InputError
-from bt_tasksim.poses import Array
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import Drive, RobotDescription
-from bt_tasksim.scene import ActorConfiguration
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.resources import asset
+from bt_tasksim.core.typed_file import load_typed
+from bt_tasksim.hardware.twin.gap_schema import GapFile
+from bt_tasksim.robot.description import Drive, RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 _FACTORS = ("object_mass", "object_friction", "pad_friction", "drive_stiffness", "drive_damping")
 _SIZES = ("joint_position", "joint_velocity", "joint_effort", "tip_force", "state_latency", "command_latency")
 _RATES = ("control_rate", "object_rate", "camera_rate")
-_WRENCH = ("force", "torque", "force_bias", "torque_bias")
-_POSE = ("position", "rotation", "position_bias", "rotation_bias")
 
 
 @dataclass(frozen=True)
@@ -80,42 +75,17 @@ def load_gap(file: str = "") -> Gap:
     Raises:
         InputError: It lacks or misstates something.
     """
-    path = Path(file) if file else asset("twin", "gap.yaml")
-    try:
-        data: Any = yaml.safe_load(path.read_text())
-        needed: dict[str, Any] = dict.fromkeys((*_FACTORS, *_SIZES, *_RATES))
-        check_keys(
-            data, "", {**needed, "wrench": dict.fromkeys(_WRENCH), "object_pose": dict.fromkeys(_POSE)}
-        )
-        factors = {name: _range(data[name], name) for name in _FACTORS}
-        sizes = {name: _size(data[name], name) for name in _SIZES}
-        rates = {name: round(positive(data[name], name)) for name in _RATES}
-        if 1000 % rates["control_rate"]:
-            raise InputError(f"control_rate should divide 1000, found {rates['control_rate']}")
-        return Gap(
-            factors,
-            sizes,
-            rates,
-            {key: _size(data["wrench"][key], f"wrench.{key}") for key in _WRENCH},
-            {key: _size(data["object_pose"][key], f"object_pose.{key}") for key in _POSE},
-        )
-    except yaml.YAMLError as error:
-        raise InputError(f"'{path}' is not YAML: {' '.join(str(error).split())}") from error
-    except (InputError, OSError) as error:
-        raise InputError(f"the twin's file '{path}': {error}") from error
-
-
-def _range(values: Any, what: str) -> tuple[float, float]:
-    low, high = vector(values, 2, what).tolist()
-    if not 0.0 < low <= high:
-        raise InputError(f"{what} should be two factors above 0, the lower one first, found {values!r}")
-    return low, high
-
-
-def _size(value: Any, what: str) -> float:
-    if number(value, what) < 0.0:
-        raise InputError(f"{what} should not be negative, found {value!r}")
-    return float(value)
+    content, document = load_typed(GapFile, file or asset("twin", "gap.yaml"), "the twin's file")
+    if 1000 % content.control_rate:
+        raise document.named(("control_rate",), f"should divide 1000, found {content.control_rate}")
+    values = content.model_dump()
+    return Gap(
+        {name: values[name] for name in _FACTORS},
+        {name: values[name] for name in _SIZES},
+        {name: values[name] for name in _RATES},
+        values["wrench"],
+        values["object_pose"],
+    )
 
 
 def displaced(pose: Array, error: Array) -> Array:

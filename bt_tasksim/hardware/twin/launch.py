@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import secrets
 import select
 import shutil
 import socket
@@ -15,17 +16,23 @@ import time
 from pathlib import Path
 from typing import IO, Any
 
-import yaml
-
-from bt_tasksim.engines.ros.setting import load_setting
-from bt_tasksim.engines.ros.websocket import WebSocket
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.interrupts import ending
-from bt_tasksim.robot import RobotDescription
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.twin.environment import bridge_binary, bridge_variables, environment, root, ros_variables
-from bt_tasksim.twin.gap import load_gap
-from bt_tasksim.twin.orphans import note_bridge
+from bt_tasksim.core.document import read_document
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.interrupts import ending
+from bt_tasksim.hardware.ros.setting import load_setting
+from bt_tasksim.hardware.ros.websocket import WebSocket
+from bt_tasksim.hardware.twin.bridge_cleanup import note_bridge
+from bt_tasksim.hardware.twin.environment import (
+    bridge_binary,
+    bridge_variables,
+    environment,
+    root,
+    ros_variables,
+)
+from bt_tasksim.hardware.twin.evaluation import SECRET
+from bt_tasksim.hardware.twin.gap import load_gap
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 START = 30.0
 """Longest time in seconds that a process may take to start."""
@@ -80,18 +87,19 @@ class Twin:
         self.domain, self._log, self._heard = domain, log, setting.wrench.topic
         self.port = port or free_port()
         self.evaluation_port = evaluation_port or free_port()
+        self.secret = secrets.token_hex(16)
         self._home = Path(tempfile.mkdtemp(prefix="bt-tasksim-twin-"))
         self.bridge: subprocess.Popen[Any] | None = None
         self.node: subprocess.Popen[Any] | None = None
         self.camera: subprocess.Popen[Any] | None = None
         robot_file = self._home / "robot.yaml"
-        robot_file.write_text(_with_urdf(robot))
+        robot_file.write_text(_with_urdf(robot, self._home))
         world = self._home / "configuration.json"
         world.write_text(configuration.to_json())
         self._command = [
             str(self._python / "bin" / "python"),
             "-m",
-            "bt_tasksim.twin.node",
+            "bt_tasksim.hardware.twin.node",
             *("--robot", str(robot_file), "--ros", str(setting.source), "--configuration", str(world)),
             *("--seed", str(seed), "--evaluation-port", str(self.evaluation_port)),
             *(("--gap", os.path.abspath(gap)) if gap else ()),
@@ -142,7 +150,7 @@ class Twin:
         """
         self.node = subprocess.Popen(
             self._command,
-            env=ros_variables(self.domain),
+            env={**ros_variables(self.domain), SECRET: self.secret},
             stdout=subprocess.PIPE,
             stderr=self._log,
             start_new_session=True,
@@ -175,11 +183,11 @@ class Twin:
         """
         self.camera = subprocess.Popen(
             [
-                *(sys.executable, "-m", "bt_tasksim.twin.camera", "--robot", robot, "--ros", ros),
+                *(sys.executable, "-m", "bt_tasksim.hardware.twin.camera", "--robot", robot, "--ros", ros),
                 *("--port", str(self.port), "--evaluation-port", str(self.evaluation_port)),
                 *("--rate", str(rate)),
             ],
-            env={**os.environ, "PYTHONPATH": str(root())},
+            env={**os.environ, "PYTHONPATH": str(root()), SECRET: self.secret},
             stdout=subprocess.PIPE,
             stderr=self._log,
             start_new_session=True,
@@ -243,8 +251,9 @@ def free_port() -> int:
         return int(server.getsockname()[1])
 
 
-def _with_urdf(robot: RobotDescription) -> str:
-    """The robot's data file with the path of its URDF written out: the twin has no simulator's package."""
-    data = yaml.safe_load(robot.source.read_text())
-    data["urdf"] = os.fspath(robot.urdf)
-    return json.dumps(data)
+def _with_urdf(robot: RobotDescription, home: Path) -> str:
+    """The robot's data file with its URDF by a link beside it: the twin has no simulator's package."""
+    (home / "urdf").symlink_to(robot.urdf.parent)
+    data = read_document(robot.source, "robot file").value
+    assert isinstance(data, dict)
+    return json.dumps({**data, "urdf": f"urdf/{robot.urdf.name}"})

@@ -1,6 +1,6 @@
 """The twin as a ROS 2 node: the topics of a robot's cell. Runs in the twin's own virtual environment.
 
-``python -m bt_tasksim.twin.node --robot FILE --ros FILE --configuration FILE`` prints one line with
+``python -m bt_tasksim.hardware.twin.node --robot FILE --ros FILE --configuration FILE`` prints one line with
 ``ready PORT``, the port of the evaluation channel, and goes on until it is stopped. One thread runs physics
 in real time and takes messages between two steps (`loop`); steps that are late are caught up with, up to a
 tenth of a second.
@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
+import secrets
 import signal
 import sys
 import time
@@ -28,18 +30,18 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from trajectory_msgs.msg import JointTrajectory
 
-from bt_tasksim.engines.ros.setting import RosSetting, load_setting
-from bt_tasksim.errors import BtTasksimError, InputError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import ActorConfiguration
-from bt_tasksim.twin import loop
-from bt_tasksim.twin.button import Button
-from bt_tasksim.twin.cell import NEVER, Cell, Readings
-from bt_tasksim.twin.controller import MOST_POINTS, RefusedError, Trajectory
-from bt_tasksim.twin.evaluation import EvaluationServer, hidden_to_json
-from bt_tasksim.twin.gap import load_gap
-from bt_tasksim.twin.orphans import clear_up, is_orphan
+from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.hardware.ros.setting import RosSetting, load_setting
+from bt_tasksim.hardware.twin import loop
+from bt_tasksim.hardware.twin.bridge_cleanup import clear_up, parent_has_ended
+from bt_tasksim.hardware.twin.button import ReleaseAnnouncer
+from bt_tasksim.hardware.twin.cell import NEVER, Cell, Readings
+from bt_tasksim.hardware.twin.controller import MOST_POINTS, RefusedTrajectoryError, Trajectory
+from bt_tasksim.hardware.twin.evaluation import SECRET, EvaluationServer, hidden_to_json
+from bt_tasksim.hardware.twin.gap import load_gap
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.configuration import ActorConfiguration
 
 SENSOR_FAULTS = ("silent", "frozen", "delayed", "nan", "order")
 DELAY = 0.3
@@ -69,7 +71,7 @@ class TwinNode(Node):  # type: ignore[misc]
             subscribe(String, setting.begin, lambda m: self.cell.begin(m.data[:64]), 10)
         if setting.hold:
             subscribe(String, setting.hold, lambda m: self.cell.hold(m.data[:400]), 10)
-        self._button = Button(setting.emergency_every)
+        self._button = ReleaseAnnouncer(setting.emergency_every)
         subscribe(Bool, setting.emergency_stop, self._press, 10)
         self._stop = publish(Bool, setting.emergency_stop, 10)
         self._joints = publish(JointState, setting.joint_states, 10)
@@ -92,7 +94,7 @@ class TwinNode(Node):  # type: ignore[misc]
         def take(message: JointTrajectory) -> None:
             try:
                 if len(message.points) > MOST_POINTS:
-                    raise RefusedError(f"{len(message.points)} points, more than {MOST_POINTS}")
+                    raise RefusedTrajectoryError(f"{len(message.points)} points, more than {MOST_POINTS}")
                 self.cell.command(
                     group,
                     Trajectory(
@@ -103,7 +105,7 @@ class TwinNode(Node):  # type: ignore[misc]
                         run=message.header.frame_id,
                     ),
                 )
-            except RefusedError as error:
+            except RefusedTrajectoryError as error:
                 self.say(f"{group}: a trajectory is refused: {error}", group)
 
         return take
@@ -238,7 +240,7 @@ def run(node: TwinNode, server: EvaluationServer, parent: int) -> None:
 
     def going() -> bool:
         server.answer(node.answer)
-        return bool(rclpy.ok()) and not is_orphan(parent)
+        return bool(rclpy.ok()) and not parent_has_ended(parent)
 
     loop.run(node.cell.period, going, executor.spin_once, node.step, node.leave_out)
 
@@ -288,7 +290,9 @@ def main() -> int:
         gap = load_gap(options.gap)
         announced, sensor = bool(setting.begin), setting.wrench.pose
         cell = Cell(robot, gap, configuration, options.seed, announced=announced, sensor=sensor)
-        server = EvaluationServer(options.evaluation_port)
+        server = EvaluationServer(
+            options.evaluation_port, os.environ.pop(SECRET, "") or secrets.token_hex(16)
+        )
     except (BtTasksimError, OSError) as error:
         print(f"twin: {error}", file=sys.stderr)
         return 2
@@ -306,7 +310,7 @@ def main() -> int:
         server.close()
         node.destroy_node()
         rclpy.try_shutdown()
-        if options.home and is_orphan(options.parent):
+        if options.home and parent_has_ended(options.parent):
             clear_up(Path(options.home))
     return 0
 

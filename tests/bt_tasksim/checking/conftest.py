@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bt_tasksim import poses
-from bt_tasksim.checking.command import check_concept
+from bt_tasksim.checking.concept_file import check_concept
 from bt_tasksim.checking.recording import Recording
-from bt_tasksim.checking.situations import Decision
-from bt_tasksim.context import Seen
-from bt_tasksim.world import Hidden
+from bt_tasksim.checking.situations import RecordedDecision
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.core import poses
+from bt_tasksim.core.world import Hidden
 
 
 def hidden_of(observation, closure=0.0):
@@ -59,7 +59,7 @@ def decisions(toy):
                 except Exception:
                     memory = None
             hidden = hidden_of(observation, 0.1 * k)
-            found.append(Decision(leaf, seen, memory, hidden, hidden_of(first), k == 0))
+            found.append(RecordedDecision(leaf, seen, memory, hidden, hidden_of(first), k == 0))
         return found
 
     return make

@@ -6,17 +6,19 @@ from pathlib import Path
 
 import pytest
 
-from bt_tasksim.checking import command
+from bt_tasksim.checking import concept_file as command
 from bt_tasksim.checking.findings import ERROR, Finding
-from bt_tasksim.cli import main
-from bt_tasksim.resources import asset
+from bt_tasksim.cli.main import main
+from bt_tasksim.core.resources import asset
+
+pytestmark = pytest.mark.physical
 
 ROOT = asset().parent
 MOVE = '''
 from bt_tasksim import ConceptModel, Scene
-from bt_tasksim.parameters import ObjectName
-from bt_tasksim.world import Command
-from trees import sequence
+from bt_tasksim.concept.parameters import ObjectName
+from bt_tasksim.core.world import Command
+from bt_tasksim.trees import sequence
 
 class Nudge(ConceptModel):
     """Hold still at the target."""

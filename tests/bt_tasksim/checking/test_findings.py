@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from bt_tasksim import poses
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.parameters import Metres, ObjectName, Radians
-from bt_tasksim.poses import array_namespace
-from bt_tasksim.world import Command
+from bt_tasksim.concept.functions import ConceptFunctions
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Metres, ObjectName, Radians
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import array_namespace
+from bt_tasksim.core.world import Command
 
 calls: list[int] = []
 
@@ -123,9 +124,21 @@ def own_dice(self, seen, memory):
     return poses.norm(seen.tool[..., :3]) + np.random.default_rng().random()
 
 
+def begin_on_seen(self, seen):
+    seen.tool[..., 2] += 1.0
+    return Memory(seen.tool)
+
+
+def begin_on_self(self, seen):
+    self.count = getattr(self, "count", 0) + 1
+    return Memory(seen.tool)
+
+
 @pytest.mark.parametrize(
     ("name", "function", "words"),
     [
+        ("begin", begin_on_seen, "changes what it is shown in 'seen'; work on a copy"),
+        ("begin", begin_on_self, "changes its own leaf or class; keep nothing on self"),
         ("done", change_seen, "changes what it is shown in 'seen'; work on a copy"),
         ("done", change_memory, "changes the memory it is given; return a new one from advance"),
         ("done", change_self, "changes its own leaf or class; keep nothing on self"),
@@ -293,7 +306,7 @@ def scaled(factor, part):
         ("necessary_cost", lambda self, seen, memory: seen.tool[..., 2] - 9.0, "never negative"),
         ("sufficient_cost", lambda self, k, memory: k.hidden.objects[..., 0, 0] * np.inf, "gives inf"),
         ("features", lambda self, seen, memory: [][0], "raises IndexError: list index out of range"),
-        ("explain", lambda self, seen, memory: 3, "gives a int; give a sentence"),
+        ("explain", lambda self, seen, memory: 3, "gives a int; give a Form"),
         ("initial_state", lambda self, seen: False, "gives False"),
         ("begin", lambda self, seen: seen.nothing, "raises AttributeError"),
     ],
@@ -375,7 +388,7 @@ def test_what_a_learner_lacks(found):
     assert any(
         "layout" in line and "is missing" in line for line in found(broken(layout=ConceptModel.layout))
     )
-    lines = found(broken(features=ConceptModel.features, layout=ConceptModel.__dict__["layout"]))
+    lines = found(broken(features=ConceptModel.features, layout=ConceptFunctions.__dict__["layout"]))
     assert any("nothing to learn from" in line for line in lines)
     assert any("says that nothing is unknown" in line for line in found(broken(is_task_model=True)))
     lines = found(broken(is_programmed=False, is_task_model=True))

@@ -5,12 +5,13 @@ import pytest
 from py_trees.behaviours import Failure
 from py_trees.common import Status
 
-from bt_tasksim.context import Context
-from bt_tasksim.errors import CommandConflictError, InputError, LeafError
-from bt_tasksim.robot import load_robot
-from bt_tasksim.world import Command
-from concept_nodes import Grasp, TimePassed
-from trees import fallback, parallel, reactive_fallback, sequence
+from bt_tasksim.concept.context import Context
+from bt_tasksim.concept_nodes import Grasp, TimePassed
+from bt_tasksim.core.errors import CommandConflictError, InputError, LeafError
+from bt_tasksim.core.outcomes import INTERRUPTED, TIMED_OUT
+from bt_tasksim.core.world import Command
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.trees import fallback, parallel, reactive_fallback, sequence
 
 TOOL, HAND = Command(tool=np.arange(7.0)), Command(hand=np.array([0.3]))
 
@@ -80,7 +81,7 @@ def test_the_same_later_on_and_with_the_hand(toy, act):
     stage.tick(3)
     assert first.status == Status.RUNNING
     stage.runner.tick()
-    assert watch.feedback_message.startswith("not done within 0.12 s")
+    assert watch.outcome.is_a(TIMED_OUT) and watch.outcome.numbers == {"limit": 0.12}
     assert stage.context.command.tool[2] == 0.3
     assert stage.context.command.hand is None, (
         "the interrupted leaf's hand target is dropped: it keeps its last"
@@ -94,7 +95,7 @@ def test_a_reactive_node_that_switches_leaves_one_command(toy, act):
     stage.tick(2)
     assert early.status == Status.RUNNING
     stage.runner.tick()
-    assert early.status == Status.INVALID and early.feedback_message == "interrupted"
+    assert early.status == Status.INVALID and early.outcome.is_a(INTERRUPTED)
     assert late.status == Status.RUNNING and stage.context.command.tool[2] == 0.3
 
 
@@ -123,7 +124,7 @@ def test_a_leaf_without_a_context_says_what_to_do():
         InputError, match=r"leaf 'grasp cup' needs a context: run the tree with bt_tasksim.run"
     ):
         Grasp("cup").setup()
-    with pytest.raises(RuntimeError, match="leaf 'grasp cup' was ticked before it was set up"):
+    with pytest.raises(RuntimeError, match="'grasp cup' was ticked before it was set up"):
         Grasp("cup").tick_once()
 
 

@@ -4,11 +4,21 @@ import errno
 import os
 import resource
 import signal
+import subprocess
+import sys
 
 import pytest
 
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.files import check_folder, whole_file, whole_folder, write_bytes, write_text
+from bt_tasksim.core import files
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.files import (
+    check_folder,
+    check_writable,
+    whole_file,
+    whole_folder,
+    write_bytes,
+    write_text,
+)
 
 
 def names(folder):
@@ -156,3 +166,82 @@ def test_rename_that_fails_half_way_brings_the_old_folder_back(tmp_path, monkeyp
     with pytest.raises(MachineError, match="No space left"), whole_folder(tmp_path / "run", {"a"}) as folder:
         (folder / "a").write_text("new")
     assert names(tmp_path) == ["run"] and (tmp_path / "run" / "a").read_text() == "old"
+
+
+WRITING = """
+import sys, time
+from pathlib import Path
+from bt_tasksim.core.files import whole_file, whole_folder
+kind, path = sys.argv[1:]
+with (whole_folder(path, ["a.txt"]) if kind == "folder" else whole_file(path)) as inside:
+    (inside / "a.txt" if kind == "folder" else inside).write_text("half")
+    print("writing", flush=True)
+    time.sleep(60)
+"""
+
+
+def writing(kind, path):
+    """A process that writes a file or a folder and does not come to an end."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", WRITING, kind, str(path)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    assert process.stdout.readline() == b"writing\n"
+    return process
+
+
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_what_a_killed_process_left_is_cleared_by_the_next_one(tmp_path, kind):
+    path = tmp_path / "one.d"
+    process = writing(kind, path)
+    other = writing(kind, path)
+    process.kill()
+    process.wait()
+    assert len(os.listdir(tmp_path)) == 2
+    if kind == "folder":
+        with whole_folder(path):
+            assert len(os.listdir(tmp_path)) == 2  # the other process's, and this one's
+    else:
+        write_text(path, "whole")
+    assert len(os.listdir(tmp_path)) == 2
+    other.kill()
+    other.wait()
+    write_text(tmp_path / "two.d", "another name clears nothing")
+    assert len(os.listdir(tmp_path)) == 3
+    process.stdout.close()
+    other.stdout.close()
+
+
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_sigterm_clears_up(tmp_path, kind):
+    process = writing(kind, tmp_path / "one")
+    process.terminate()
+    process.wait(10)
+    process.stdout.close()
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_folder_that_was_moved_away_by_a_killed_process_comes_back(tmp_path):
+    path = tmp_path / "one"
+    with whole_folder(path) as inside:
+        (inside / "a.txt").write_text("mine")
+    killed = subprocess.Popen([sys.executable, "-c", ""])
+    killed.wait()
+    files._beside(path, files._OLD)
+    path.rename(tmp_path / files._beside(path, files._OLD).name.replace(str(os.getpid()), str(killed.pid)))
+    with pytest.raises(InputError, match="other things"), whole_folder(path, ["b.txt"]):
+        pass
+    assert (path / "a.txt").read_text() == "mine"
+
+
+def test_a_folder_of_a_files_name_is_no_such_file(tmp_path):
+    (tmp_path / "one" / "run.h5").mkdir(parents=True)
+    with pytest.raises(InputError, match=r"a folder named run\.h5"):
+        check_folder(tmp_path / "one", ["run.h5"])
+
+
+def test_whether_a_file_can_be_written_is_known_beforehand(tmp_path):
+    check_writable(tmp_path / "a.json")
+    for path in (tmp_path / "no" / "a.json", tmp_path):
+        with pytest.raises(InputError):
+            check_writable(path)
+    assert os.listdir(tmp_path) == []

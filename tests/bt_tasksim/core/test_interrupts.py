@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from bt_tasksim.errors import Terminated
-from bt_tasksim.interrupts import ending, held_back, terminable
+from bt_tasksim.core.errors import Terminated
+from bt_tasksim.core.interrupts import ending, held_back, terminable
 
 
 def wait_and_say(pipe):

@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from bt_tasksim import poses
+from bt_tasksim.core import poses
 
 torch = pytest.importorskip("torch")
 
@@ -200,3 +200,27 @@ def test_yaw_and_pose():
     assert np.allclose(poses.rotate(poses.yaw(np.pi / 2), np.array([1.0, 0, 0])), [0, 1, 0])
     assert poses.pose([1, 2, 3]).tolist() == [1, 2, 3, 1, 0, 0, 0]
     assert poses.pose([1, 2, 3]).dtype == float
+
+
+# ---- axes -------------------------------------------------------------------------------------------------
+
+
+@law
+@given(quaternions(), quaternions())
+def test_tilt_is_the_angle_between_z_axes_whatever_the_heading(a, b):
+    up = poses.z_axis(a)
+    assert np.abs(up - scipy_rotation(a).as_matrix()[:, 2]).max() < TIGHT
+    angle = np.arccos(np.clip(up[2], -1.0, 1.0))
+    assert float(poses.tilt(a)) == pytest.approx(angle, abs=1e-7)
+    between = np.arccos(np.clip(poses.z_axis(b) @ up, -1.0, 1.0))
+    assert float(poses.tilt(a, b)) == pytest.approx(between, abs=1e-7)
+    turned = poses.quat_multiply(a, poses.yaw(1.3))
+    assert float(poses.tilt(turned)) == pytest.approx(float(poses.tilt(a)), abs=1e-7)
+    both, others = np.stack([a, b]), np.stack([b, a])
+    assert poses.tilt(both, others) == pytest.approx([between, between], abs=1e-7)
+    assert poses.tilt(torch.from_numpy(both)).numpy() == pytest.approx(poses.tilt(both), abs=1e-12)
+
+
+def test_a_pose_of_a_few_digits_is_brought_to_unit_length():
+    pose = poses.unit_pose([1, 2, 3, 0.707, 0.707, 0.0, 0.0])
+    assert pose[:3].tolist() == [1, 2, 3] and np.linalg.norm(pose[3:]) == pytest.approx(1.0, abs=1e-15)

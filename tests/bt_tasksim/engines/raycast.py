@@ -4,18 +4,24 @@ import dataclasses
 
 import numpy as np
 
-from bt_tasksim import poses
+from bt_tasksim.core import poses
 from bt_tasksim.engines.cameras import CAMERAS, unproject
-from bt_tasksim.engines.pipeline import Image
+from bt_tasksim.engines.images import Image
 
 CAMERA = dataclasses.replace(CAMERAS["scene"], size=(480, 360)).model("scene")
 TABLE = (0.80, 0.72, 0.60)
 
 
+def cloud(camera, depth):
+    """Points ``(height, width, 3)``, base frame, of a depth image ``(height, width)``."""
+    rows, columns = np.mgrid[0 : camera.height, 0 : camera.width]
+    return unproject(camera, rows, columns, depth)
+
+
 def rays():
     """Directions ``(height, width, 3)`` that reach depth 1, base frame."""
     ones = np.ones((CAMERA.height, CAMERA.width))
-    return unproject(CAMERA, ones) - CAMERA.pose[:3]
+    return cloud(CAMERA, ones) - CAMERA.pose[:3]
 
 
 def box(pose, size):

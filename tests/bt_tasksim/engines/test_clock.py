@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_tasksim import pacing
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.pacing import GRACE, FreeClock, RealTimeClock, Timing, next_tick
-from bt_tasksim.runner import Runner
-from trees.load import load_source
+from bt_tasksim.engines import clock as pacing
+from bt_tasksim.engines.clock import GRACE, FreeClock, RealTimeClock, Timing, next_tick
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.trees.load import load_source
 
 
 @pytest.mark.parametrize(

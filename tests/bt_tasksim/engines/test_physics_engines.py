@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from physics_cases import PHYSICS, G, Still, holding, lifted, scene
 
-from bt_tasksim import poses
-from bt_tasksim.engines.pipeline import PhysicsEngine
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import Scene
-from bt_tasksim.world import Command, JointTarget
+from bt_tasksim.core import poses
+from bt_tasksim.core.world import Command, JointTarget
+from bt_tasksim.engines.base import PhysicsEngine
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
 
 KINDS = ("box", "cube", "cup", "cylinder", "oval", "diamond")
 
-pytestmark = pytest.mark.parametrize("engine", PHYSICS)
+pytestmark = [pytest.mark.physical, pytest.mark.parametrize("engine", PHYSICS)]
 
 
 # ---- resting and falling ----------------------------------------------------------------------------------
@@ -57,7 +57,7 @@ def test_a_falling_object_obeys_gravity_in_fine_steps(engine):
 @pytest.mark.parametrize("kind", ["box", "cup", "diamond"])
 def test_a_landing_is_no_deeper_than_two_millimetres(engine, kind):
     still = Still(lifted(scene(kind).sample(1), 0.25, turn=(0.5, 0.3, 0.0)), engine)
-    still.step(40)
+    still.step(80)
     assert 0 < still.physics.hidden().penetration < 0.002
     assert np.linalg.norm(still.physics.hidden().velocities[0, :3]) < 0.05
 
@@ -143,7 +143,8 @@ def test_effort_is_the_drives_own_law(engine):
         state = runner.pipeline.physics.step(target)
         law = k * (target.position - state.joint_position) + d * (target.velocity - state.joint_velocity)
         assert np.any(np.abs(law) > limit) == limited
-        assert np.allclose(state.joint_effort, np.clip(law, -limit, limit))
+        off = np.abs(state.joint_effort - np.clip(law, -limit, limit))
+        assert np.all(off < 2e-6 * k + 1e-5), "as exact as targets are (see `perturbation`)"
 
 
 def test_fingers_that_press_shut_feel_it(engine):
@@ -158,8 +159,8 @@ def test_fingers_that_press_shut_feel_it(engine):
 
 def test_a_disturbance_pushes_the_object_out_of_the_hand(engine):
     undisturbed = holding("box", 0.2, engine=engine)
-    disturbed = holding("box", 0.2, engine=engine, knock="thing")
-    delay = disturbed.scene.sample(0).disturbance.delay
+    disturbed = holding("box", 0.2, engine=engine, disturbed="thing")
+    delay = 1.6  # seconds, the longest that is drawn
     forces = {}
     for name, runner in (("undisturbed", undisturbed), ("disturbed", disturbed)):
         forces[name] = []

@@ -3,27 +3,23 @@
 import numpy as np
 import pytest
 
-from bt_tasksim.engines.pipeline import (
-    CameraModel,
-    EnginePipeline,
-    Image,
-    KinematicsEngine,
-    PhysicsEngine,
-    PostProcessEngine,
-    RenderingEngine,
-)
-from bt_tasksim.engines.registry import EngineOptions, build_pipeline
-from bt_tasksim.robot import load_robot
-from bt_tasksim.world import Command
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.world import Command
+from bt_tasksim.engines.base import KinematicsEngine, PhysicsEngine, PostProcessEngine, RenderingEngine
+from bt_tasksim.engines.images import CameraModel, Image
+from bt_tasksim.engines.pipeline import EnginePipeline
+from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
+from bt_tasksim.robot.description import load_robot
 
 CAMERA = CameraModel("front", 4, 3, np.eye(3), np.array([0, 0, 1.0, 1, 0, 0, 0]))
 
 
-class Engines:
+class Engines(KinematicsEngine, PhysicsEngine, RenderingEngine, PostProcessEngine):
     """All four roles in one, which note what is asked of them."""
 
     def __init__(self, wants=()):
         self.calls, self.wants, self.solved, self.n = [], wants, [], 0
+        self.curious = False
 
     def reset(self, configuration, model=None):
         self.calls.append("reset")
@@ -47,8 +43,8 @@ class Engines:
         self.calls.append(f"rendering {camera} of {state}{' with depth' if depth else ''}")
         return Image(CAMERA, np.zeros((3, 4, 3), np.uint8), None)
 
-    def cameras(self, needed):
-        return tuple(self.wants) if needed else ()
+    def cameras(self, first):
+        return tuple(self.wants) if first or self.curious else ()
 
     def observe(self, state, images):
         self.calls.append("post-process")
@@ -86,7 +82,8 @@ def pipeline(engines):
 
 
 def test_the_order_is_kinematics_physics_rendering_post_process(engines, pipeline):
-    observation = pipeline.step(Command(tool=np.zeros(7)), look=True)
+    engines.curious = True
+    observation = pipeline.step(Command(tool=np.zeros(7)))
     assert engines.calls == ["kinematics", "physics", "rendering front of state 1 with depth", "post-process"]
     assert observation == ("state 1", ["front"])
     assert engines.solved[0][1] == "state 0", "kinematics starts from the state before"
@@ -138,6 +135,35 @@ def test_close_reaches_every_engine_that_can(engines):
     assert closed == [a, b]
 
 
+def test_what_an_engine_does_not_write_has_a_default():
+    class Perception(PostProcessEngine):
+        def reset(self, configuration, model): ...
+        def observe(self, state, images):
+            return state
+
+    class Physics(PhysicsEngine):
+        def reset(self, configuration):
+            return "state"
+
+        def step(self, target):
+            return "next"
+
+    class Kinematics(KinematicsEngine):
+        def solve(self, command, state):
+            return "target"
+
+    line = EnginePipeline(Kinematics(), Physics(), Perception())
+    assert line.reset(None, None) == "state" and line.step(Command()) == "next"
+    assert line.hidden() is None and line.unseen() == {} and line.served == {}
+    assert not line.real and line.hold_delivered
+    line.stop("the run is over")
+    line.close()
+    with pytest.raises(MachineError, match="Kinematics cannot tell with which joints"):
+        line.kinematics.joints_of_hand_start((0.5, 0.0, 0.2, 0.0))
+    with pytest.raises(TypeError, match="abstract"):
+        PhysicsEngine()
+
+
 def test_the_bundled_engines_play_their_roles():
     line = build_pipeline(load_robot("panda"), EngineOptions())
     assert isinstance(line.kinematics, KinematicsEngine) and isinstance(line.physics, PhysicsEngine)
@@ -148,15 +174,15 @@ def test_the_bundled_engines_play_their_roles():
 
 def test_another_physics_engine_fits_in():
     """A physics engine without dynamics: joints are where they are told to be."""
-    from bt_tasksim.runner import Runner
-    from bt_tasksim.scene import Scene
-    from concept_nodes import Release
+    from bt_tasksim.concept_nodes import Release
+    from bt_tasksim.execution.runner import Runner
+    from bt_tasksim.scene.scene import Scene
 
     robot = load_robot("panda")
     line = build_pipeline(robot, EngineOptions())
     sapien = line.physics
 
-    class Ideal:
+    class Ideal(PhysicsEngine):
         def reset(self, configuration):
             import dataclasses
 
@@ -179,9 +205,6 @@ def test_another_physics_engine_fits_in():
                 tool_pose=q[[0, 1, 2, 6, 3, 4, 5]],
             )
             return self.state
-
-        def hidden(self):
-            return None
 
     line.physics = Ideal()
     result = Runner(Release("cup", retreat=0.1), Scene(objects={"cup": "on table"}), pipeline=line).run(0)

@@ -4,13 +4,15 @@ import sys
 
 import pytest
 
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.engines.physics_mujoco import MujocoPhysics
-from bt_tasksim.engines.physics_sapien import SapienPhysics
-from bt_tasksim.engines.postprocess_state import StatePostProcess
-from bt_tasksim.engines.registry import ROLES, EngineOptions, build_engine, build_pipeline
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.robot import load_robot
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.registry import parts
+from bt_tasksim.engines.base import ROLES
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.engines.perception.state import StatePostProcess
+from bt_tasksim.engines.physics.mujoco import MujocoPhysics
+from bt_tasksim.engines.physics.sapien import SapienPhysics
+from bt_tasksim.execution.pipelines import EngineOptions, build_engine, build_pipeline
+from bt_tasksim.robot.description import load_robot
 
 
 def test_the_default_is_sapien_with_fine_noise_and_no_images():
@@ -47,17 +49,18 @@ def test_results_say_which_perception_it_was(options, label):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"engines": "mujocco"}, r"unknown engines 'mujocco'; did you mean 'mujoco'\?"),
-        ({"engines": "sapiens"}, r"unknown engines 'sapiens'; did you mean 'sapien'\?"),
-        ({"perception": "camra"}, r"unknown perception 'camra'; did you mean 'camera'\?"),
+        ({"engines": "mujocco"}, r"unknown physics engine 'mujocco'; did you mean 'mujoco'\?"),
+        ({"engines": "sapiens"}, r"unknown physics engine 'sapiens'; did you mean 'sapien'\?"),
+        ({"perception": "camra"}, r"unknown postprocess engine 'camra'; did you mean 'camera'\?"),
         ({"noise": "nome"}, r"unknown noise model 'nome'; did you mean 'none'\?"),
-        ({"kinematics": "pinochio"}, r"unknown kinematics 'pinochio'; did you mean 'pinocchio'\?"),
-        ({"renderer": "sapient"}, r"unknown rendering 'sapient'; did you mean 'sapien'\?"),
+        ({"kinematics": "pinochio"}, r"unknown kinematics engine 'pinochio'; did you mean 'pinocchio'\?"),
+        ({"renderer": "sapient"}, r"unknown rendering engine 'sapient'; did you mean 'sapien'\?"),
         ({"engines": "ros:here"}, "'ros:here' should read ros:HOST:PORT, such as ros:127.0.0.1:9090"),
         ({"engines": "ros:here:0"}, "'ros:here:0' should end with a port from 1 to 65535"),
-        ({"renderer": "ros:here:1"}, "unknown rendering 'ros:here:1'"),
+        ({"renderer": "ros:here:1"}, "unknown rendering engine 'ros'"),
         ({"engines": "remote:here"}, "'remote:here' should read remote:HOST:PORT"),
         ({"renderer": "remote:here:0"}, "'remote:here:0' should end with a port from 1 to 65535"),
+        ({"engines": "sapien:here:1"}, "the physics engine 'sapien' takes no address"),
         ({"timeout": 0.0}, "a time-out is a positive number of seconds"),
         ({"connect_timeout": 1e9}, "a time-out is a positive number of seconds"),
         ({"timeout": float("nan")}, "a time-out is a positive number of seconds"),
@@ -75,10 +78,11 @@ def test_options_say_whether_an_engine_is_elsewhere():
 
 
 def test_every_name_of_a_role_can_be_built():
-    for role, names in ROLES.items():
-        for name in names:
-            if role != "rendering":  # needs a device to draw with
-                assert build_engine(role, name, load_robot("panda")) is not None
+    for role in ROLES:
+        for name, engine in parts(f"engine/{role}").items():
+            assert engine.role == role
+            if role != "rendering" and not engine.takes_address:  # needs a device to draw with, or a server
+                assert type(build_engine(role, name, load_robot("panda"))) is engine
     with pytest.raises(InputError, match=r"unknown role of an engine 'physic'; did you mean 'physics'\?"):
         build_engine("physic", "sapien", load_robot("panda"))
     with pytest.raises(InputError, match="unknown physics engine 'pinocchio'; known: "):

@@ -2,18 +2,21 @@
 
 import dataclasses
 import json
+import socket
 
 import numpy as np
 import pytest
 
-from bt_tasksim.errors import InputError
-from bt_tasksim.replay import replay
-from bt_tasksim.report.run_log import RunRecorder, read_text
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.demos_decomp.log_file import read_log, write_log
+from bt_tasksim.execution.replay import replay
+from bt_tasksim.execution.run_log import RunRecorder, read_text
+from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report.write import write_run
-from bt_tasksim.resources import asset
-from bt_tasksim.runner import Runner
-from demos_decomp.log_file import read_log, write_log
-from trees.scenarios import pick_and_place, shelf_to_shelf
+from bt_tasksim.trees.scenarios import pick_and_place, shelf_to_shelf
+
+pytestmark = pytest.mark.physical
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +47,7 @@ def test_identical(folder, what):
     found = replay(folder / what)
     assert found.identical and found.time is None and found.differences == {} and found.changed == {}
     assert found.why.startswith("identical bit for bit over ")
-    assert found.result.success
+    assert found.result.success == json.loads((folder / "result.json").read_text())["success"]
 
 
 def test_identical_in_another_scene(tmp_path):
@@ -93,7 +96,7 @@ def test_the_recorded_policy_is_taken_whatever_is_pinned_now(with_policy):
 
 
 def test_another_policy_of_the_same_name_is_named(with_policy):
-    from bt_tasksim.policy_files import load_policy, save_policy
+    from bt_tasksim.policy.files import load_policy, save_policy
 
     run, home = with_policy
     network, card = load_policy(home / "one")
@@ -110,7 +113,7 @@ def test_a_policy_that_is_gone_is_one_sentence(with_policy):
 
     run, home = with_policy
     shutil.rmtree(home / "one")
-    with pytest.raises(InputError, match="leaf 'grasp target': no policy 'one'"):
+    with pytest.raises(InputError, match=r"leaf 'grasp target' ran with the policy 'one'.*--policy grasp="):
         replay(run)
 
 
@@ -135,11 +138,137 @@ def test_bad_input(folder, tampered, tmp_path):
         replay(tampered(**{"run/about": np.array(json.dumps(about).encode())}))
 
 
+def changed(folder, name, change):
+    """A part of the run in JSON, changed."""
+    content = json.loads(read_text(read_log(folder / "run.h5").demonstrations[0].extra[f"run/{name}"]))
+    change(content)
+    return {f"run/{name}": np.array(json.dumps(content).encode())}
+
+
+@pytest.fixture
+def address():
+    """An address at which nobody may knock."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(0.2)
+        yield server.getsockname()[1]
+        with pytest.raises(TimeoutError):
+            server.accept()
+
+
+@pytest.mark.parametrize("option", ["engines", "perception", "kinematics", "renderer"])
+@pytest.mark.parametrize("kind", ["ros", "remote"])
+def test_no_address_in_a_log_is_connected_to(folder, tampered, address, option, kind):
+    name = f"{kind}:127.0.0.1:{address}"
+    path = tampered(**changed(folder, "about", lambda about: about["options"].update({option: name})))
+    if option == "renderer":  # nothing is drawn
+        assert replay(path).identical
+        return
+    with pytest.raises(InputError, match=f"{option} '{name}'; only a run in which all engines"):
+        replay(path)
+
+
+def test_files_and_keys_in_a_log_count_for_nothing(folder, tampered, tmp_path):
+    def change(about):
+        about["options"] |= {"ros": "/etc/passwd", "key": "/etc/passwd", "real_time": True, "rendering": True}
+
+    assert replay(tampered(**changed(folder, "about", change))).identical
+
+
+@pytest.mark.parametrize("name", ["/etc/passwd", "../robots/panda", "mine.yaml", "", "panda.yaml"])
+def test_only_a_robot_that_is_bundled_or_named_is_taken(folder, tampered, name):
+    path = tampered(**changed(folder, "configuration", lambda world: world.update(robot=name)))
+    with pytest.raises(InputError, match="is no bundled one; name it: --robot"):
+        replay(path)
+    assert replay(path, robot="panda").identical
+
+
+def test_only_a_mesh_that_is_bundled_or_in_a_named_folder_is_taken(folder, tampered, tmp_path):
+    def change(world):
+        world["objects"][0] |= {"kind": "mesh", "mesh": "/etc/passwd"}
+
+    path = tampered(**changed(folder, "configuration", change))
+    with pytest.raises(InputError, match="name its folder: --objects"):
+        replay(path)
+    with pytest.raises(InputError, match="name its folder: --objects"):
+        replay(path, objects=tmp_path)
+    (tmp_path / "passwd").write_text("no mesh")
+    with pytest.raises(InputError, match=r"mesh .*passwd.* cannot be read"):
+        replay(path, objects=tmp_path)
+
+
+def test_only_a_policy_that_is_bundled_or_named_is_taken(folder, tampered, tmp_path):
+    path = tampered(
+        **changed(folder, "policies", lambda leaves: leaves[0].update(source=str(tmp_path / "secret")))
+    )
+    with pytest.raises(InputError, match=r"ran with the policy .*secret.*--policy grasp=FOLDER"):
+        replay(path)
+    assert replay(path, policies=[("grasp", "programmed")]).identical
+    with pytest.raises(InputError, match="the run has no leaf of this concept"):
+        replay(path, policies=[("grip", "programmed")])
+
+
+def test_a_policy_named_in_the_recorded_tree_is_no_exception(folder, tampered, tmp_path):
+    tree = read_text(read_log(folder / "run.h5").demonstrations[0].extra["run/tree"])
+    tree = tree.replace("<Grasp ", f'<Grasp policy="{tmp_path}" ', 1)
+    path = tampered(**{"run/tree": np.array(tree.encode()), "run/policies": np.array(b"[]")})
+    with pytest.raises(InputError, match="--policy grasp=FOLDER"):
+        replay(path)
+
+
+BROKEN = {
+    "no JSON": {"run/about": np.array(b"{")},
+    "deep": {"run/about": np.array(b"[" * 100_000)},
+    "a list": {"run/about": np.array(b"[]")},
+    "numbers": {"run/about": np.zeros(1)},
+    "no tree": {"run/tree": np.array(b"<root/>")},
+    "policies of nobody": {"run/policies": np.array(b'[{"node": 99, "source": "programmed"}]')},
+    "policies in words": {"run/policies": np.array(b'[{"node": "one", "source": "programmed"}]')},
+    "text compared": {"state/joint_position": np.array(b"none")},
+    "too few rows": {"tree/status": np.zeros((3, 6))},
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_part_is_one_sentence(tampered, name):
+    with pytest.raises(InputError, match=r"run\.h5"):
+        replay(tampered(**BROKEN[name]))
+
+
+WORLDS = {
+    "mass": lambda world: world["objects"][0].update(mass=-1.0),
+    "text": lambda world: world["objects"][0].update(pose="here"),
+    "NaN": lambda world: world["objects"][0]["pose"].__setitem__(0, float("nan")),
+    "far": lambda world: world["objects"][0]["pose"].__setitem__(0, 1e150),
+    "frequency": lambda world: world.update(physics_frequency=10_000_000),
+    "seed": lambda world: world.update(seed=-1),
+    "unknown": lambda world: world.update(gravity=1.0),
+    "objects": lambda world: world.update(objects=world["objects"] * 1000),
+    "joints": lambda world: world.update(joint_position=[0.0] * 3, hand_start=[]),
+}
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_world_that_cannot_be_is_one_sentence(folder, tampered, name):
+    with pytest.raises(InputError, match=r"run\.h5.*configuration"):
+        replay(tampered(**changed(folder, "configuration", WORLDS[name])))
+
+
+def test_a_repetition_ends_soon_after_the_recorded_run(folder, tampered):
+    tree = '<root BTCPP_format="4"><BehaviorTree ID="wait"><Wait duration="1000"/></BehaviorTree></root>'
+    path = tampered(
+        **{"run/tree": np.array(tree.encode()), "run/policies": np.array(b"[]")},
+        **changed(folder, "about", lambda about: about.update(longest=1e6)),
+    )
+    found = replay(path)
+    recorded = read_log(path).demonstrations[0].time[-1]
+    assert not found.identical and found.result.sim_time < recorded + 6.0
+
+
 def test_a_tree_that_xml_cannot_hold_is_given(tmp_path):
     from py_trees.behaviours import Success
 
-    from concept_nodes import Grasp
-    from trees import sequence
+    from bt_tasksim.concept_nodes import Grasp
+    from bt_tasksim.trees import sequence
 
     def build():
         return sequence("mixed", Success("plain"), Grasp("target"))

@@ -8,13 +8,18 @@ from py_trees.behaviours import Failure, Running
 from py_trees.common import Status
 from py_trees.decorators import Inverter
 
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import InputError, LeafError, UnreachableError
-from bt_tasksim.runner import Runner, failed_leaf
-from bt_tasksim.world import Command
-from concept_nodes import Pick, Wait
-from trees import fallback, parallel, retry, sequence, timeout
-from trees.load import load_source
+from bt_tasksim.concept.reporting import speaker
+from bt_tasksim.concept_nodes import Pick, Wait
+from bt_tasksim.core.errors import InputError, LeafError, UnreachableError
+from bt_tasksim.core.outcomes import TEXT
+from bt_tasksim.core.plugins import load_plugin
+from bt_tasksim.core.world import Command
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import NOT_JUDGED, Runner
+from bt_tasksim.trees import fallback, parallel, retry, sequence, timeout
+from bt_tasksim.trees.load import load_source
+
+pytestmark = pytest.mark.physical
 
 
 def runner_of(scenario="pick_and_place", **options):
@@ -41,7 +46,8 @@ def test_steps_and_times_of_an_episode(toy, act):
 def test_a_failure_names_its_leaf_and_reason(toy, act):
     result = finished(toy(sequence("root", act("a", ticks=1), act("b", ticks=99, timeout=0.2))))
     assert result.status == Status.FAILURE and not result.success
-    assert result.reason == "b failed" and result.why.startswith("b: not done within 0.2 s")
+    assert (result.reason, result.leaf) == ("timed_out", "b")
+    assert result.outcome.numbers == {"limit": 0.2} and result.why == f"b: {result.outcome.sentence}"
 
 
 @pytest.mark.parametrize("where", ["fallback", "retry", "parallel", "timeout"])
@@ -57,19 +63,19 @@ def test_the_named_leaf_is_the_one_that_decided_last(toy, act, where):
     }[where]()
     result = finished(toy(tree))
     assert result.status == Status.FAILURE
-    assert result.reason == "last failed" and "not done within 0." in result.why
+    assert (result.reason, result.leaf) == ("timed_out", "last")
 
 
 def test_an_inverted_condition_still_has_a_reason(toy):
     tree = sequence("root", Inverter("not", Failure("never")), Failure("always"))
     stage = toy(tree)
     stage.runner.tick()
-    assert failed_leaf(tree).name == "always"
+    assert speaker(tree).name == "always"
 
 
 def test_an_episode_has_an_end(toy):
     result = finished(toy(Running("for ever")), longest=1.0)
-    assert result.reason == "time over" and result.why == "not done within 1 s"
+    assert result.reason == "time_over" and result.leaf == "" and result.outcome.numbers == {"limit": 1.0}
     assert result.control_steps == 20 and result.status == Status.INVALID
 
 
@@ -77,7 +83,7 @@ def unreachable(stage):
     """A stage whose arm reaches nothing, and holds when nothing is asked of it."""
     step = stage.world.step
 
-    def far(command, look=False):
+    def far(command):
         if command.tool is not None:
             raise UnreachableError("the nearest pose misses by 120.0 mm", 0.12, 0.0)
         return step(command)
@@ -89,8 +95,8 @@ def unreachable(stage):
 def test_out_of_reach_fails_the_leaf_with_the_distance(toy, act):
     stage = unreachable(toy(act("move", ticks=10)))
     result = finished(stage)
-    assert result.reason == "out of reach"
-    assert result.why == "move: out of reach: the nearest pose misses by 120.0 mm"
+    assert (result.reason, result.leaf) == ("out_of_reach", "move")
+    assert result.outcome.numbers == {"distance": 0.12, "angle": 0.0}
     assert not result.success and result.status == Status.FAILURE
 
 
@@ -98,6 +104,19 @@ def test_a_fallback_takes_over_when_a_leaf_is_out_of_reach(toy, act):
     stage = unreachable(toy(fallback("either", act("move", ticks=10), Wait(0.2))))
     result = finished(stage)
     assert result.status == Status.SUCCESS
+
+
+def test_a_result_shows_itself_in_a_line_and_in_a_table(toy, act):
+    good, bad = finished(toy(act("a", ticks=2))), finished(toy(act("<b>", ticks=99, timeout=0.2)))
+    assert len(repr(good)) < 100 > len(repr(bad)) and "timed_out" in repr(bad)
+    assert str(bad).startswith(f"FAILURE: {bad.why} (") and str(bad).count("<b>") == 1
+    assert str(good).startswith("SUCCESS: ") and good.outcome.is_a(NOT_JUDGED)
+    assert "&lt;b&gt;" in bad._repr_html_() and "<b>" not in bad._repr_html_()
+
+
+def test_a_leaf_that_was_not_set_up_says_how_to():
+    with pytest.raises(RuntimeError, match=r"'wait 1.0' was ticked .* Runner, or call tree.setup\("):
+        Wait(1.0).tick_once()
 
 
 def test_records_hold_every_tick(toy, act):
@@ -158,7 +177,7 @@ def test_every_node_ends_the_command_is_dropped_and_the_leaf_is_named(toy, act, 
     bad, other = Raising("culprit", at=at), act("other", "tool hand", ticks=99)
     tree = NESTS[nest](bad, other)
     stage = toy(tree)
-    with pytest.raises(LeafError, match="leaf 'culprit' raised ZeroDivisionError: oh") as error:
+    with pytest.raises(LeafError, match=r"leaf 'culprit' raised ZeroDivisionError in .*: oh") as error:
         stage.tick(10)
     assert isinstance(error.value.__cause__, ZeroDivisionError)
     assert bad.ended == [Status.INVALID], "terminate() is called on the leaf that raised, once"
@@ -185,9 +204,22 @@ def test_every_function_of_a_concept_is_covered(toy, act, method):
         raise KeyError("handle")
 
     leaf = type("Broken", (act,), {method: broken})("culprit", ticks=2)
-    with pytest.raises(LeafError, match="leaf 'culprit' raised KeyError: 'handle'"):
+    with pytest.raises(LeafError, match=r"leaf 'culprit' raised KeyError in test_runner.py:\d+: 'handle'"):
         toy(sequence("root", leaf)).tick(5)
     assert leaf.ended[-1] == Status.INVALID and leaf.status != Status.RUNNING
+
+
+def test_an_exception_in_a_users_own_file_is_found_by_file_and_line(toy, tmp_path):
+    (tmp_path / "my_concepts.py").write_text(
+        "from py_trees.behaviour import Behaviour\n"
+        "import json\n\n"
+        "class Mine(Behaviour):\n"
+        "    def update(self):\n"
+        "        return json.loads('{')\n"
+    )
+    stage = toy(sequence("root", load_plugin(str(tmp_path / "my_concepts.py")).Mine("mine")))
+    with pytest.raises(LeafError, match=r"leaf 'mine' raised JSONDecodeError in my_concepts.py:6: "):
+        stage.tick()
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), InputError("a sentence")])
@@ -210,7 +242,7 @@ def states(runner, seed):
         yield runner.pipeline.state
         if runner.tree.status != Status.RUNNING:
             return
-        runner.context.advance(runner.pipeline.step(runner.context.command, look=runner.context.look))
+        runner.context.advance(runner.pipeline.step(runner.context.command))
 
 
 def same(a, b):
@@ -250,4 +282,5 @@ def test_what_was_never_seen_is_said(toy):
     stage.world.unseen = lambda: {"cup": "camera 'scene' shows 3 pixels of it"}
     result = finished(stage)
     assert result.status == Status.FAILURE
-    assert result.why.endswith("; camera 'scene' shows 3 pixels of it")
+    assert result.reason == "not_held"
+    assert result.outcome.cause.detail == TEXT(text="camera 'scene' shows 3 pixels of it")

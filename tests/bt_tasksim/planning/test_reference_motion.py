@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_tasksim import poses
-from bt_tasksim.motion import TURN_BACK, Path, minimum_jerk, plan, sample
+from bt_tasksim.core import poses
+from bt_tasksim.planning.reference_motion import TURN_BACK, Path, minimum_jerk, plan, sample
 
 torch = pytest.importorskip("torch")
 

@@ -6,11 +6,11 @@ import coal
 import numpy as np
 import pytest
 
-from bt_tasksim import poses
-from bt_tasksim.errors import BtTasksimError, NoWayError
-from bt_tasksim.planning import MARGIN, Carried, clear_path
-from bt_tasksim.robot import load_robot
-from bt_tasksim.world import Obstacle
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import BtTasksimError, NoWayError
+from bt_tasksim.core.world import Obstacle
+from bt_tasksim.planning.ways import MARGIN, Carried, clear_path
+from bt_tasksim.robot.description import load_robot
 
 DOWN = poses.frame_from_axes(np.array([0.0, 0, -1]), np.array([0.0, 1, 0]))
 HAND = ((poses.pose([0, 0, -0.05]), (0.07, 0.21, 0.13)),)

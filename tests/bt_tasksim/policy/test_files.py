@@ -12,18 +12,19 @@ import numpy as np
 import pytest
 import safetensors.numpy
 
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.network import Network
-from bt_tasksim.policy_files import (
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.policy.files import (
     CARD,
     FILES,
     WEIGHTS,
     PolicyCard,
+    PolicySlot,
     check_fits,
     load_card,
     load_policy,
     save_policy,
 )
+from bt_tasksim.policy.network import Network
 
 
 def small(seed=0, inputs=3, outputs=2):
@@ -146,7 +147,7 @@ def test_missing_folders_and_files(folder, tmp_path):
 )
 def test_a_card_that_is_not_json(folder, text):
     (folder / CARD).write_text(text, encoding="latin-1")
-    assert "is not JSON" in refused(folder)
+    assert refused(folder).endswith("copy the policy's folder again")
 
 
 @pytest.mark.parametrize("field", list(CARD_OF_SMALL.to_json()))
@@ -247,7 +248,7 @@ LAYOUT = {"gap": 2, "time": 1}
 
 
 def test_it_fits_the_concept_it_was_trained_for(folder):
-    check_fits(load_card(folder), folder, "grasp", "panda", LAYOUT, 1)
+    check_fits(load_card(folder), folder, PolicySlot("grasp", "panda", LAYOUT, 1))
 
 
 @pytest.mark.parametrize(
@@ -265,14 +266,14 @@ def test_it_fits_the_concept_it_was_trained_for(folder):
 )
 def test_it_does_not_fit(folder, concept, robot, layout, actions, sentence):
     with pytest.raises(InputError, match=sentence):
-        check_fits(load_card(folder), folder, concept, robot, layout, actions)
+        check_fits(load_card(folder), folder, PolicySlot(concept, robot, layout, actions))
 
 
 def test_reading_needs_numpy_and_safetensors_alone(folder):
     code = (
         "import sys\n"
         "for name in ('torch', 'sapien', 'mani_skill', 'gymnasium', 'scipy'): sys.modules[name] = None\n"
-        "from bt_tasksim.policy_files import load_policy\n"
+        "from bt_tasksim.policy.files import load_policy\n"
         f"print(load_policy({str(folder)!r})[1].concept)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

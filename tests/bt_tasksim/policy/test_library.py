@@ -5,8 +5,10 @@ import os
 
 import pytest
 
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.policy_library import (
+from bt_tasksim.concept_nodes import Grasp, Pick
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.policy.library import (
     describe,
     folder_of_pinned,
     list_policies,
@@ -15,9 +17,7 @@ from bt_tasksim.policy_library import (
     read_pins,
     unpin,
 )
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import load_robot
-from concept_nodes import Grasp, Pick
+from bt_tasksim.robot.description import load_robot
 
 CONCEPTS = {"grasp": Grasp, "pick": Pick}
 
@@ -99,7 +99,7 @@ def test_a_full_disk_leaves_the_pins(shipped, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("{", "pins '.*pins.json' cannot be read"),
+        ("{", "pins '.*pins.json', line 1: not JSON"),
         ("[]", "should map concepts to robots"),
         ('{"grasp": "one"}', "'grasp' should map robots to names"),
         ('{"grasp": {"panda": 1}}', "'grasp' should map robots to names"),

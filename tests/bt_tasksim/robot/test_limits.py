@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 import yaml
 
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.errors import InputError
-from bt_tasksim.robot import load_robot
-from bt_tasksim.safety.limits import REACTION, read_limits
+from bt_tasksim.core.document import Document
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.typed_file import validate
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.limits import REACTION, read_limits
+from bt_tasksim.robot.schema import ArmEntry, SafetyEntry
 
 ARM = {
     "joints": ["a", "b"], "lower": [-1, -2], "upper": [1, 2], "velocity": [2, 3], "acceleration": [10, 20],
+    "rest": [0, 0], "drive": {"stiffness": 1, "damping": 1, "force_limit": 1},
 }  # fmt: skip
 SECTION = {
     "tool_velocity": {"linear": 1.0, "angular": 2.0},
@@ -21,6 +25,11 @@ SECTION = {
     "wrench": {"force": 50, "torque": 5},
     "tracking": {"limit": 0.3},
 }
+
+
+def limits_of(data):
+    arm = validate(ArmEntry, Document("arm", ARM))
+    return read_limits(validate(SafetyEntry, Document("safety", data)), arm)
 
 
 def section(**changes):
@@ -43,7 +52,7 @@ def test_every_bundled_robot_has_limits_within_its_own(name):
 
 
 def test_what_is_not_said_follows_from_the_arm():
-    limits = read_limits(SECTION, ARM)
+    limits = limits_of(SECTION)
     np.testing.assert_array_equal(limits.lower, [-1, -2])
     np.testing.assert_array_equal(limits.velocity, [2, 3])
     np.testing.assert_allclose(limits.step, [0.2, 0.3])
@@ -52,12 +61,11 @@ def test_what_is_not_said_follows_from_the_arm():
 
 
 def test_what_is_said_counts():
-    limits = read_limits(
+    limits = limits_of(
         section(
             joint_velocity__limit=[1, 1], joint_acceleration__policy="clip", joint_position__upper=[0.5, 1],
             step__limit=[0.1, 0.1], timing__stale=0.05,
-        ),
-        ARM,
+        )
     )  # fmt: skip
     np.testing.assert_array_equal(limits.velocity, [1, 1])
     np.testing.assert_array_equal(limits.upper, [0.5, 1])
@@ -70,25 +78,25 @@ def test_what_is_said_counts():
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"wrench": {"force": 50}}, "'safety.wrench.torque' is missing"),
-        ({"wrench__forse": 50}, "unknown key 'safety.wrench.forse'; did you mean 'force'"),
-        ({"tool_velocity__linear": -1}, "safety.tool_velocity.linear should be positive, found -1"),
-        ({"tool_velocity__linear": "fast"}, "safety.tool_velocity.linear should be a number, found 'fast'"),
-        ({"joint_velocity__limit": [1]}, "safety.joint_velocity.limit should be 2 finite numbers"),
-        ({"joint_velocity__limit": [1, 4]}, "joint_velocity.limit is wider than the arm's own"),
-        ({"joint_position__lower": [-1.5, 0]}, "lower is wider than the arm's own limit for joint 1"),
-        ({"joint_position__lower": [0, 0], "joint_position__upper": [0, 1]}, "lower is not below upper"),
-        ({"step__limit": [0, 1]}, "safety.step.limit should be positive"),
-        ({"workspace__lower": [2, 0, 0]}, "workspace.lower is not below upper"),
-        ({"wrench__policy": "clip"}, "safety.wrench.policy can only be 'stop'; joint_position"),
-        ({"joint_velocity__policy": "slow"}, "policy should be 'stop' or 'clip', found 'slow'"),
-        ({"timing__validity": 0.5}, "safety.timing.validity should be at most 0.2 s, found 0.5"),
-        ({"timing__stail": 0.1}, "unknown key 'safety.timing.stail'; did you mean 'stale'"),
+        ({"wrench": {"force": 50}}, "'wrench.torque' is missing"),
+        ({"wrench__forse": 50}, "unknown field 'wrench.forse'; did you mean 'force'"),
+        ({"tool_velocity__linear": -1}, "'tool_velocity.linear' should be positive, found -1"),
+        ({"tool_velocity__linear": "fast"}, "'tool_velocity.linear' should be a number, found 'fast'"),
+        ({"joint_velocity__limit": [1]}, "'safety.joint_velocity.limit' should be 2 numbers"),
+        ({"joint_velocity__limit": [1, 4]}, "'safety.joint_velocity.limit' is wider than the arm's own"),
+        ({"joint_position__lower": [-1.5, 0]}, "lower' is wider than the arm's own limit for joint 1"),
+        ({"joint_position__lower": [0, 0], "joint_position__upper": [0, 1]}, "lower' is not below"),
+        ({"step__limit": [0, 1]}, "'step.limit[0]' should be positive"),
+        ({"workspace__lower": [2, 0, 0]}, "'safety.workspace.lower' is not below"),
+        ({"wrench__policy": "clip"}, "'safety.wrench.policy' can only be 'stop'; joint_position"),
+        ({"joint_velocity__policy": "slow"}, "policy' should be 'stop' or 'clip', found 'slow'"),
+        ({"timing__validity": 0.5}, "'safety.timing.validity' should be at most 0.2 s, found 0.5"),
+        ({"timing__stail": 0.1}, "unknown field 'timing.stail'; did you mean 'stale'"),
     ],
 )  # fmt: skip
 def test_bad_limits_are_refused(changes, sentence):
     with pytest.raises(InputError) as error:
-        read_limits(section(**changes), ARM)
+        limits_of(section(**changes))
     assert sentence in str(error.value)
 
 
@@ -98,7 +106,7 @@ def test_a_robot_file_names_itself(tmp_path):
     data["safety"]["workspace"]["lower"] = [0, 0]
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(data))
-    with pytest.raises(InputError, match=r"mine.yaml': safety.workspace.lower should be 3 finite numbers"):
+    with pytest.raises(InputError, match=r"mine.yaml', line \d+: 'safety.workspace.lower' should be 3"):
         load_robot(str(file))
     del data["safety"]
     file.write_text(yaml.safe_dump(data))

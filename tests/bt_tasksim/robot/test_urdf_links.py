@@ -4,10 +4,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bt_tasksim import poses
-from bt_tasksim.engines.urdf_links import Mimic, links_below, load_links, root_pose, still_links
-from bt_tasksim.errors import InputError
-from bt_tasksim.robot import load_robot
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.urdf_links import Mimic, links_below, load_links, root_pose, still_links
 
 LINK = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
 JOINT = '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>{4}</joint>'

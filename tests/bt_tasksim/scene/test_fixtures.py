@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bt_tasksim import poses
-from bt_tasksim.errors import InputError
-from bt_tasksim.fixtures import Fixture, load_fixture
-from bt_tasksim.resources import asset
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.scene.fixtures import Fixture, load_fixture
 
 BUNDLED = sorted(path.stem for path in asset("fixtures").glob("*.yaml"))
 
@@ -65,17 +65,38 @@ def test_moved_fixture_moves_its_places():
     assert turned.boxes[0].look == "matte" and shelf.boxes[0].look == "wood"
 
 
+BOX = "{name: x, boxes: [{position: [0, 0, 0], size: [1, 1, 1], %s}], places: []}"
+PLACE = "{name: x, boxes: [], places: [{name: p, kind: board, position: [0, 0, 0], %s}]}"
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("name: x", "KeyError"),
-        ("{", "Error"),
-        ("[]", "AttributeError"),
-        ("{name: x, boxes: [{position: [0, 0], size: [1, 1, 1]}], places: []}", "expected 7"),
-        ("{name: x, boxes: [{position: [0, 0, 0], size: [1, 0, 1]}], places: []}", "three positive"),
+        ("name: x", "'boxes' is missing"),
+        ("{", "line .: not YAML"),
+        ("[]", "should be a mapping"),
+        (
+            "{name: x, boxes: [{position: [0, 0], size: [1, 1, 1]}], places: []}",
+            r"'boxes\[0\].position'",
+        ),
+        (
+            "{name: x, boxes: [{position: [0, 0, 0], size: [1, 0, 1]}], places: []}",
+            r"'boxes\[0\].size\[1\]'",
+        ),
         ("{name: x, pose: [0, 0, 0, 0, 0, 0, 0], boxes: [], places: []}", "unit quaternion"),
         ("{name: x, boxes: [{position: [0, 0, 0], size: [1, .nan, 1]}], places: []}", "finite"),
         ("{name: x, boxes: [{position: [0, 0, 0], size: [1, 1, 1], look: woood}], places: []}", "'wood'"),
+        (BOX % "friction: .nan", r"'boxes\[0\].friction' should be a number that is finite"),
+        (BOX % "friction: -1", r"'boxes\[0\].friction' should not be negative"),
+        (BOX % "joint: hinge", r"unknown field 'boxes\[0\].joint'"),
+        (BOX % "pose: [0, 0, 0, 1, 0, 0, 0]", "either 'position' or 'pose'"),
+        (PLACE % "extent: [-1, 1]", r"'places\[0\].extent\[0\]' should be positive"),
+        (PLACE % "extent: [1, 1], access: [0, 0, 0]", r"'places\[0\].access' should be a direction"),
+        (PLACE % "extent: [1, 1], height: .nan", r"'places\[0\].height'"),
+        (PLACE % "extent: [1, 1], clearance: .inf", r"'places\[0\].clearance'"),
+        (PLACE % "extent: [1, 1], drawer: 1", r"unknown field 'places\[0\].drawer'"),
+        ("{name: x, boxes: [], places: [], drawer: {}}", "unknown field 'drawer'"),
+        ("{name: a/b, boxes: [], places: []}", "'name' should hold no '/'"),
     ],
 )
 def test_bad_fixture_files(tmp_path, text, words):

@@ -8,10 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_tasksim import poses
-from bt_tasksim.collision import check_configuration
-from bt_tasksim.errors import InputError
-from bt_tasksim.scene import STREAMS, ActorConfiguration, Goal, ObjectSpec, Scene, SpotSpec
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.scene.configuration import STREAMS, ActorConfiguration
+from bt_tasksim.scene.overlap import check_configuration
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import Goal, ObjectSpec, SpotSpec
 
 SHELF = Scene(fixtures=["shelf"], objects={"cup": "on upper_board", "oval": "on lower_board"})
 TABLE = Scene(
@@ -21,7 +23,7 @@ TABLE = Scene(
     },
     spots=[SpotSpec("mat", "table", (0.0, -0.2), (0.03, 0.03), yaw=0.5)],
     goal=Goal("target", "mat"),
-    knock="target",
+    disturbed="target",
 )
 
 
@@ -96,7 +98,7 @@ def test_short_forms():
         (lambda: Scene(fixtures=["shelff"]), "did you mean 'shelf'"),
         (lambda: Scene(objects={"cup": "on table"}, goal=Goal("cap", "table")), "did you mean 'cup'"),
         (lambda: Scene(objects={"cup": "on table"}, goal=Goal("cup", "tabel")), "did you mean 'table'"),
-        (lambda: Scene(objects={"cup": "on table"}, knock="cap"), "did you mean 'cup'"),
+        (lambda: Scene(objects={"cup": "on table"}, disturbed="cap"), "did you mean 'cup'"),
     ],
 )
 def test_unknown_names_are_refused_with_the_nearest(made, words):

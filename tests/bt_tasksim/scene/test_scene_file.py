@@ -1,14 +1,16 @@
 """Scenes and meshes of one's own: what is read, and what is refused with which sentence."""
 
+import os
+
 import numpy as np
 import pytest
 
-from bt_tasksim.collision import check_configuration
-from bt_tasksim.errors import InputError
-from bt_tasksim.mesh_file import mesh_shape
-from bt_tasksim.meshes import TriangleMesh, circle, cup, prism, rounded_rectangle
-from bt_tasksim.resources import asset
-from bt_tasksim.scene_file import load_scene
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.scene.mesh_file import mesh_shape
+from bt_tasksim.scene.meshes import TriangleMesh, circle, cup, prism, rounded_rectangle
+from bt_tasksim.scene.overlap import check_configuration
+from bt_tasksim.scene.scene_file import load_scene
 
 
 def save(path, *bodies, drop=0):
@@ -57,11 +59,11 @@ def test_everything_that_may_be_said(tmp_path):
         spots:
           - {name: mat, on: lower_board, at: [0, -0.1], area: [0.01, 0.02], extent: [0.1, 0.1], heading: 0.2}
         goal: {object: part, place: mat, relation: stands, position_tolerance: 0.02}
-        knock: part
+        disturbed: part
         """,
     )
     scene = load_scene(file)
-    assert scene.name == "scene" and scene.knock == "part"
+    assert scene.name == "scene" and scene.disturbed == "part"
     assert scene.goal.position_tolerance == 0.02
     world = scene.sample(4)
     part = next(o for o in world.objects if o.name == "part")
@@ -75,17 +77,17 @@ def test_everything_that_may_be_said(tmp_path):
     [
         ("{cup: {on: tabel}}", "did you mean 'table'"),
         ("{cup: {kind: cupp, on: table}}", "did you mean 'cup'"),
-        ("{cup: {on: table, masss: 1}}", "unknown entry 'masss'; did you mean 'mass'"),
-        ("{cup: {kind: cup}}", "'on' is missing"),
-        ("{cup: 5}", "should be entries"),
-        ("{cup: {on: table, mass: heavy}}", "mass should be a number"),
+        ("{cup: {on: table, masss: 1}}", "unknown field 'objects.cup.masss'; did you mean 'mass'"),
+        ("{cup: {kind: cup}}", "'objects.cup.on' is missing"),
+        ("{cup: 5}", "'objects.cup' should be a mapping"),
+        ("{cup: {on: table, mass: heavy}}", "'objects.cup.mass' should be a number"),
         ("{cup: {on: table, mass: 200}}", "between 0.001 and 20 kg"),
         ("{cup: {on: table, mass: [0.2, 0.1]}}", "the lower one first"),
         ("{cup: {on: table, mass: 15}}", "denser than any metal"),
-        ("{cup: {on: table, friction: -0.1}}", "friction should be between"),
-        ("{cup: {on: table, friction: .nan}}", "friction should be a number"),
+        ("{cup: {on: table, friction: -0.1}}", "'objects.cup.friction' should be between"),
+        ("{cup: {on: table, friction: .nan}}", "'objects.cup.friction' should be a number"),
         ("{box: {on: table, size: [60, 40, 80]}}", "looks like millimetres"),
-        ("{box: {on: table, size: [0.06, 0.04]}}", "size should be 3 numbers"),
+        ("{box: {on: table, size: [0.06, 0.04]}}", "'objects.box.size' should be 3 numbers"),
         ("{box: {on: table, size: [0.06, 0, 0.08]}}", "should be positive"),
         ("{box: {on: table, mesh: a.obj, kind: box}}", "belong to the kind 'mesh'"),
         ("{part: {kind: mesh, on: table}}", "'mesh' is missing"),
@@ -94,7 +96,7 @@ def test_everything_that_may_be_said(tmp_path):
         ("{part: {mesh: open.obj, on: table}}", "not watertight: 3 of its edges"),
         ("{part: {mesh: large.obj, on: table}}", "looks like millimetres: set scale: 0.001"),
         ("{part: {mesh: large.obj, scale: 0.00001, on: table}}", "should be between 0.005 m and 1 m"),
-        ("{part: {mesh: large.obj, scale: -1, on: table}}", "scale should be above 0"),
+        ("{part: {mesh: large.obj, scale: -1, on: table}}", "'objects.part.scale' should be positive"),
         ("{part: {mesh: large.obj, scale: 1, size: [1, 1, 1], on: table}}", "not both"),
         ("{box: {on: table, at: [0.7, 0]}}", "mm beyond the edge of 'table' along x"),
         ("{box: {on: lower_board, at: [0.16, 0]}}", "overlap by [0-9.]+ mm at the start"),
@@ -113,23 +115,62 @@ def test_bad_objects(tmp_path, objects, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "should be entries"),
-        ("[1, 2]", "should be entries"),
+        ("", "should be a mapping"),
+        ("[1, 2]", "should be a mapping"),
         ("objects: {cup: [", "line"),
         ("robbot: panda", "did you mean 'robot'"),
         ("robot: pandaa", "did you mean 'panda'"),
-        ("fixtures: shelf", "fixtures should be a list"),
+        ("fixtures: shelf", "'fixtures' should be a list"),
         ("fixtures: [shelv]", "did you mean 'shelf'"),
-        ("spots: [{name: a}]", "'on' is missing"),
-        ("spots: [{name: a, on: table, extent: [0, 1]}]", "extent should be above 0"),
-        ("{objects: {cup: on table}, goal: {object: cup}}", "'place' is missing"),
-        ("{objects: {cup: on table}, goal: {object: cup, place: table, relation: stand}}", "'stands'"),
-        ("{objects: {cup: on table}, knock: cap}", "did you mean 'cup'"),
+        ("spots: [{name: a}]", r"'spots\[0\].on' is missing"),
+        ("spots: [{name: a, on: table, extent: [0, 1]}]", r"'spots\[0\].extent\[0\]' should be positive"),
+        ("{objects: {cup: on table}, goal: {object: cup}}", "'goal.place' is missing"),
+        ("{objects: {cup: on table}, goal: {object: cup, place: table, relation: lifte}}", "'lifted'"),
+        ("{objects: {cup: on table}, disturbed: cap}", "did you mean 'cup'"),
     ],
 )
 def test_bad_files(tmp_path, text, words):
     with pytest.raises(InputError, match=words):
         load_scene(write(tmp_path, text))
+
+
+def test_the_line_is_that_of_the_field(tmp_path):
+    text = "robot: panda\nobjects:\n  cup: on table\n  box:\n    kind: box\n    on: tabel\n"
+    with pytest.raises(InputError, match=r"scene.yaml', line 6: object 'box' is on 'tabel'.*'table'"):
+        load_scene(write(tmp_path, text))
+    with pytest.raises(InputError, match=r"line 4: unknown field 'fixtrues'; did you mean 'fixtures'"):
+        load_scene(write(tmp_path, "robot: panda\nobjects:\n  cup: on table\nfixtrues: [shelf]\n"))
+
+
+def test_a_goal_of_being_lifted_keeps_its_height(tmp_path):
+    goal = "goal: {object: cup, place: table, relation: lifted, height: 0.12}"
+    found = load_scene(write(tmp_path, f"objects: {{cup: on table}}\n{goal}\n")).goal
+    assert (found.relation, found.height) == ("lifted", 0.12)
+    with pytest.raises(InputError, match=r"line 2: 'goal.height' should be positive"):
+        load_scene(write(tmp_path, f"objects: {{cup: on table}}\n{goal.replace('0.12', '-1')}\n"))
+
+
+@pytest.mark.parametrize(
+    "entry",
+    ["objects: {x: {mesh: %s, on: table}}", "fixtures: [%s.yaml]", "robot: %s.yaml"],
+    ids=["mesh", "fixture", "robot"],
+)
+@pytest.mark.parametrize("where", ["/etc/passwd", "../secret", "a/../../secret", "C:\\\\secret"])
+def test_nothing_outside_of_the_files_folder_is_opened(tmp_path, entry, where):
+    (tmp_path / "inner").mkdir()
+    for name in ("secret", "secret.yaml"):
+        (tmp_path / name).write_text("name: secret")
+    with pytest.raises(InputError, match=r"line 1: .* should lie in the folder"):
+        load_scene(write(tmp_path / "inner", entry % where))
+
+
+def test_a_mesh_opens_no_other_file(tmp_path):
+    save(tmp_path / "part.obj", block(0.05, 0.04, 0.1))
+    text = (tmp_path / "part.obj").read_text()
+    os.mkfifo(tmp_path / "pipe.mtl")  # whoever opens it waits for ever
+    (tmp_path / "part.obj").write_text(f"mtllib pipe.mtl\nusemtl a\n{text}")
+    scene = load_scene(write(tmp_path, "objects: {part: {mesh: part.obj, on: table}}"))
+    assert scene.sample(0).objects[0].size == pytest.approx((0.05, 0.04, 0.1))
 
 
 def test_missing_and_binary_files(tmp_path):

@@ -6,22 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from bt_tasksim import meshes, poses
-from bt_tasksim.errors import InputError
-from bt_tasksim.mesh_file import mesh_extent
-from bt_tasksim.resources import asset
-from bt_tasksim.scene import Scene
-from bt_tasksim.shapes import (
-    CUP_WALL,
-    KINDS,
-    BoxPiece,
-    ShapeSize,
-    diamond_width,
-    nearest_point,
-    object_model,
-    resting_height,
-    shape,
-)
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.scene import meshes
+from bt_tasksim.scene.kinds.cup import WALL
+from bt_tasksim.scene.kinds.diamond import diamond_width
+from bt_tasksim.scene.mesh_file import mesh_extent
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.shapes import KINDS, BoxPiece, ShapeSize, object_model, resting_height, shape
 
 MADE = sorted(set(KINDS) - {"mesh"})
 
@@ -33,7 +26,7 @@ def drawn(draw, kinds=tuple(MADE)):
     size = [draw(st.floats(a, b)) if a < b else a for a, b in zip(low, high, strict=True)]
     if KINDS[kind].round:
         size[1] = size[0]
-    if KINDS[kind].cubic_range:
+    if KINDS[kind].cubic:
         size = [size[0]] * 3
     exponents = (draw(st.floats(0.2, 1.0)), draw(st.floats(0.2, 1.0)))
     return kind, ShapeSize(tuple(size), exponents)
@@ -79,7 +72,7 @@ def test_volume_and_inertia(case):
     kind, size = case
     x, y, z = size.size
     geometry = shape(*case)
-    wall, base = CUP_WALL, 0.005
+    wall, base = WALL, 0.005
     expected = {
         "box": x * y * z,
         "cube": x * y * z,
@@ -149,11 +142,11 @@ def test_cup_is_hollow_and_its_wall_has_no_gaps(case, angle, height, radius):
     x, _, z = case[1].size
     way = np.array([np.cos(angle), np.sin(angle), 0])
     up = np.array([0, 0, height * (z - 2e-4)])
-    assert not inside_a_piece(geometry, radius * (x / 2 - 1.03 * CUP_WALL - 5e-4) * way + up)
-    assert inside_a_piece(geometry, (x / 2 - CUP_WALL / 2) * way + up)
+    assert not inside_a_piece(geometry, radius * (x / 2 - 1.03 * WALL - 5e-4) * way + up)
+    assert inside_a_piece(geometry, (x / 2 - WALL / 2) * way + up)
     assert inside_a_piece(geometry, radius * (x / 2) * way - np.array([0, 0, z / 2 - 0.002]))
     radii = np.linalg.norm(geometry.visual.vertices[:, :2], axis=1)
-    inner = geometry.visual.vertices[np.abs(radii - (x / 2 - CUP_WALL)) < 1e-6]
+    inner = geometry.visual.vertices[np.abs(radii - (x / 2 - WALL)) < 1e-6]
     assert np.ptp(inner[:, 2]) > 0.85 * z
 
 
@@ -172,14 +165,14 @@ def test_diamond_turns_its_sides_to_the_fingers():
 def test_nearest_points_lie_on_the_surface_alone_and_in_batches(case, point):
     geometry = shape(*case)
     p = np.array(point)
-    found = nearest_point(geometry, p)
-    batch = nearest_point(geometry, np.tile(p, (5, 7, 1)))
+    found = geometry.surface.nearest(p)
+    batch = geometry.surface.nearest(np.tile(p, (5, 7, 1)))
     assert batch.shape == (5, 7, 3)
     # From the very middle several points are equally near.
     assert np.linalg.norm(batch[2, 3] - p) == pytest.approx(np.linalg.norm(found - p), abs=1e-9)
     extent = np.array(geometry.extent)
     assert np.all(np.abs(found) <= extent / 2 + 1e-9)
-    again = nearest_point(geometry, found)
+    again = geometry.surface.nearest(found)
     assert again == pytest.approx(found, abs=1e-6)
 
 
@@ -189,7 +182,7 @@ def test_nearest_point_to_a_finger_on_the_closing_axis(case, gap):
     model, geometry = object_model("it", *case), shape(*case)
     axis, width = np.array(model.grasp_axes[0]), model.grasp_widths[0]
     for sign in (-1, 1):
-        found = nearest_point(geometry, sign * (width / 2 + gap) * axis)
+        found = geometry.surface.nearest(sign * (width / 2 + gap) * axis)
         assert found == pytest.approx(sign * width / 2 * axis, abs=1e-9)
 
 
@@ -198,9 +191,9 @@ def test_nearest_point_to_a_finger_on_the_closing_axis(case, gap):
 def test_nearest_point_is_the_nearest_of_many(case, seed):
     geometry = shape(*case)
     p = np.random.default_rng(seed).normal(size=3) * 0.06
-    found = np.linalg.norm(nearest_point(geometry, p) - p)
+    found = np.linalg.norm(geometry.surface.nearest(p) - p)
     rng = np.random.default_rng(1)
-    candidates = nearest_point(geometry, rng.normal(size=(2000, 3)) * 0.06)
+    candidates = geometry.surface.nearest(rng.normal(size=(2000, 3)) * 0.06)
     assert found <= np.min(np.linalg.norm(candidates - p, axis=1)) + 1e-9
 
 
@@ -264,7 +257,7 @@ def test_shapes_need_no_simulator():
     import sys
 
     code = (
-        "import sys; from bt_tasksim import shapes;"
+        "import sys; from bt_tasksim.scene import shapes;"
         "[shapes.shape(k, shapes.ShapeSize(v.size_range[0]))"
         " for k, v in shapes.KINDS.items() if k != 'mesh'];"
         "bad = {'trimesh', 'scipy', 'sapien', 'torch', 'mani_skill'} & set(sys.modules); sys.exit(bool(bad))"

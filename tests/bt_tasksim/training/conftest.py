@@ -13,13 +13,13 @@ import toys
 @pytest.fixture
 def toy_engines(monkeypatch):
     """Every pipeline that is built is a toy world."""
-    monkeypatch.setattr("bt_tasksim.runner.build_pipeline", lambda robot, options: toys.World())
+    monkeypatch.setattr("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: toys.World())
 
 
 @pytest.fixture
 def env_of(toy_engines):
     """Builds an environment in a toy world: ``env_of(tree, ...)``."""
-    from bt_tasksim.training.episode import EpisodeEnv
+    from bt_tasksim.training.env import EpisodeEnv
 
     def make(tree, scene=toys.SCENE, **settings):
         return EpisodeEnv(tree, scene, **settings)

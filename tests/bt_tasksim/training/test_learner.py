@@ -8,15 +8,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from bt_tasksim.network import Network
+from bt_tasksim.policy.network import Network
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.learner import Learner, Statistics
-from bt_tasksim.training.rollouts import Lane
+from bt_tasksim.training.rollouts import EnvironmentRollout
 
 torch.set_num_threads(1)
 N, M = 5, 3
 CONFIG = TrainConfig(
-    steps=240, lanes=2, lane_steps=30, epochs=2, minibatch=20, hidden=(16, 8), learning_rate=3e-3, seed=4
+    steps=240,
+    n_envs=2,
+    n_steps=30,
+    epochs=2,
+    minibatch=20,
+    hidden=(16, 8),
+    learning_rate=3e-3,
+    seed=4,
 )
 
 
@@ -25,7 +32,7 @@ def learner(**changes):
     return Learner(*boxes, TrainConfig(**{**CONFIG.to_dict(), "reward": CONFIG.reward, **changes}))
 
 
-def lanes(iteration, count=2, n=30, cut=True):
+def environments(iteration, count=2, n=30, cut=True):
     """Made-up episodes: what is paid is how near the first action is to the first feature."""
     rng = np.random.default_rng([9, iteration])
     out = []
@@ -33,7 +40,7 @@ def lanes(iteration, count=2, n=30, cut=True):
         features = rng.normal(2.0, 3.0, (n, N)).astype(np.float32)
         actions = rng.normal(0.0, 0.5, (n, M)).astype(np.float32)
         out.append(
-            Lane(
+            EnvironmentRollout(
                 features=features,
                 actions=actions,
                 rewards=(-np.abs(actions[:, 0] - 0.1 * features[:, 0])).astype(np.float32),
@@ -50,7 +57,7 @@ def lanes(iteration, count=2, n=30, cut=True):
 def trained(rollouts=2, **changes):
     found = learner(**changes)
     for k in range(rollouts):
-        found.update(lanes(k), k + 1)
+        found.update(environments(k), k + 1)
     return found
 
 
@@ -72,14 +79,14 @@ def test_numpy_and_torch_decide_alike():
     assert np.abs(found.network(features) - expected).max() < 1e-5
     assert np.abs(np.array([found.network(row) for row in features]) - expected).max() < 1e-5
     assert np.ptp(expected, axis=0).min() > 0.01, "and it is not the same for all"
-    assert found.deviation == pytest.approx(found.ppo.policy.log_std.exp().detach().numpy())
+    assert found.std == pytest.approx(found.ppo.policy.log_std.exp().detach().numpy())
 
 
 def test_a_first_policy_rarely_ends_an_episode():
     found = learner()
     features = np.random.default_rng(0).normal(0.0, 1.0, (100, N)).astype(np.float32)
     assert found.network(features)[:, -1] == pytest.approx(CONFIG.terminate_bias, abs=0.1)
-    assert found.deviation == pytest.approx(np.exp(CONFIG.log_deviation))
+    assert found.std == pytest.approx(np.exp(CONFIG.log_std))
 
 
 def test_the_same_settings_give_the_same_policy_and_another_seed_another():
@@ -95,7 +102,7 @@ def test_learning_goes_on_from_a_checkpoint_bit_for_bit():
     later.restore(half.tensors(), timesteps=120)
     assert same(later.tensors(), half.tensors())
     for k in (2, 3):
-        later.update(lanes(k), k + 1)
+        later.update(environments(k), k + 1)
     assert same(later.tensors(), straight.tensors())
     assert same(later.network.arrays(), straight.network.arrays())
     assert later.ppo.num_timesteps == straight.ppo.num_timesteps == 240
@@ -106,7 +113,7 @@ def test_a_checkpoint_is_a_copy():
     found = trained(1)
     before = found.tensors()
     kept = {k: v.copy() for k, v in before.items()}
-    found.update(lanes(1), 2)
+    found.update(environments(1), 2)
     assert same(before, kept)
 
 
@@ -126,7 +133,7 @@ def test_global_random_states_are_left_as_they_were():
 
 
 def test_it_learns_what_pays():
-    found = learner(epochs=10, lane_steps=200, steps=8000, log_deviation=-0.7)
+    found = learner(epochs=10, n_steps=200, steps=8000, log_std=-0.7)
     features = np.random.default_rng(1).normal(2.0, 3.0, (300, N)).astype(np.float32)
     wanted = 0.1 * features[:, 0]
 
@@ -135,9 +142,9 @@ def test_it_learns_what_pays():
 
     before = gap()
     for k in range(8):
-        rows = lanes(k, n=200, cut=False)
+        rows = environments(k, n=200, cut=False)
         for row in rows:
-            noise = np.random.default_rng([k, 1]).normal(size=row.actions.shape) * found.deviation
+            noise = np.random.default_rng([k, 1]).normal(size=row.actions.shape) * found.std
             row.actions[:] = found.network(row.features) + noise
             row.rewards[:] = -np.abs(row.actions[:, 0] - 0.1 * row.features[:, 0])
         found.update(rows, k + 1)
@@ -145,14 +152,14 @@ def test_it_learns_what_pays():
 
 
 def test_a_cut_episode_is_worth_what_may_follow():
-    """The value beyond a cut counts, at the end of the lane and before."""
+    """The value beyond a cut counts, at the end of the environment and before."""
     results = []
     for worth in (0.0, 5.0):
         found = learner()
         with torch.no_grad():
             found.ppo.policy.value_net.weight.zero_()
             found.ppo.policy.value_net.bias.fill_(worth)
-        rows = lanes(0)
+        rows = environments(0)
         kept = {}
 
         def keep(found=found, kept=kept):
@@ -177,7 +184,7 @@ def test_it_begins_with_what_was_trained_before():
     features = np.random.default_rng(0).normal(2.0, 4.0, (50, N)).astype(np.float32)
     assert np.abs(found.network(features) - network(features)).max() < 1e-5
     assert np.abs(torch_policy(found, features) - network(features)).max() < 1e-5
-    found.update(lanes(7), 1)
+    found.update(environments(7), 1)
     assert not np.array_equal(found.network(features), network(features))
 
 

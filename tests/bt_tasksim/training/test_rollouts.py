@@ -1,4 +1,4 @@
-"""Lanes: the same whatever the number of workers, and one sentence where a worker goes wrong."""
+"""Environments: the same whatever the number of workers, and one sentence where a worker goes wrong."""
 
 import os
 import signal
@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from toys import SCENE, Check, Even, Raise, Unprogrammed
 
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.network import Network
-from bt_tasksim.training.decorator import Train
-from bt_tasksim.training.episode import EpisodeEnv
-from bt_tasksim.training.rollouts import Task, Workers, collect, judge_draw
-from trees import sequence
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.policy.network import Network
+from bt_tasksim.training.env import EpisodeEnv
+from bt_tasksim.training.rollouts import RolloutTask, Workers, collect, judge_draw
+from bt_tasksim.trees import sequence
+from bt_tasksim.trees.nodes.train import Train
 
 UP = Network(
     np.zeros(3), np.ones(3), [(np.array([[3.0, 0, 0], [-10.0, 0, 0]]), np.array([0.0, 1.0]))]
@@ -28,8 +28,8 @@ def make(tree=None):
     return EpisodeEnv(sequence("s", Even(), Train(Raise()), Check()) if tree is None else tree, SCENE)
 
 
-def lane(number, decisions=40, network=UP, deviation=0.3, lesson=None):
-    return Task("lane", network, np.full(2, deviation, np.float32), (7, number), decisions, lesson)
+def environment(number, decisions=40, network=UP, std=0.3, stage=None):
+    return RolloutTask("environment", network, np.full(2, std, np.float32), (7, number), decisions, stage)
 
 
 def as_bytes(found):
@@ -51,7 +51,7 @@ def maker(toy_engines):
 
 
 def test_a_lane_is_whole_episodes_in_a_row(maker):
-    found = collect(maker(), lane(0, decisions=60))
+    found = collect(maker(), environment(0, decisions=60))
     assert found.features.shape == (60, 3) and found.actions.shape == (60, 2)
     assert found.features.dtype == found.actions.dtype == np.float32
     assert found.starts[0] and int(found.starts.sum()) in (len(found.ends), len(found.ends) + 1)
@@ -72,14 +72,14 @@ def test_a_truncated_episode_is_marked(maker):
         return EpisodeEnv(sequence("s", Train(Raise()), Check()), SCENE, longest=0.2)
 
     still = Network(np.zeros(3), np.ones(3), [(np.zeros((2, 3)), np.zeros(2))]).arrays()
-    found = collect(short(), lane(0, decisions=12, network=still, deviation=0.0))
+    found = collect(short(), environment(0, decisions=12, network=still, std=0.0))
     assert found.cut_at.tolist() == [4, 9, 11] and found.cut.shape == (3, 3)
     assert [end[3] for end in found.ends] == ["failed", "failed"]
     assert found.starts.tolist() == [k in (0, 5, 10) for k in range(12)]
 
 
 def test_lanes_are_the_same_whatever_the_workers_and_their_order(maker):
-    tasks = [lane(k) for k in range(5)]
+    tasks = [environment(k) for k in range(5)]
     here = {k: as_bytes(collect(maker(), task)) for k, task in enumerate(tasks)}
     assert run(tasks, 1) == run(tasks, 2) == here
     back = run(tasks[::-1], 2)
@@ -89,7 +89,7 @@ def test_lanes_are_the_same_whatever_the_workers_and_their_order(maker):
 
 def test_held_apart_draws_are_judged_without_noise_and_apart(maker):
     env = maker()
-    tasks = [Task("draw", UP, np.full(2, 9.0), (), 0, None, draw=k) for k in range(8)]
+    tasks = [RolloutTask("draw", UP, np.full(2, 9.0), (), 0, None, draw=k) for k in range(8)]
     found = [judge_draw(env, task) for task in tasks]
     assert [k for k, _, _ in found] == list(range(8))
     reached = [SCENE.sample(k, "validation").objects[0].pose[0] > 0.5 for k in range(8)]
@@ -101,9 +101,9 @@ def test_held_apart_draws_are_judged_without_noise_and_apart(maker):
 
 def test_a_worker_that_finds_an_error_says_it(maker):
     with pytest.raises(InputError, match="leaf 'first' has no policy yet"):
-        run([lane(0)], 1, lambda: make(sequence("s", Unprogrammed(name="first"), Train(Raise()))))
-    with pytest.raises(InputError, match="has 0 lessons, and none number 3"):
-        run([lane(0, lesson=3)], 1)
+        run([environment(0)], 1, lambda: make(sequence("s", Unprogrammed(name="first"), Train(Raise()))))
+    with pytest.raises(InputError, match="has 0 stages, and none number 3"):
+        run([environment(0, stage=3)], 1)
 
 
 def test_a_worker_that_raises_is_one_error(maker):
@@ -111,7 +111,7 @@ def test_a_worker_that_raises_is_one_error(maker):
         raise ZeroDivisionError("no such thing")
 
     with pytest.raises(MachineError, match=r"ZeroDivisionError\('no such thing'\)"):
-        run([lane(0), lane(1)], 2, broken)
+        run([environment(0), environment(1)], 2, broken)
 
 
 def test_a_worker_that_dies_is_one_error(maker):
@@ -119,12 +119,12 @@ def test_a_worker_that_dies_is_one_error(maker):
         os.kill(os.getpid(), signal.SIGKILL)
 
     with pytest.raises(MachineError, match=r"^a worker process ended; is there enough memory\?$"):
-        run([lane(0), lane(1)], 2, deadly)
+        run([environment(0), environment(1)], 2, deadly)
 
 
 def test_workers_end_when_they_are_told(maker):
     pool = Workers(make, 2)
-    dict(pool.each([lane(0), lane(1)]))
+    dict(pool.each([environment(0), environment(1)]))
     pids = [process.pid for process in pool._processes]
     pool.close()
     assert not any(alive(pid) for pid in pids)

@@ -13,31 +13,31 @@ from pathlib import Path
 
 import pytest
 
-from bt_tasksim.cli import main
-from bt_tasksim.errors import InputError
-from bt_tasksim.policy_files import load_card
-from bt_tasksim.training import command
+from bt_tasksim.cli.main import main
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.policy.files import load_card
+from bt_tasksim.training import session as command
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.ppo import Progress
+from bt_tasksim.training.record import Progress
 
 TINY = {
-    "steps": 128, "lanes": 2, "lane_steps": 32, "epochs": 1, "minibatch": 32, "evaluate_every": 1,
+    "steps": 128, "n_envs": 2, "n_steps": 32, "epochs": 1, "minibatch": 32, "evaluate_every": 1,
     "evaluation_draws": 2, "checkpoint_every": 1,
 }  # fmt: skip
 TWO = """
 from bt_tasksim import Train
-from concept_nodes import Grasp
-from trees import fallback
-from trees.scenarios.grasp_then_pick import scene
+from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.trees import fallback
+from bt_tasksim.trees.scenarios.grasp_then_pick import scene
 
 def build():
     return fallback("twice", *(Train(Grasp("target", name=name, timeout=2.0)) for name in ("first", "again")))
 """
 NEVER = """
 from bt_tasksim import Train
-from concept_nodes import Grasp, Pick
-from trees import sequence
-from trees.scenarios.grasp_then_pick import scene
+from bt_tasksim.concept_nodes import Grasp, Pick
+from bt_tasksim.trees import sequence
+from bt_tasksim.trees.scenarios.grasp_then_pick import scene
 
 def build():
     return sequence("never", Pick("target"), Train(Grasp("target")))
@@ -67,7 +67,7 @@ def call(capsys):
         capsys.readouterr()
         try:
             code = main(["train", *map(str, words)])
-        except SystemExit as end:  # argparse's own
+        except SystemExit as end:
             code = end.code
         return code, *capsys.readouterr()
 
@@ -133,7 +133,9 @@ def test_the_second_node_begins_when_a_resumed_training_gets_there(call, tiny):
 
 
 def test_settings_in_yaml():
-    Path("s.yaml").write_text("steps: 500\nhidden: [32]\nreward: {success: 2, gamma: 0.9}\n")
+    Path("s.yaml").write_text(
+        "steps: 500\nhidden: [32]\nreward: {success: 2, gamma: 0.9, sufficient: yes}\nclip: 1e-1\n"
+    )
     found = command.load_settings(Path("s.yaml"))
     assert (found.steps, found.hidden, found.reward.success, found.reward.gamma) == (500, (32,), 2, 0.9)
     assert command.load_settings(None) == TrainConfig()
@@ -146,14 +148,16 @@ def test_settings_in_yaml():
         ("reward: {sucess: 1}", "did you mean 'success'"),
         ("reward: 3", "'reward' should be a mapping"),
         ("steps: many", "'steps' should be a whole number"),
-        ("steps: 0", "'steps' should be a positive whole number"),
+        ("steps: 0", "'steps' should be at least 1"),
         ("steps: true", "'steps' should be a whole number"),
-        ("hidden: [64.5]", "'hidden' should be a list of whole numbers"),
+        ("hidden: [64.5]", "'hidden[0]' should be a whole number"),
         ("learning_rate: fast", "'learning_rate' should be a number"),
         ("reward: {sufficient: 1}", "'reward.sufficient' should be true or false"),
         ("- 1", "should be a mapping"),
         ("a: [", "not YAML"),
-        ("1: 2", "unknown setting '1'"),
+        ("steps: 5\nsteps: 6", "line 2: 'steps' stands there twice"),
+        ("epochs: " + "1" + "0" * 30, "'epochs' should be at most 1000"),
+        ("1: 2", "unknown field '1'"),
     ],
 )
 def test_settings_that_are_no_good(text, said):
@@ -192,7 +196,7 @@ def test_words_of_a_request_that_goes_on():
 def test_progress_in_words():
     progress = Progress("train grasp", (10, 20), 0.5, (3, 4), "all shapes", 900.0, 7500.0)
     said = command.describe(progress)
-    assert said == "50 % success, held apart 3 of 4, lesson 'all shapes', 900 decisions/s, 2 h 05 min left"
+    assert said == "50 % success, held apart 3 of 4, stage 'all shapes', 900 decisions/s, 2 h 05 min left"
 
 
 @pytest.mark.parametrize("kept", [True, False])
@@ -207,7 +211,7 @@ def test_an_interrupt_says_how_to_go_on(tiny, tmp_path, kept):
     assert " of 1000000, " in process.stderr.readline()
     time.sleep(0.3)
     os.killpg(process.pid, signal.SIGINT)
-    _, err = process.communicate(timeout=20)
+    _, err = process.communicate(timeout=60)
     assert process.returncode == 130
     last = err.splitlines()[-1]
     if kept:

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.concept import ConceptModel, Condition
-from bt_tasksim.context import Known, Seen
-from bt_tasksim.parameters import Flag, Metres, ObjectName, Ratio
-from bt_tasksim.world import Command, Hidden
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Flag, Metres, ObjectName, Ratio
+from bt_tasksim.core.world import Command, Hidden
 
 _spec = importlib.util.spec_from_file_location("toy_world", Path(__file__).parents[2] / "conftest.py")
 _shared = importlib.util.module_from_spec(_spec)
@@ -32,10 +33,10 @@ class World(_shared.ToyWorld):
         super().__init__()
         self.truth, self.error, self.depth, self.closed = 0.0, None, 0.0, 0
 
-    def step(self, command: Command, *, look: bool = False):
+    def step(self, command: Command):
         if self.error is not None and command.tool is not None:
             raise self.error
-        return super().step(command, look=look)
+        return super().step(command)
 
     def hidden(self) -> Hidden:
         n = len(self.now.objects)

@@ -6,9 +6,12 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-import trees
-from bt_tasksim.context import Context
-from bt_tasksim.errors import InputError
+from bt_tasksim import trees
+from bt_tasksim.concept.context import Context
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.outcomes import FAILED, TEXT, TIMED_OUT
+from bt_tasksim.trees.nodes.parallel import CHILDREN_FAILED
+from bt_tasksim.trees.nodes.retry import ATTEMPT_FAILED
 
 STATUS = {"R": Status.RUNNING, "S": Status.SUCCESS, "F": Status.FAILURE}
 LETTER = {status: letter for letter, status in STATUS.items()}
@@ -52,7 +55,8 @@ def test_retry_waits_a_tick_after_a_failure_at_once():
     tree = trees.retry(3, leaf)
     assert ticks(tree, 3) == "RRF"
     assert leaf.log == "FFF"
-    assert tree.feedback_message == "attempt 3 of 3 failed: answer 3"
+    assert tree.outcome.is_a(ATTEMPT_FAILED) and tree.outcome.numbers == {"attempt": 3, "attempts": 3}
+    assert tree.outcome.cause == FAILED(text="answer 3"), "what a plain behaviour says is kept"
     assert ticks(tree, 3) == "RRF"
 
 
@@ -75,7 +79,7 @@ def test_an_interrupted_retry_ends_its_child_and_counts_anew():
     assert leaf.log == "RFRx"
     assert leaf.status == Status.INVALID
     tree.tick_once()
-    assert tree.failures == 0
+    assert tree.rounds == 0
 
 
 def test_parallel_does_not_tick_finished_children_again():
@@ -112,7 +116,8 @@ def test_counts_of_a_parallel(scripts, success, failure, expected):
 def test_a_failed_parallel_says_why():
     tree = trees.parallel("p", Scripted("R", "a"), Scripted("F", "b"))
     tree.tick_once()
-    assert tree.feedback_message == "1 of 2 failed, last 'b': answer 1"
+    assert tree.outcome.is_a(CHILDREN_FAILED) and tree.outcome.names == {"last": "b"}
+    assert tree.outcome.numbers == {"failed": 1, "children": 2}
 
 
 def clocked(tree):
@@ -142,7 +147,7 @@ def test_timeout_names_what_was_not_done():
     context.now = 0.1
     tree.tick_once()
     assert tree.status == Status.FAILURE
-    assert tree.feedback_message == "not done within 0.1 s: answer 1"
+    assert tree.outcome == TIMED_OUT(TEXT(text="answer 1"), limit=0.1)
 
 
 def test_timeout_lets_a_result_through():

@@ -7,10 +7,9 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from toys import Below, Check, Move, Raise, Turn, Unprogrammed
 
-from bt_tasksim.errors import InputError
-from bt_tasksim.training.decorator import Train, concepts_in, follower_of, train_nodes
-from concept_nodes import Grasp, Pick, Wait
-from trees import (
+from bt_tasksim.concept_nodes import Grasp, Pick, Wait
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.trees import (
     fallback,
     force_failure,
     force_success,
@@ -22,6 +21,7 @@ from trees import (
     subtree,
     timeout,
 )
+from bt_tasksim.trees.nodes.train import Train, concepts_in, follower_of, train_nodes
 
 ANSWERS = {"R": Status.RUNNING, "S": Status.SUCCESS, "F": Status.FAILURE}
 

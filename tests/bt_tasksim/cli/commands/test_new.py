@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from bt_tasksim import new_concept
-from bt_tasksim.cli import main
-from bt_tasksim.errors import InputError, MachineError
+from bt_tasksim.checking import new_concept
+from bt_tasksim.cli.main import main
+from bt_tasksim.core.errors import InputError, MachineError
 
 FILES = ["push.py", "test_push.py", "train_push.py"]
 
@@ -35,8 +35,9 @@ def test_it_says_what_it_wrote_and_what_to_do_next(capsys):
         assert not re.search("@(name|Class|words)@", Path(name).read_text()), name
 
 
-def test_its_own_tests_pass_and_its_style_is_clean():
-    new_concept.write_concept("wipe_table")
+@pytest.mark.parametrize("like", [None, *new_concept.examples()])
+def test_its_own_tests_pass_and_its_style_is_clean(like):
+    new_concept.write_concept("wipe_table", like=like)
     text = Path("wipe_table.py").read_text()
     assert "class WipeTable(ConceptModel):" in text and "WipeTableMemory" in text
     rules = ["--select", "E,F,W,I,D,UP,B", "--ignore", "D103,D105,D401,D107,D203,D213,D407,D413"]
@@ -103,3 +104,13 @@ def test_nothing_stays_half_written(monkeypatch):
     with pytest.raises(MachineError):
         new_concept.write_concept("push")
     assert len(count) == 3 and here() == []
+
+
+def test_it_is_neutral_unless_an_example_is_asked_for(capsys):
+    assert main(["new", "concept", "tilt"]) == 0
+    text = Path("tilt.py").read_text().lower()
+    assert "class tilt(" in text and "push" not in text and text.count("todo") > 5
+    assert main(["new", "concept", "shove", "--like", "push"]) == 0
+    assert "Push an object" in Path("shove.py").read_text()
+    assert main(["new", "concept", "heave", "--like", "pusch"]) == 2
+    assert "did you mean 'push'" in capsys.readouterr().err and not Path("heave.py").exists()

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_tasksim import poses
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.errors import InputError, UnreachableError
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import load_robot
-from bt_tasksim.world import Command, JointTarget, WorldState
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError, UnreachableError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Command, JointTarget, WorldState
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.robot.description import load_robot
 
 PERIOD = 0.05
 DOWN = poses.frame_from_axes(np.array([0.0, 0.0, -1.0]), np.array([0.0, -1.0, 0.0]))

@@ -5,11 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bt_tasksim import poses
-from bt_tasksim.engines.features import TOUCH, ObservationBuilder
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import ObjectSpec, Scene
-from bt_tasksim.world import Observation, WorldState
+from bt_tasksim.core import poses
+from bt_tasksim.core.world import Observation, WorldState
+from bt_tasksim.engines.perception.features import TOUCH, ObservationBuilder
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import ObjectSpec
 
 SIZE = ((0.04, 0.06, 0.1),) * 2
 SCENE = Scene(objects={"box": ObjectSpec(("box",), "table", size=SIZE), "far": ObjectSpec(("cup",), "table")})

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bt_tasksim import poses
-from bt_tasksim.engines.noise import NOISE, noise_model
-from bt_tasksim.errors import InputError
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.engines.perception.noise import NOISE, noise_model
 
 N = 20000
 

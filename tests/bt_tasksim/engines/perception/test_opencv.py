@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 from raycast import box, image
 
-from bt_tasksim import poses
-from bt_tasksim.engines.camera_errors import PERFECT
-from bt_tasksim.engines.pipeline import Image, PostProcessEngine
-from bt_tasksim.engines.postprocess_opencv import APART, LOOKS, CameraPostProcess
-from bt_tasksim.errors import MachineError
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import ObjectSpec, Scene
-from bt_tasksim.world import WorldState
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.world import WorldState
+from bt_tasksim.engines.base import PostProcessEngine
+from bt_tasksim.engines.images import Image
+from bt_tasksim.engines.perception.camera_errors import PERFECT
+from bt_tasksim.engines.perception.opencv import APART, CAPTURES, CameraPostProcess
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import ObjectSpec
 
 SIZE = (0.07, 0.045, 0.1)
 SCENE = Scene("panda", objects={"pack": ObjectSpec(("box",), on="table", size=(SIZE, SIZE))})
@@ -35,8 +37,8 @@ class Bench:
         )
         self.time, self.looked = 0.0, []
 
-    def tick(self, tool, contacts=(False, False), needed=False, shown=True, taken=None):
-        names = self.post.cameras(needed)
+    def tick(self, tool, contacts=(False, False), look=False, shown=True, taken=None):
+        names = self.post.cameras(look)
         self.looked.append(bool(names))
         things = [(box(self.pose, SIZE), self.colour)] if shown else []
         images = {name: dataclasses.replace(image(things)[0], taken=taken) for name in names}
@@ -70,12 +72,12 @@ def above(bench):
 def test_it_is_a_post_process_engine():
     post = CameraPostProcess(load_robot("panda"))
     assert isinstance(post, PostProcessEngine)
-    assert post.perception == "camera"
+    assert post.wants_images
 
 
 def test_the_first_look_finds_it_and_then_nobody_looks():
     bench = Bench()
-    seen = bench.tick(AWAY, needed=True)
+    seen = bench.tick(AWAY, look=True)
     assert bench.error(seen) < 0.001
     for _ in range(20):
         again = bench.tick(AWAY)
@@ -85,10 +87,10 @@ def test_the_first_look_finds_it_and_then_nobody_looks():
 
 def test_a_concept_gets_the_look_it_asks_for():
     bench = Bench()
-    bench.tick(AWAY, needed=True)
+    bench.tick(AWAY, look=True)
     bench.pose[:2] += 0.05
     assert bench.error(bench.tick(AWAY)) > 0.05
-    assert bench.error(bench.tick(AWAY, needed=True)) < 0.001
+    assert bench.error(bench.tick(AWAY, look=True)) < 0.001
 
 
 def done(bench):
@@ -99,11 +101,11 @@ def done(bench):
 
 def test_looks_in_the_background_find_the_same_a_tick_later():
     here, there = Bench(), Bench(background=True)
-    assert np.array_equal(here.tick(AWAY, needed=True).objects, there.tick(AWAY, needed=True).objects)
+    assert np.array_equal(here.tick(AWAY, look=True).objects, there.tick(AWAY, look=True).objects)
     for bench in (here, there):
         bench.pose[:2] += 0.05
-    found = here.tick(AWAY, needed=True)
-    assert there.error(there.tick(AWAY, needed=True)) > 0.05  # the first look was waited for, this one is not
+    found = here.tick(AWAY, look=True)
+    assert there.error(there.tick(AWAY, look=True)) > 0.05  # the first look was waited for, this one is not
     done(there)
     assert np.array_equal(there.tick(AWAY).objects, found.objects)
     assert there.post.unseen() == {}
@@ -111,10 +113,10 @@ def test_looks_in_the_background_find_the_same_a_tick_later():
 
 def test_what_the_hand_has_taken_during_a_look_is_not_moved_by_it():
     bench = Bench(background=True)
-    before = bench.tick(AWAY, needed=True).objects
+    before = bench.tick(AWAY, look=True).objects
     tool = above(bench)
     bench.pose[:2] += 0.05
-    bench.tick(AWAY, needed=True)
+    bench.tick(AWAY, look=True)
     done(bench)
     assert np.allclose(bench.tick(tool, (True, True)).objects, before)
 
@@ -122,13 +124,13 @@ def test_what_the_hand_has_taken_during_a_look_is_not_moved_by_it():
 def test_a_hold_is_corrected_by_a_look_in_the_background():
     bench = Bench(background=True)
     tool = above(bench)
-    bench.tick(AWAY, needed=True)
+    bench.tick(AWAY, look=True)
     bench.tick(tool, (True, True))
     lift = poses.pose([0.0, 0.0, 0.15])
     tool, bench.pose = poses.multiply(lift, tool), poses.multiply(lift, bench.pose)
     bench.tick(tool, (True, True))
     bench.pose = bench.pose + np.array([0.004, 0, -0.003, 0, 0, 0, 0])  # it slips
-    assert bench.error(bench.tick(tool, (True, True), needed=True)) > 0.004
+    assert bench.error(bench.tick(tool, (True, True), look=True)) > 0.004
     done(bench)
     step = poses.pose([0.03, -0.02, 0.01])
     for _ in range(30):  # the tool goes on, also while there are looks
@@ -141,25 +143,25 @@ def test_a_hold_is_corrected_by_a_look_in_the_background():
 
 def test_a_new_episode_waits_for_the_look_of_the_last_one():
     bench = Bench(background=True)
-    bench.tick(AWAY, needed=True)
+    bench.tick(AWAY, look=True)
     bench.pose[:2] += 0.05
-    bench.tick(AWAY, needed=True)
+    bench.tick(AWAY, look=True)
     bench.post.reset(bench.world, bench.world.world_model(["left", "right"], 0.08))
     assert bench.post._pending is None and not np.isfinite(bench.tick(AWAY).objects).any()
 
 
 def test_errors_of_the_camera_are_seeded():
-    first, second, other = (Bench(None, seed).tick(AWAY, needed=True).objects for seed in (1, 1, 2))
+    first, second, other = (Bench(None, seed).tick(AWAY, look=True).objects for seed in (1, 1, 2))
     assert np.array_equal(first, second)
     assert not np.array_equal(first, other)
     bench = Bench(None)
-    assert 1e-5 < bench.error(bench.tick(AWAY, needed=True)) < 0.008
+    assert 1e-5 < bench.error(bench.tick(AWAY, look=True)) < 0.008
 
 
 def test_what_the_fingers_hold_moves_with_the_tool_and_is_looked_at():
     bench = Bench()
     tool = above(bench)
-    bench.tick(AWAY, needed=True)
+    bench.tick(AWAY, look=True)
     bench.tick(tool, (True, True))
     lift = poses.pose([0.03, -0.02, 0.15], poses.yaw(0.3))
     lifted, moved = poses.multiply(lift, tool), poses.multiply(lift, bench.pose)
@@ -174,7 +176,7 @@ def test_what_the_fingers_hold_moves_with_the_tool_and_is_looked_at():
 def test_a_contact_that_flickers_lets_nothing_go():
     bench = Bench()
     tool = above(bench)
-    bench.tick(AWAY, needed=True)
+    bench.tick(AWAY, look=True)
     bench.tick(tool, (True, True))
     for _ in range(APART - 1):
         bench.tick(tool, (True, False))
@@ -186,7 +188,7 @@ def test_a_contact_that_flickers_lets_nothing_go():
 def test_what_falls_is_looked_at_until_it_lies_still():
     bench = Bench()
     tool = above(bench)
-    bench.tick(AWAY, needed=True)
+    bench.tick(AWAY, look=True)
     bench.tick(tool, (True, True))
     tip = poses.from_rotation_vector(np.array([np.pi / 2, 0, 0]))
     bench.pose = poses.pose([0.45, 0.1, SIZE[1] / 2], poses.quat_multiply(poses.yaw(0.7), tip))
@@ -199,7 +201,7 @@ def test_what_falls_is_looked_at_until_it_lies_still():
 def test_a_brush_with_one_finger_is_followed_by_a_look():
     bench = Bench()
     tool = above(bench)
-    bench.tick(AWAY, needed=True)
+    bench.tick(AWAY, look=True)
     bench.tick(tool, (True, False))
     bench.pose[0] += 0.02
     for _ in range(20):
@@ -209,37 +211,37 @@ def test_a_brush_with_one_finger_is_followed_by_a_look():
 
 def test_what_never_was_seen_is_not_a_number_and_said_to_be_missing():
     bench = Bench()
-    seen = bench.tick(AWAY, needed=True, shown=False)
+    seen = bench.tick(AWAY, look=True, shown=False)
     assert np.all(np.isnan(seen.objects))
     said = bench.post.unseen()
     assert said == {"pack": "pack is not seen: camera 'scene' shows fewer than 30 pixels of its colour"}
-    assert bench.error(bench.tick(AWAY, needed=True)) < 0.001
+    assert bench.error(bench.tick(AWAY, look=True)) < 0.001
     assert bench.post.unseen() == {}
 
 
 def test_what_was_seen_and_is_hidden_keeps_its_pose_and_is_given_up():
     bench = Bench()
     tool = above(bench)
-    first = bench.tick(AWAY, needed=True)
+    first = bench.tick(AWAY, look=True)
     bench.tick(tool, (True, True))
     for _ in range(80):
         last = bench.tick(AWAY, shown=False)
     assert np.allclose(last.objects, first.objects, atol=1e-6)
-    assert sum(bench.looked[2:]) == LOOKS
+    assert sum(bench.looked[2:]) == CAPTURES
 
 
 def test_one_picture_is_one_look():
     bench = Bench()
-    bench.tick(AWAY, needed=True, taken=-0.1)
+    bench.tick(AWAY, look=True, taken=-0.1)
     bench.pose[:2] += 0.05  # an old picture would not show it
-    assert bench.error(bench.tick(AWAY, needed=True, taken=-0.1)) > 0.05
-    assert bench.error(bench.tick(AWAY, needed=True, taken=0.05)) < 0.001
+    assert bench.error(bench.tick(AWAY, look=True, taken=-0.1)) > 0.05
+    assert bench.error(bench.tick(AWAY, look=True, taken=0.05)) < 0.001
 
 
 def test_a_picture_from_before_the_hand_let_go_is_not_used():
     bench = Bench()
     tool = above(bench)
-    bench.tick(AWAY, needed=True, taken=-0.1)
+    bench.tick(AWAY, look=True, taken=-0.1)
     bench.tick(tool, (True, True))
     lay, bench.pose = bench.pose, bench.pose + np.array([0.05, 0.02, 0, 0, 0, 0, 0])
     there, old = bench.pose, bench.time
@@ -255,7 +257,7 @@ def test_a_picture_from_before_the_hand_let_go_is_not_used():
 def test_what_the_hand_holds_is_not_looked_for_where_it_was():
     bench = Bench()
     tool = above(bench)
-    bench.tick(AWAY, needed=True, taken=-0.1)
+    bench.tick(AWAY, look=True, taken=-0.1)
     bench.tick(tool, (True, True))
     slipped = bench.pose + np.array([0.004, 0, 0, 0, 0, 0, 0])
     held, bench.pose = bench.pose, slipped
@@ -281,7 +283,7 @@ def make_state(bench):
 
 @pytest.fixture(scope="module")
 def rendering():
-    from bt_tasksim.engines.rendering_sapien import SapienRendering
+    from bt_tasksim.engines.rendering.sapien import SapienRendering
 
     try:
         made = SapienRendering()

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from raycast import CAMERA, box, cylinder, image
+from raycast import CAMERA, box, cloud, cylinder, image
 
-from bt_tasksim import poses
-from bt_tasksim.engines.camera_errors import CameraErrors
-from bt_tasksim.engines.cameras import unproject
-from bt_tasksim.engines.pose_estimation import Target, estimate_pose, follow
-from bt_tasksim.engines.registration import UPRIGHT, View, judge_fit, register, sample_surface
-from bt_tasksim.fixtures import load_fixture
-from bt_tasksim.shapes import ShapeSize, object_model, shape
+from bt_tasksim.core import poses
+from bt_tasksim.engines.perception.camera_errors import CameraErrors
+from bt_tasksim.engines.perception.pose_estimation import Target, estimate_pose, follow
+from bt_tasksim.engines.perception.registration import UPRIGHT, DepthView, judge_fit, register, sample_surface
+from bt_tasksim.scene.fixtures import load_fixture
+from bt_tasksim.scene.shapes import ShapeSize, object_model, shape
 
 PLACES = load_fixture("table").place_models()
 RED = (0.86, 0.16, 0.15)
@@ -29,9 +28,9 @@ def view(depth, occluder=None, noise=None):
     things = [(depth, RED)] + ([] if occluder is None else [(occluder, (0.5, 0.5, 0.5))])
     seen, which = image(things)
     metres = seen.depth if noise is None else noise.depth(seen.depth, np.random.default_rng(0))
-    points = unproject(CAMERA, metres)[which == 1]
+    points = cloud(CAMERA, metres)[which == 1]
     points = points[points[:, 2] > 0.005]
-    return View(CAMERA, metres, np.random.default_rng(1).permutation(points))
+    return DepthView(CAMERA, metres, np.random.default_rng(1).permutation(points))
 
 
 def turned(found, true, symmetry):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from raycast import CAMERA, TABLE, box, image
 
-from bt_tasksim import poses
-from bt_tasksim.engines.segmentation import NEUTRAL, classify, find_segments, outside
-from bt_tasksim.shapes import KINDS
-from bt_tasksim.world import Obstacle
+from bt_tasksim.core import poses
+from bt_tasksim.core.world import Obstacle
+from bt_tasksim.engines.perception.segmentation import NEUTRAL, classify, find_segments, outside
+from bt_tasksim.scene.shapes import KINDS
 
 SHELF = [(0.72, 0.53, 0.34), (0.62, 0.44, 0.27)]
 OTHERS = np.array([NEUTRAL, TABLE, *SHELF])

@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bt_tasksim import poses
-from bt_tasksim.engines.noise import NoiseModel, noise_model
-from bt_tasksim.engines.pipeline import PostProcessEngine
-from bt_tasksim.engines.postprocess_state import StatePostProcess
-from bt_tasksim.errors import MachineError
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import Scene
-from bt_tasksim.world import WorldState
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.world import WorldState
+from bt_tasksim.engines.base import PostProcessEngine
+from bt_tasksim.engines.perception.noise import NoiseModel, noise_model
+from bt_tasksim.engines.perception.state import StatePostProcess
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
 
 ROBOT = load_robot("panda")
 SCENE = Scene(objects={"cup": "on table", "box": "on table"})

@@ -11,17 +11,20 @@ from hypothesis import strategies as st
 from physics_cases import PHYSICS, G, Still, assert_identical, episode, holding, runner_of, scene
 from py_trees.common import Status
 
-from bt_tasksim import poses
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.engines.physics_mujoco import MujocoPhysics
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import MachineError
-from bt_tasksim.fixtures import Box, Fixture
-from bt_tasksim.robot import load_robot
-from bt_tasksim.runner import Runner
-from bt_tasksim.scene import ActorConfiguration, ObjectActor, Scene
-from bt_tasksim.world import Command, JointTarget
-from trees.load import load_source
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.world import Command, JointTarget
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.engines.physics.mujoco import MujocoPhysics
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
+from bt_tasksim.scene.fixtures import Box, Fixture
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.trees.load import load_source
+
+pytestmark = pytest.mark.physical
 
 # ---- the robot --------------------------------------------------------------------------------------------
 
@@ -270,9 +273,9 @@ def test_a_world_that_blew_up_is_an_error_and_does_not_start_anew(tmp_path, monk
 def test_it_needs_no_other_simulator_and_no_torch():
     code = (
         "import sys, json;"
-        "from bt_tasksim.engines.physics_mujoco import MujocoPhysics;"
-        "from bt_tasksim.robot import load_robot;"
-        "from bt_tasksim.scene import Scene;"
+        "from bt_tasksim.engines.physics.mujoco import MujocoPhysics;"
+        "from bt_tasksim.robot.description import load_robot;"
+        "from bt_tasksim.scene.scene import Scene;"
         "p = MujocoPhysics(load_robot('panda'));"
         "p.reset(Scene(objects={'cup': 'on table'}).sample(0)); p.hidden();"
         "print(json.dumps(sorted({'sapien', 'mani_skill', 'torch', 'trimesh', 'scipy'} & set(sys.modules))))"

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from bt_tasksim.engines.mujoco_contacts import Body, Solid, Surface, add_pair, touching_pairs
+from bt_tasksim.engines.physics.mujoco_contacts import Body, ContactSurface, Solid, add_pair, touching_pairs
 
 BODIES = {
     "base": Body("base", -1, "base"),
@@ -25,7 +25,7 @@ NEVER = {
 
 
 def pairs(names):
-    solids = [Solid(f"{name}/{k}", BODIES[name], Surface(0.5)) for name in names for k in range(2)]
+    solids = [Solid(f"{name}/{k}", BODIES[name], ContactSurface(0.5)) for name in names for k in range(2)]
     found = {frozenset((a.body.name, b.body.name)) for a, b in touching_pairs(solids)}
     assert all(len(pair) == 2 for pair in found), "nothing touches itself"
     return found
@@ -54,7 +54,7 @@ def test_friction_is_the_mean_and_pads_resist_twisting(a, b, friction, twist, co
         body.add_freejoint()
         body.mass, body.inertia = 1.0, [1.0, 1.0, 1.0]
         body.add_geom(name=name, size=[0.1, 0.1, 0.1], contype=0, conaffinity=0)
-        solids.append(Solid(name, BODIES[name], Surface(mu, patch)))
+        solids.append(Solid(name, BODIES[name], ContactSurface(mu, patch)))
     add_pair(spec, *solids)
     model = spec.compile()
     assert model.npair == 1 and model.pair_dim[0] == condim

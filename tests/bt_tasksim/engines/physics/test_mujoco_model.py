@@ -4,16 +4,17 @@ import numpy as np
 import pinocchio
 import pytest
 
-from bt_tasksim import poses
-from bt_tasksim.engines.mujoco_contacts import TIMESTEP
-from bt_tasksim.engines.mujoco_model import GRAVITY, build_world
-from bt_tasksim.engines.mujoco_robot import drive_armature
-from bt_tasksim.engines.urdf_links import load_links
-from bt_tasksim.errors import InputError
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import ObjectSpec, Scene
-from bt_tasksim.shapes import KINDS
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.engines.physics.mujoco_contacts import TIMESTEP
+from bt_tasksim.engines.physics.mujoco_model import GRAVITY, build_world
+from bt_tasksim.engines.physics.mujoco_robot import drive_armature
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.urdf_links import load_links
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.shapes import KINDS
+from bt_tasksim.scene.specs import ObjectSpec
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.engines.pipeline import CameraModel, Image
+from bt_tasksim.core.world import WorldState
+from bt_tasksim.engines.images import CameraModel, Image
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.remote.handshake import identity
-from bt_tasksim.engines.remote.messages import Message, encode, sizes_of
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import Scene
-from bt_tasksim.world import WorldState
+from bt_tasksim.engines.remote.messages import Message, encode
+from bt_tasksim.engines.remote.schema import sizes_of
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[4]
 START = 60.0

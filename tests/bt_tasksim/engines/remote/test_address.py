@@ -2,8 +2,8 @@
 
 import pytest
 
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.engines.remote.address import listening, parse_remote
-from bt_tasksim.errors import InputError
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,13 @@ import shutil
 
 import pytest
 
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.resources import asset
 from bt_tasksim.engines.remote.configurations import as_received, find_mesh, for_sending, mesh_name
-from bt_tasksim.errors import InputError
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import ObjectSpec, Scene
-from trees.load import load_source, scenarios
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import ObjectSpec
+from bt_tasksim.trees.load import load_source, scenarios
 
 BOTTLE = asset("objects", "bottle.obj")
 

@@ -7,9 +7,9 @@ import stat
 import pytest
 import zmq
 
+from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.engines.remote import keys
 from bt_tasksim.engines.remote.keys import CLIENT, SERVER, load_key, make_keys
-from bt_tasksim.errors import InputError, MachineError
 
 
 @pytest.fixture

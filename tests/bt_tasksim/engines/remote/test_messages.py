@@ -10,28 +10,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bt_tasksim.engines.pipeline import CameraModel
-from bt_tasksim.engines.remote import messages as messages_file
-from bt_tasksim.engines.remote import plain
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.world import Hidden, JointTarget, Observation, PlaceModel, WorldState
+from bt_tasksim.engines.images import CameraModel
+from bt_tasksim.engines.remote import plain, schema
 from bt_tasksim.engines.remote.bundles import arrays_of, bundle_of
-from bt_tasksim.engines.remote.messages import (
+from bt_tasksim.engines.remote.messages import BadMessageError, Message, decode, encode
+from bt_tasksim.engines.remote.plain import LARGEST
+from bt_tasksim.engines.remote.schema import (
     LARGEST_HEADER,
     PROTOCOL,
     REQUESTS,
     SCHEMA,
     ArraySpec,
-    BadMessageError,
-    Message,
     MessageSpec,
-    decode,
-    encode,
     layout_digest,
 )
-from bt_tasksim.engines.remote.plain import LARGEST
-from bt_tasksim.errors import InputError
-from bt_tasksim.fixtures import Box, Fixture, Place
-from bt_tasksim.scene import ActorConfiguration, Disturbance, Goal, ObjectActor, Scene
-from bt_tasksim.world import Hidden, JointTarget, Observation, PlaceModel, WorldState
+from bt_tasksim.scene.configuration import ActorConfiguration, Disturbance, ObjectActor
+from bt_tasksim.scene.fixtures import Box, Fixture, Place
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import Goal
 
 SIZES = {"joints": 9, "arm": 7, "hand": 2, "tips": 2, "closures": 1, "objects": 2, "bodies": 4}
 NUMBERS = {"finite": st.floats(-LARGEST, LARGEST), "not NaN": st.floats(allow_nan=False), "any": st.floats()}
@@ -164,9 +162,9 @@ def test_a_changed_array_is_another_layout(monkeypatch):
         monkeypatch.setitem(SCHEMA, kind, MessageSpec(arrays={"time": array}))
         digests.add(layout_digest())
     wide = ArraySpec(("height", "width"), "<f8", optional=True)
-    monkeypatch.setitem(messages_file._IMAGE, "depth", wide)
+    monkeypatch.setitem(schema.IMAGE, "depth", wide)
     digests.add(layout_digest())
-    monkeypatch.setattr(messages_file, "PROTOCOL", 2)
+    monkeypatch.setattr(schema, "PROTOCOL", 2)
     assert len(digests | {layout_digest()}) == 5
 
 
@@ -272,7 +270,7 @@ def test_ten_thousand_malformed_messages(state, world, image):
         Message(2, "solve", arrays={**arrays_of(state), "tool": state.tool_pose}),
         Message(3, "observe", arrays=arrays_of(state), images=(image,)),
         Message(4, "reset", {"configuration": world}),
-        Message(5, "cameras", {"needed": True}),
+        Message(5, "cameras", {"first": True}),
         Message(6, "hidden"),
     ]
     originals = [[bytes(f) for f in encode(m, SIZES)] for m in sent]

@@ -14,20 +14,22 @@ import numpy as np
 import pytest
 import zmq
 
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.core.errors import InputError, LostEngine, MachineError
+from bt_tasksim.core.world import Command, JointTarget
+from bt_tasksim.engines.base import KinematicsEngine
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.remote import memory
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.remote.client import Connection, Limits
 from bt_tasksim.engines.remote.engines import RemoteKinematics, RemotePhysics
 from bt_tasksim.engines.remote.keys import CLIENT, SERVER, Key, load_key, make_keys
 from bt_tasksim.engines.remote.memory import MemoryWatch
-from bt_tasksim.engines.remote.messages import REPLIES, Message, decode, encode
+from bt_tasksim.engines.remote.messages import Message, decode, encode
+from bt_tasksim.engines.remote.schema import REPLIES
 from bt_tasksim.engines.remote.server import EngineServer
 from bt_tasksim.engines.remote.session import Session
-from bt_tasksim.errors import InputError, LostEngine, MachineError
+from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.training.evaluation import Job, evaluate
-from bt_tasksim.world import Command, JointTarget
 
 from .conftest import ROOT, hello, served
 from .test_messages import damaged
@@ -146,11 +148,11 @@ def test_something_else_at_this_port(robot, answer):
 
 CONNECT = """
 import sys
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.remote import memory
 from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.remote.client import Connection, Limits
-from bt_tasksim.robot import load_robot
+from bt_tasksim.robot.description import load_robot
 Connection(Address("127.0.0.1", int(sys.argv[1])), "physics", load_robot("panda"), limits=Limits(connect=1.0))
 """
 
@@ -172,7 +174,7 @@ def fake(robot):
                 if replies:
                     router.send_multipart([client, *replies.pop(0)(number)])
                 else:
-                    own = {**_welcome(robot), "engine": "fake"}
+                    own = {**_welcome(robot), "engine": "fake", "wants_images": False}
                     router.send_multipart([client, *encode(Message(number, "welcome", own), {})])
 
     thread = threading.Thread(target=serve)
@@ -211,7 +213,7 @@ def test_a_server_that_answers_nonsense(fake, robot, answer, sentence):
 
 def test_a_server_of_another_version_that_did_not_look(fake, robot):
     port, replies = fake
-    other = {**_welcome(robot), "engine": "fake", "version": "9.9"}
+    other = {**_welcome(robot), "engine": "fake", "wants_images": False, "version": "9.9"}
     replies.append(lambda n: encode(Message(n, "welcome", other), {}))
     with pytest.raises(InputError, match=r"the server has bt-tasksim '9.9' and the client"):
         Connection(Address("127.0.0.1", port), "physics", robot, limits=QUICK)
@@ -302,9 +304,9 @@ def test_a_client_that_is_killed_in_an_episode(server, robot, world, state, raw)
 
 HOLD = """
 import sys
-from bt_tasksim.engines.registry import EngineOptions, build_pipeline
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import Scene
+from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
 port, timeout = sys.argv[1:]
 options = EngineOptions(kinematics=f"remote:127.0.0.1:{port}", timeout=float(timeout))
 line = build_pipeline(load_robot("panda"), options)
@@ -399,7 +401,7 @@ def test_half_a_message_holds_nobody_up(server, robot, world, state, half):
         engine.close()
 
 
-class Slow:
+class Slow(KinematicsEngine):
     """Kinematics that takes its time: `busy` says in what, and it goes on when `go` is set."""
 
     def __init__(self, robot, busy=""):

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bt_tasksim.engines.pipeline import CameraModel
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.engines.images import CameraModel
 from bt_tasksim.engines.remote.plain import LARGEST, LONGEST_LIST, from_plain, shown, to_plain
-from bt_tasksim.errors import InputError
-from bt_tasksim.scene import ActorConfiguration, Disturbance, Goal
-from trees.load import load_source, scenarios
+from bt_tasksim.scene.configuration import ActorConfiguration, Disturbance
+from bt_tasksim.scene.specs import Goal
+from bt_tasksim.trees.load import load_source, scenarios
 
 
 def again(kind, value):

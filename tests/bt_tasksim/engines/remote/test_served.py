@@ -6,24 +6,19 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.engines.pipeline import (
-    EnginePipeline,
-    KinematicsEngine,
-    PhysicsEngine,
-    PostProcessEngine,
-    RenderingEngine,
-)
-from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
-from bt_tasksim.engines.registry import EngineOptions, build_engine, build_pipeline, connect, result_names
-from bt_tasksim.engines.remote.engines import ENGINES
-from bt_tasksim.errors import InputError, MachineError, UnreachableError
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import load_robot
-from bt_tasksim.runner import Runner
+from bt_tasksim.core.errors import InputError, MachineError, UnreachableError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.core.world import Command, JointTarget
+from bt_tasksim.engines.base import KinematicsEngine, PhysicsEngine, PostProcessEngine, RenderingEngine
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.engines.perception.opencv import CameraPostProcess
+from bt_tasksim.engines.pipeline import EnginePipeline
+from bt_tasksim.engines.remote.engines import RemotePostProcess, RemoteRendering
+from bt_tasksim.execution.pipelines import EngineOptions, build_engine, build_pipeline, result_names
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.robot.description import load_robot
 from bt_tasksim.training.evaluation import Job, evaluate
-from bt_tasksim.world import Command, JointTarget
-from trees.load import load_source
+from bt_tasksim.trees.load import load_source
 
 from .conftest import served
 
@@ -41,7 +36,7 @@ def kinematics(folder):
 
 
 def connected(role, server, robot):
-    return connect(role, server.name, robot, EngineOptions())
+    return build_engine(role, server.name, robot)
 
 
 def episode(seed, **options):
@@ -126,7 +121,7 @@ def test_results_say_which_engine_was_behind_an_address(physics):
 
 
 def test_an_episode_that_begins_with_the_hand_above_the_object(kinematics, physics):
-    world = load_source("grasp_then_pick").scene.sample(2, lesson=0)
+    world = load_source("grasp_then_pick").scene.sample(2, stage=0)
     assert world.hand_start
     states = []
     for options in ({}, {"kinematics": kinematics.name, "engines": physics.name}):
@@ -158,7 +153,7 @@ def test_served_perception_sees_in_pictures_what_it_sees_here(folder, robot, wor
     model = world.world_model([tip.name for tip in robot.tips], robot.opening)
     with served(folder, "postprocess", "camera") as server:
         remote = connected("postprocess", server, robot)
-        assert remote.perception == "camera"
+        assert remote.wants_images and remote.served_name == "camera"
         own = CameraPostProcess(robot)
         for engine in (remote, own):
             engine.reset(world, model)
@@ -178,7 +173,7 @@ def test_served_perception_sees_in_pictures_what_it_sees_here(folder, robot, wor
 def test_pictures_drawn_there_are_those_drawn_here(folder, world, state):
     """With a robot of one's own, from a file."""
     file = folder / "mine.yaml"
-    file.write_text(asset("robots", "panda.yaml").read_text() + SMALL_CAMERA)
+    file.write_text(asset("robots", "panda.yaml").read_text().replace("cameras: {}\n", SMALL_CAMERA))
     robot = load_robot(str(file))
     world = dataclasses.replace(world, robot=str(file))
     try:
@@ -208,8 +203,8 @@ cameras:
 def test_served_engines_play_their_roles(physics, kinematics, robot):
     a, b = connected("physics", physics, robot), connected("kinematics", kinematics, robot)
     assert isinstance(a, PhysicsEngine) and isinstance(b, KinematicsEngine)
-    assert issubclass(ENGINES["rendering"], RenderingEngine)
-    assert issubclass(ENGINES["postprocess"], PostProcessEngine)
+    assert issubclass(RemoteRendering, RenderingEngine)
+    assert issubclass(RemotePostProcess, PostProcessEngine)
     EnginePipeline(b, a, a).close()
     assert a.connection.broken and b.connection.broken
     with pytest.raises(MachineError, match="is closed"):

@@ -6,14 +6,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bt_tasksim.engines.physics_sapien import SapienPhysics
+from bt_tasksim.core.errors import InputError, LostEngine, MachineError, NoWayError, UnreachableError
+from bt_tasksim.core.world import JointTarget
+from bt_tasksim.engines.base import PhysicsEngine
+from bt_tasksim.engines.physics.sapien import SapienPhysics
 from bt_tasksim.engines.remote.configurations import for_sending
 from bt_tasksim.engines.remote.handshake import identity, mismatch
-from bt_tasksim.engines.remote.messages import REPLIES, BadMessageError, Message, decode, encode, sizes_of
+from bt_tasksim.engines.remote.messages import BadMessageError, Message, decode, encode
+from bt_tasksim.engines.remote.schema import REPLIES, sizes_of
 from bt_tasksim.engines.remote.session import Session, error_of, plain_sentence
-from bt_tasksim.errors import InputError, LostEngine, MachineError, NoWayError, UnreachableError
-from bt_tasksim.robot import load_robot
-from bt_tasksim.world import JointTarget
+from bt_tasksim.robot.description import load_robot
 
 from .conftest import hello
 from .test_messages import damaged
@@ -21,7 +23,7 @@ from .test_messages import damaged
 ME, YOU = b"me", b"you"
 
 
-class Arm:
+class Arm(PhysicsEngine):
     """Physics that does as it is told."""
 
     def __init__(self, state):
@@ -142,7 +144,7 @@ def test_errors_come_back_as_the_same_kind(stage, error, kind, said):
             0.5,
         ) and not stage.refused
     stage.arm.error = None
-    known = type(error).__module__ == "bt_tasksim.errors"
+    known = type(error).__module__ == "bt_tasksim.core.errors"
     after = stage.step()
     assert after.kind == "state" if known else "it has to be reset first" in sentence(after)
     assert stage.reset().kind == "state"
@@ -168,7 +170,7 @@ def test_a_world_that_cannot_be_built_leaves_no_episode(stage):
 
 def test_requests_of_another_role_do_not_belong_here(stage):
     stage.hello(), stage.reset()
-    assert "'cameras' does not belong here" in sentence(stage.say("cameras", fields={"needed": True}))
+    assert "'cameras' does not belong here" in sentence(stage.say("cameras", fields={"first": True}))
 
 
 def test_nonsense_is_answered_with_the_number_that_could_be_read(stage):

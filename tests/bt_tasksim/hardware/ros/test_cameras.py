@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 import pytest
 
-from bt_tasksim.engines.ros.cameras import EVERY, TOGETHER, RosCameras
-from bt_tasksim.engines.ros.setting import load_setting
-from bt_tasksim.errors import MachineError
-from bt_tasksim.robot import load_robot
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.hardware.ros.cameras import EVERY, TOGETHER, RosCameras
+from bt_tasksim.hardware.ros.setting import load_setting
+from bt_tasksim.robot.description import load_robot
 
 SETTING = load_setting(load_robot("panda"))
 TOPICS = SETTING.cameras["scene"]

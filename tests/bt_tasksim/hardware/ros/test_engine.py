@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 import yaml
 
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.core.world import JointTarget
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.remote.address import Address
-from bt_tasksim.engines.ros.engine import RosRobot
-from bt_tasksim.engines.ros.messages import RefusedError
-from bt_tasksim.engines.ros.sensors import Newest
-from bt_tasksim.engines.ros.setting import load_setting
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.resources import asset
-from bt_tasksim.robot import load_robot
-from bt_tasksim.safety.engine import RealEngine
-from bt_tasksim.scene import Scene
-from bt_tasksim.twin.controller import Controller, Trajectory
-from bt_tasksim.world import JointTarget
+from bt_tasksim.hardware.ros.engine import RosRobot
+from bt_tasksim.hardware.ros.messages import UnusableMessageError
+from bt_tasksim.hardware.ros.sensors import Newest
+from bt_tasksim.hardware.ros.setting import load_setting
+from bt_tasksim.hardware.safety.engine import RealEngine
+from bt_tasksim.hardware.twin.controller import Controller, Trajectory
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
 
 ROBOT = load_robot("panda")
 KINEMATICS = PinocchioKinematics(ROBOT)
@@ -101,7 +101,7 @@ def test_nonsense_leaves_the_last_state() -> None:
     robot = engine()
     feel(robot)
     before = robot.latest()
-    with pytest.raises(RefusedError):
+    with pytest.raises(UnusableMessageError):
         robot.joints.take({"name": [1]}, 0.0)
     assert robot.latest() is before
 

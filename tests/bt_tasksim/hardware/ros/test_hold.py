@@ -7,11 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from bt_tasksim.engines.ros import messages
-from bt_tasksim.engines.ros.hold import EVERY, Motion, _motion, _standing
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import load_robot
-from bt_tasksim.twin.controller import Controller, Trajectory
+from bt_tasksim.core.poses import Array
+from bt_tasksim.hardware.ros import messages
+from bt_tasksim.hardware.ros.hold import EVERY, JointSample, _motion, _standing
+from bt_tasksim.hardware.twin.controller import Controller, Trajectory
+from bt_tasksim.robot.description import load_robot
 
 ROBOT = load_robot("panda")
 assert ROBOT.safety is not None
@@ -74,7 +74,7 @@ def test_the_watchdog_finds_the_same_point() -> None:
         velocity = rng.uniform(-1.0, 1.0, N) * rng.choice([0.0, 0.1, 2.0, 100.0])
         can = np.clip(velocity, -LIMITS.velocity, LIMITS.velocity)
         point = messages.standing(position, can, LIMITS.acceleration, LIMITS.lower, LIMITS.upper)
-        found = _standing(Motion(0.0, position.tolist(), velocity.tolist()), limits)
+        found = _standing(JointSample(0.0, position.tolist(), velocity.tolist()), limits)
         after = found["time_from_start"]
         assert np.allclose(found["positions"], point.position) and not any(found["velocities"])
         assert after["sec"] + 1e-9 * after["nanosec"] == pytest.approx(point.time, abs=1e-8)
@@ -85,9 +85,11 @@ def test_the_watchdog_knows_the_speed_said_or_not() -> None:
         return json.dumps({"msg": {"name": ["x", "b", "a"], "position": [9.0, 2.0, 1.0], **more}})
 
     joints = ["a", "b"]
-    assert _motion(said(velocity=[0.0, 0.2, 0.1]), joints, 5.0, None) == Motion(5.0, [1.0, 2.0], [0.1, 0.2])
-    assert _motion(said(), joints, 5.0, None) == Motion(5.0, [1.0, 2.0], [0.0, 0.0])
-    before = Motion(5.0 - EVERY / 1000, [0.98, 2.0], [0.0, 0.0])
+    assert _motion(said(velocity=[0.0, 0.2, 0.1]), joints, 5.0, None) == JointSample(
+        5.0, [1.0, 2.0], [0.1, 0.2]
+    )
+    assert _motion(said(), joints, 5.0, None) == JointSample(5.0, [1.0, 2.0], [0.0, 0.0])
+    before = JointSample(5.0 - EVERY / 1000, [0.98, 2.0], [0.0, 0.0])
     found = _motion(said(velocity=[]), joints, 5.0, before)
     assert found is not None and np.allclose(found.velocity, [1.0, 0.0])
     for unsaid in ([1.0], ["?"] * 3, [None] * 3, 3):

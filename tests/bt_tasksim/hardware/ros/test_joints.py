@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bt_tasksim.engines.ros.joints import JointFeed
-from bt_tasksim.engines.ros.messages import RefusedError
-from bt_tasksim.engines.ros.setting import load_setting
-from bt_tasksim.robot import load_robot
+from bt_tasksim.hardware.ros.joints import JointFeed
+from bt_tasksim.hardware.ros.messages import UnusableMessageError
+from bt_tasksim.hardware.ros.setting import load_setting
+from bt_tasksim.robot.description import load_robot
 
 ROBOT = load_robot("panda")
 SETTING = load_setting(ROBOT)
@@ -35,7 +35,7 @@ def feed() -> JointFeed:
 def test_an_older_state_does_not_take_the_place_of_a_newer_one(feed: JointFeed) -> None:
     feed.take(states(10.1, first=0.5), HOUR + 10.105)
     for stamp in (10.1, 10.05):
-        with pytest.raises(RefusedError, match="before the last ones, not after them"):
+        with pytest.raises(UnusableMessageError, match="before the last ones, not after them"):
             feed.take(states(stamp, first=0.2), HOUR + 10.12)
     assert feed.newest is not None and feed.newest.position[0] == 0.5
     feed.forget()

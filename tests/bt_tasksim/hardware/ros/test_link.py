@@ -8,7 +8,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from bt_tasksim.engines.ros.link import Link
+from bt_tasksim.hardware.ros.link import Link
 
 
 def link_of(sent: list[Any], waiting: list[Callable[[], None]]) -> Link:

@@ -15,8 +15,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_tasksim.engines.ros import messages
-from bt_tasksim.engines.ros.messages import RefusedError
+from bt_tasksim.hardware.ros import messages
+from bt_tasksim.hardware.ros.messages import UnusableMessageError
 
 STAMP = {"sec": 12, "nanosec": 500_000_000}
 HEADER = {"stamp": STAMP, "frame_id": "base"}
@@ -94,7 +94,7 @@ def test_a_depth_image_of_another_encoding(kind: Any, sentence: str) -> None:
         message = {**GOOD["depth"], "format": kind}
         return messages.image_content(message, "depth image", (8, 6), messages.MILLIMETRES)
 
-    with pytest.raises(RefusedError, match=sentence):
+    with pytest.raises(UnusableMessageError, match=sentence):
         read(kind)
     for good in ("16UC1; compressedDepth png", "mono16; png compressed", "png", ""):
         assert np.allclose(messages.metres(read(good)[0]), DEPTH / 1000.0)
@@ -104,7 +104,7 @@ def test_the_size_of_a_jpeg_is_read_before_it_is_unpacked() -> None:
     jpeg = cv2.imencode(".jpg", COLOUR)[1].tobytes()
     message = {**GOOD["colour"], "data": base64.b64encode(jpeg).decode()}
     assert READ["colour"](message).shape == (6, 8, 3)
-    with pytest.raises(RefusedError, match="8 x 6 pixels, and the camera has 640 x 480"):
+    with pytest.raises(UnusableMessageError, match="8 x 6 pixels, and the camera has 640 x 480"):
         messages.image_content(message, "colour image", (640, 480))
 
 
@@ -135,7 +135,7 @@ def test_the_size_of_a_jpeg_is_read_before_it_is_unpacked() -> None:
     ],
 )
 def test_what_is_wrong_is_said(kind: str, change: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(RefusedError, match=sentence) as refused:
+    with pytest.raises(UnusableMessageError, match=sentence) as refused:
         READ[kind]({**GOOD[kind], **change})
     assert len(str(refused.value)) < 200
 
@@ -151,7 +151,7 @@ anything = st.recursive(
 @settings(max_examples=200, deadline=None)
 def test_nothing_but_a_refusal(value: Any) -> None:
     for read in READ.values():
-        with pytest.raises(RefusedError):
+        with pytest.raises(UnusableMessageError):
             read(value)
 
 
@@ -193,7 +193,7 @@ def test_thousands_of_damaged_messages(kind: str) -> None:
             message = changed(message, rng)
         try:
             value = READ[kind](message)
-        except RefusedError as error:
+        except UnusableMessageError as error:
             refused += 1
             assert "\n" not in str(error) and len(str(error)) < 250
             continue

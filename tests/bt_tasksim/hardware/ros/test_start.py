@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.engines.ros.setting import load_setting
-from bt_tasksim.engines.ros.start import PERIOD, WayToStart
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.robot import load_robot
-from bt_tasksim.safety.engine import JointReading
-from bt_tasksim.world import JointTarget
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.world import JointTarget
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.hardware.ros.setting import load_setting
+from bt_tasksim.hardware.ros.start import PERIOD, WayToStart
+from bt_tasksim.hardware.safety.engine import JointReading
+from bt_tasksim.robot.description import load_robot
 
 ROBOT = load_robot("panda")
 KINEMATICS = PinocchioKinematics(ROBOT)
@@ -71,11 +71,11 @@ def test_it_ends_there_within_the_share_of_the_limits() -> None:
 
 
 def test_it_does_not_make_up_for_lost_time() -> None:
-    arm, beats = Arm(stall=0.04), list[float]()
-    arm.way().go(goal(0, 0.05), lambda: beats.append(time.monotonic()))
+    arm, heartbeats = Arm(stall=0.04), list[float]()
+    arm.way().go(goal(0, 0.05), lambda: heartbeats.append(time.monotonic()))
     times = [at for _, _, at in arm.sent]
     assert len(times) > 6
-    assert len(beats) > len(times) and np.max(np.diff(beats)) < 0.15, "the watchdog watches"
+    assert len(heartbeats) > len(times) and np.max(np.diff(heartbeats)) < 0.15, "the watchdog watches"
     assert np.min(np.diff(times)) > 0.6 * PERIOD
 
 

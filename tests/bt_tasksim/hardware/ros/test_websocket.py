@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import base64
+import hashlib
 import json
+import re
+import socket as py_socket
 import subprocess
 import sys
 import threading
@@ -13,8 +17,8 @@ from typing import Any
 
 import pytest
 
-from bt_tasksim.engines.ros.hold import RosHold
-from bt_tasksim.engines.ros.websocket import LARGEST, WebSocket
+from bt_tasksim.hardware.ros.hold import RosHold
+from bt_tasksim.hardware.ros.websocket import LARGEST, WebSocket
 
 websockets = pytest.importorskip("websockets")
 
@@ -133,6 +137,59 @@ def test_the_watchdog_says_hold_and_where_the_arm_is(server: Server) -> None:
         )
 
 
+ODD = {
+    "digits": '{"msg": {"name": ["a"], "position": [1' + "0" * 400 + "]}}",
+    "too many digits": '{"msg": {"name": ["a"], "position": [1' + "0" * 10_000 + "]}}",
+    "digits of a speed": '{"msg": {"name": ["a"], "position": [1], "velocity": [1' + "0" * 400 + "]}}",
+    "deep": "[" * 100_000,
+    "deep in a message": '{"msg": {"name": ["a"], "position": [' + "[" * 50_000 + "]" * 50_000 + "]}}",
+    "names that are lists": '{"msg": {"name": [["a"]], "position": [1]}}',
+    "a word": '"msg"',
+    "infinite": '{"msg": {"name": ["a"], "position": [Infinity]}}',
+    "no text": "\x00\ufffd\ud7ff",
+    "words as numbers": '{"msg": {"name": ["a"], "position": ["2.5"]}}',
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_the_watchdog_outlives_any_message(server: Server, name: str) -> None:
+    """Where the robot takes no word to hold, the arm is held by what is known of it, so that has to go on."""
+    hold = RosHold("127.0.0.1", server.port, "/states", "/arm", ["a"], "", [2.0], [7.5], [-3.0], [3.0])
+    hold.open()
+    deadline = time.monotonic() + 5.0
+    while len(server.heard) < 2 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    server.say(ODD[name])
+    time.sleep(0.05)
+    server.say(json.dumps({"msg": {"name": ["a"], "position": [1.0]}}))
+    time.sleep(0.04)
+    hold.hold("the runner is gone")
+    while len(server.heard) < 3 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert json.loads(server.heard[2])["msg"]["points"][0]["positions"] == [1.0]
+    hold.close()
+
+
+@pytest.mark.parametrize("frame", [b"\xf1\x02hi", b"\x81\x82\x00\x00\x00\x00hi", b"\x81\x7f" + b"\xff" * 8])
+def test_frames_that_no_server_sends_end_the_connection(frame: bytes) -> None:
+    with py_socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve() -> None:
+            peer = listening.accept()[0]
+            key = re.search(rb"Sec-WebSocket-Key: (\S+)", peer.recv(4096))[1]
+            accept = base64.b64encode(hashlib.sha1(key + b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11").digest())
+            head = b"HTTP/1.1 101 Switching Protocols\r\nSec-WebSocket-Accept: " + accept + b"\r\n\r\n"
+            peer.sendall(head + frame)
+            time.sleep(2.0)
+            peer.close()
+
+        threading.Thread(target=serve, daemon=True).start()
+        socket = WebSocket("127.0.0.1", listening.getsockname()[1])
+        with pytest.raises(OSError, match="frame"):
+            socket.receive(1.5)
+        socket.close()
+
+
 def test_the_watchdog_connects_again(server: Server) -> None:
     hold = RosHold("127.0.0.1", server.port, "/states", "/arm", ["a"], "/hold", [2.0], [7.5], [-3.0], [3.0])
     hold.open()
@@ -152,5 +209,5 @@ def test_the_watchdog_connects_again(server: Server) -> None:
 
 def test_the_channel_loads_nothing_heavy() -> None:
     heavy = "('numpy', 'yaml', 'cv2', 'roslibpy')"
-    look = f"import sys, bt_tasksim.engines.ros.hold; print([m for m in sys.modules if m in {heavy}])"
+    look = f"import sys, bt_tasksim.hardware.ros.hold; print([m for m in sys.modules if m in {heavy}])"
     assert subprocess.run([sys.executable, "-c", look], capture_output=True, text=True).stdout.strip() == "[]"

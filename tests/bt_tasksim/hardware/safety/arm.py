@@ -18,15 +18,16 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim import Runner, Scene
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.engines.features import ObservationBuilder
-from bt_tasksim.engines.kinematics_pinocchio import PinocchioKinematics
-from bt_tasksim.engines.registry import robot_pipeline
-from bt_tasksim.errors import MachineError
-from bt_tasksim.robot import load_robot
-from bt_tasksim.safety.engine import ChannelSpec, EmergencyStop, JointReading, RobotClock
-from bt_tasksim.world import Command, WorldState
-from trees import sequence
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.world import Command, WorldState
+from bt_tasksim.engines.base import PostProcessEngine
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.engines.perception.features import ObservationBuilder
+from bt_tasksim.execution.pipelines import robot_pipeline
+from bt_tasksim.hardware.safety.engine import ChannelSpec, EmergencyStop, JointReading, RealEngine, RobotClock
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.trees import sequence
 
 HERE = Path(__file__).parent
 SCENE = Scene("panda", objects={"cup": "on table"})
@@ -78,7 +79,7 @@ class ArmProcess:
         self.line.close()
 
 
-class ArmEngine:
+class ArmEngine(RealEngine):
     """A `RealEngine` for it."""
 
     def __init__(self, port: int) -> None:
@@ -89,7 +90,7 @@ class ArmEngine:
         self._lost = ""
         self._run = ""
 
-    def reset(self, configuration: Any, beat: Any) -> None:
+    def reset(self, configuration: Any, heartbeat: Any) -> None:
         self.close()
         self._lost, self._reading, self._run = "", None, uuid.uuid4().hex
         self._began = time.monotonic()
@@ -127,15 +128,12 @@ class ArmEngine:
             tips=self.kinematics.tips(joints),
         )
 
-    def hidden(self) -> None:
-        return None
-
     def hold(self, why: str, here: bool) -> None:
         self._write({"hold": why, "here": here})
 
     def hold_channel(self) -> ChannelSpec:
         arguments = {"host": "127.0.0.1", "port": self.port}
-        return ChannelSpec("bt_tasksim.safety.socket_hold:SocketHold", arguments)
+        return ChannelSpec("socket_hold:SocketHold", arguments)
 
     def close(self) -> None:
         if self._socket is not None:
@@ -173,14 +171,11 @@ class ArmEngine:
             self._lost = "the arm has closed the connection"
 
 
-class GivenPoses:
+class GivenPoses(PostProcessEngine):
     """In the place of perception: objects are where somebody says."""
 
     def reset(self, configuration: Any, model: Any) -> None:
         self.builder = ObservationBuilder(ROBOT, configuration)
-
-    def cameras(self, needed: bool) -> tuple[str, ...]:
-        return ()
 
     def observe(self, state: WorldState, images: Any) -> Any:
         return self.builder.build(state, np.array([[0.5, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0]]))
@@ -226,7 +221,7 @@ def runner_of(port: int) -> tuple[Runner, Sweep]:
 
 def main() -> None:
     """A run in a process of its own: a port, and a word when the arm moves."""
-    from bt_tasksim.errors import BtTasksimError
+    from bt_tasksim.core.errors import BtTasksimError
 
     runner, _ = runner_of(int(sys.argv[1]))
 

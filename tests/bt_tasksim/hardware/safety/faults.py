@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import numpy as np
 from arm import ArmProcess, runner_of
 
-from bt_tasksim.errors import BtTasksimError
+from bt_tasksim.core.errors import BtTasksimError
 
 QUIET = 0.05
 """Longest time in seconds between two steps of the arm's process in a measurement that counts."""
@@ -170,7 +170,7 @@ def _by_signal(arm: ArmProcess, fault: str, wait: float) -> Seen:
     process = subprocess.Popen(
         [sys.executable, str(here / "arm.py"), str(arm.port)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONPATH": str(here.parents[2])},
+        env={**os.environ, "PYTHONPATH": str(here.parents[3])},
     )  # fmt: skip
     assert process.stdout.readline().startswith("moving")
     arm.tell()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bt_tasksim.safety.engine import EmergencyStop, RobotClock
+from bt_tasksim.hardware.safety.engine import EmergencyStop, RobotClock
 
 
 def test_an_emergency_stop_stays_pressed_and_calls_its_listeners_once():

@@ -8,29 +8,31 @@ import pytest
 from arm import SCENE, ArmProcess, runner_of
 from faults import FAULTS, QUIET, measure
 
-from bt_tasksim.errors import InputError, MachineError, SafetyStop
-from bt_tasksim.safety.limits import REACTION
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.execution.runner import SAFETY_STOP
+from bt_tasksim.hardware.safety.stop import SafetyStop
+from bt_tasksim.robot.limits import REACTION
 
 SAID = {
-    "joint states stop": r"safety stop, stale: sweep: stale: joint states are",
-    "joint states frozen": "joint states have not changed for",
-    "states delayed 300 ms": "safety stop, stale: sweep: stale: joint states are",
-    "NaN in a state": "positions reported, panda_joint3 at nan; the arm holds",
-    "wrong joint order": "in another order, 'panda_joint2' where 'panda_joint1' should be",
-    "positions of two joints mixed up": "is reported to have jumped by",
-    "emergency stop": "emergency stop: the red button",
-    "connection lost": "engine failed: the arm has closed the connection",
-    "leaf raises": "leaf 'sweep' raised ZeroDivisionError: oh",
-    "leaf blocks 2 s": "sweep: the watchdog has stopped the robot: no sign of life",
+    "joint states stop": "INVALID: stale_joint_states: sweep: ",
+    "joint states frozen": "INVALID: frozen_joint_states: sweep: ",
+    "states delayed 300 ms": "INVALID: stale_joint_states: sweep: ",
+    "NaN in a state": "INVALID: not_finite: sweep: ",
+    "wrong joint order": "INVALID: wrong_joints: sweep: ",
+    "positions of two joints mixed up": "INVALID: implausible_joint_states: sweep: ",
+    "emergency stop": "INVALID: emergency_stop: ",
+    "connection lost": "INVALID: robot_engine_failed: sweep: ",
+    "leaf raises": "leaf 'sweep' raised ZeroDivisionError in faults.py:",
+    "leaf blocks 2 s": "INVALID: watchdog_stop: sweep: ",
     "policy gives NaN": "leaf 'sweep' commands a tool target that is not finite",
-    "no solution of the inverse kinematics": "sweep: out of reach: panda cannot bring its tool to",
-    "watchdog killed": "sweep: the watchdog's process has ended; the arm holds",
+    "no solution of the inverse kinematics": "FAILURE: out_of_reach: sweep: ",
+    "watchdog killed": "INVALID: watchdog_stop: sweep: ",
     "SIGINT": "stopped KeyboardInterrupt every node has ended, and the arm holds []",
     "SIGTERM": "stopped Terminated every node has ended, and the arm holds []",
     "SIGKILL of the runner": "bt-tasksim watchdog: the runner is gone",
     "SIGSTOP of the runner": "bt-tasksim watchdog: no sign of life from the runner for",
 }
-OR = {"SIGSTOP of the runner": "late: no command for"}
+OR = {"SIGSTOP of the runner": "command_late"}
 """What may be said instead: the last command expires before the watchdog's time, and the runner goes on."""
 
 
@@ -54,7 +56,7 @@ def test_a_robot_that_dies_ends_the_run():
     leaf.trouble = lambda tool: (arm.process.kill() if leaf.context.now > 0.4 else None, tool)[1]
     try:
         result = runner.run(0)
-        assert result.reason == "safety stop, engine" and "engine failed: the " in result.why
+        assert result.reason == "robot_engine_failed" and result.outcome.is_a(SAFETY_STOP)
         assert leaf.ended[-1].name == "INVALID"
         with pytest.raises(MachineError, match=r"cannot reach the robot: .*refused"):
             runner.run(0)
@@ -75,7 +77,7 @@ def test_after_a_stop_nothing_starts_again_without_a_new_run(arm):
     physics = runner.pipeline.physics
     leaf.trouble = lambda tool: (physics.engine.emergency.press("a test"), tool)[1]
     result = runner.run(0)
-    assert result.reason == "safety stop, emergency stop"
+    assert result.reason == "emergency_stop"
     before = arm.stopped()
     with pytest.raises(SafetyStop, match="emergency stop: a test"):
         runner.step(runner.context.command)
@@ -99,8 +101,8 @@ def test_an_emergency_stop_while_a_run_begins_counts(arm):
     engine = runner.pipeline.physics.engine
     reset = engine.reset
 
-    def pressed(configuration, beat):
-        reset(configuration, beat)
+    def pressed(configuration, heartbeat):
+        reset(configuration, heartbeat)
         engine.emergency.press("too early")
 
     engine.reset = pressed
@@ -117,17 +119,17 @@ def test_the_watchdog_watches_the_way_to_the_start_and_rests_then(arm):
     engine = runner.pipeline.physics.engine
     reset = engine.reset
 
-    def hangs(configuration, beat):
-        reset(configuration, beat)
-        beat()
+    def hangs(configuration, heartbeat):
+        reset(configuration, heartbeat)
+        heartbeat()
         time.sleep(0.4)
-        beat()
+        heartbeat()
 
     engine.reset = hangs
     with pytest.raises(SafetyStop, match="the watchdog has stopped the robot: no sign of life"):
         runner.run(0)
     assert arm.stopped()["latched"].startswith("no sign of life") and leaf.ended == []
-    engine.reset = lambda configuration, beat: (reset(configuration, beat), beat())
+    engine.reset = lambda configuration, heartbeat: (reset(configuration, heartbeat), heartbeat())
     leaf.lasts, leaf.begin = 0.3, lambda seen: (time.sleep(0.4), seen.tool.copy())[1]
     assert runner.run(0).success, "a leaf may plan before its first command"
     runner.pipeline.close()
@@ -144,7 +146,7 @@ def test_a_watchdog_that_had_to_stop_the_arm_is_replaced(arm):
     physics.engine.hold = fails
     leaf.lasts = 0.3
     runner.run(0)
-    assert arm.stopped()["latched"] == "the runner asked for it" and runner.pipeline.told
+    assert arm.stopped()["latched"] == "the runner asked for it" and runner.pipeline.hold_delivered
     first, physics.engine.hold = physics.watchdog.pid, hold
     assert runner.run(0).success and physics.watchdog.pid != first
     runner.pipeline.close()
@@ -164,8 +166,8 @@ def test_that_nobody_could_tell_the_arm_is_said(arm):
         raise MachineError("the connection to the arm is lost")
 
     physics.engine.hold, leaf.trouble = fails, dies
-    why = runner.run(0).why
-    assert why.endswith("ended; nobody could tell the arm to hold: its last command expires"), why
+    outcome = runner.run(0).outcome
+    assert outcome.is_a(SAFETY_STOP) and outcome.names["arm"].startswith("nobody could tell the arm")
     physics.engine.hold = hold
     runner.pipeline.close()
 
@@ -184,7 +186,7 @@ def test_a_command_that_was_held_up_after_its_checks_is_not_sent(arm):
     command = physics.guard.command
     physics.guard.command = lambda target: (time.sleep(0.07 * (leaf.context.now > 0.3)), command(target))[1]
     result = runner.run(0)
-    assert result.reason == "safety stop, late" and "before it could be sent" in result.why
+    assert result.reason == "checked_late"
     runner.pipeline.close()
 
 
@@ -200,7 +202,7 @@ def test_an_arm_that_pushes_against_something_stops_where_it_is(arm, wrench, her
 
     engine.state = pushed
     result = runner.run(0)
-    assert result.reason == f"safety stop, {'wrench' if here else 'not finite'}"
+    assert result.reason == ("force_limit" if here else "not_finite")
     assert arm.stopped()["here"] is here
     runner.pipeline.close()
 

@@ -4,11 +4,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_tasksim.safety.motion import (
-    Motion,
+from bt_tasksim.hardware.safety.motion import (
+    JointMotion,
     approach,
     braked,
-    braking_distance,
     followed,
     moved,
     stopping_speed,
@@ -25,8 +24,18 @@ accelerations = st.floats(0.5, 50.0)
 rows = st.lists(st.lists(st.floats(-4.0, 4.0), min_size=N, max_size=N), min_size=1, max_size=30)
 
 
+def braking_distance(velocity, acceleration, period):
+    """How far joints get ``(n,)`` after the last period, slowing down by a T in each until they stand.
+
+    Speeds v - a T, v - 2 a T, ... are summed up while they are positive.
+    """
+    speed, change = np.abs(velocity), acceleration * period
+    n = np.where(np.isfinite(change), np.floor(speed / change), 0.0)
+    return period * (n * speed - np.where(n > 0.0, change, 0.0) * n * (n + 1.0) / 2.0)
+
+
 def still(position):
-    return Motion(np.array(position, float), np.zeros(len(position)))
+    return JointMotion(np.array(position, float), np.zeros(len(position)))
 
 
 def follow(before, reference):
@@ -35,7 +44,7 @@ def follow(before, reference):
 
 @given(speeds, accelerations)
 def test_braking_distance_is_what_braking_takes(speed, acceleration):
-    motion = Motion(np.zeros(1), np.array([speed]))
+    motion = JointMotion(np.zeros(1), np.array([speed]))
     a = np.array([acceleration])
     far = braking_distance(motion.velocity, a, PERIOD)
     while motion.velocity.any():
@@ -56,7 +65,7 @@ def test_joints_without_a_limit():
     assert stopping_speed(np.array([0.1]), endless, PERIOD) == 0.1 / PERIOD
     assert stopping_speed(endless, np.array([5.0]), PERIOD) == np.inf
     assert stopping_speed(np.array([-0.1]), np.array([5.0]), PERIOD) == 0.0
-    assert braked(Motion(np.zeros(1), np.array([3.0])), endless, PERIOD).velocity == 0.0
+    assert braked(JointMotion(np.zeros(1), np.array([3.0])), endless, PERIOD).velocity == 0.0
 
 
 @given(rows)

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from bt_tasksim.errors import MachineError
-from bt_tasksim.safety.engine import ChannelSpec
-from bt_tasksim.safety.watchdog import Watchdog
-from bt_tasksim.safety.watchdog_process import BEAT, DONE, HOLD, RECORD, Watch
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.hardware.safety.engine import ChannelSpec
+from bt_tasksim.hardware.safety.watchdog import Watchdog
+from bt_tasksim.hardware.safety.watchdog_process import DONE, HEARTBEAT, HOLD, RECORD, Watch
 
-ROOT = Path(__file__).parents[3]
+PATH = os.pathsep.join((str(Path(__file__).parents[4]), str(Path(__file__).parent)))
 DEADLINE = 0.15
 
 
@@ -31,7 +31,7 @@ class Line:
     @property
     def channel(self):
         arguments = {"host": "127.0.0.1", "port": self.server.getsockname()[1]}
-        return ChannelSpec("bt_tasksim.safety.socket_hold:SocketHold", arguments)
+        return ChannelSpec("socket_hold:SocketHold", arguments)
 
     def heard(self, patience=3.0):
         """What has come, and when."""
@@ -66,7 +66,7 @@ def watchdog(line):
 def beating(watchdog, seconds):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        watchdog.beat()
+        watchdog.heartbeat()
         time.sleep(0.02)
     return time.monotonic()
 
@@ -107,7 +107,7 @@ def test_the_runner_notices_that_it_was_killed(watchdog):
     beating(watchdog, 0.1)
     os.kill(watchdog.pid, signal.SIGKILL)
     time.sleep(0.1)
-    watchdog.beat()
+    watchdog.heartbeat()
     assert watchdog.trouble() == "the watchdog's process has ended"
 
 
@@ -131,15 +131,15 @@ def test_one_that_was_told_to_hold_serves_no_other_run(watchdog, line):
 def test_it_holds_at_once_when_the_runner_is_gone(line):
     words = f"""
 import sys, time
-from bt_tasksim.safety.engine import ChannelSpec
-from bt_tasksim.safety.watchdog import Watchdog
+from bt_tasksim.hardware.safety.engine import ChannelSpec
+from bt_tasksim.hardware.safety.watchdog import Watchdog
 watchdog = Watchdog(ChannelSpec({line.channel.factory!r}, {line.channel.arguments!r}), 5.0)
-watchdog.beat()
+watchdog.heartbeat()
 print("beating", flush=True)
 time.sleep(60)
 """
     process = subprocess.Popen(
-        [sys.executable, "-c", words], stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)}
+        [sys.executable, "-c", words], stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": PATH}
     )
     assert process.stdout.readline() == b"beating\n"
     process.kill()
@@ -153,10 +153,10 @@ time.sleep(60)
     ("channel", "sentence"),
     [
         (
-            ChannelSpec("bt_tasksim.safety.socket_hold:SocketHold", {"host": "127.0.0.1", "port": 1}),
+            ChannelSpec("socket_hold:SocketHold", {"host": "127.0.0.1", "port": 1}),
             "refused",
         ),
-        (ChannelSpec("bt_tasksim.safety.socket_hold:Gone"), "AttributeError"),
+        (ChannelSpec("socket_hold:Gone"), "AttributeError"),
         (ChannelSpec("nowhere.at:All"), "No module named 'nowhere'"),
     ],
 )
@@ -169,12 +169,11 @@ def test_what_cannot_reach_the_robot_does_not_start(channel, sentence):
 
 
 def test_it_loads_nothing_that_could_hang_with_the_runner():
-    words = (
-        "import sys, bt_tasksim.safety.watchdog_process, bt_tasksim.safety.socket_hold; print(*sys.modules)"
-    )
+    safety = "bt_tasksim.hardware.safety"
+    words = f"import sys, {safety}.watchdog_process, socket_hold; print(*sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", words], capture_output=True, text=True, check=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": PATH},
     )  # fmt: skip
     loaded = {name.partition(".")[0] for name in done.stdout.split()}
     assert not loaded & {"numpy", "py_trees", "pinocchio", "yaml", "sapien"}
@@ -182,10 +181,18 @@ def test_it_loads_nothing_that_could_hang_with_the_runner():
 
 def test_records_may_arrive_in_pieces():
     watch = Watch(0.1)
-    data = RECORD.pack(BEAT, 5.0) + RECORD.pack(BEAT, 6.0)
+    data = RECORD.pack(HEARTBEAT, 5.0) + RECORD.pack(HEARTBEAT, 6.0)
     assert not watch.feed(data[:4]) and watch.left(6.0) is None
     assert not watch.feed(data[4:11]) and watch.left(5.0) == pytest.approx(0.1)
     assert not watch.feed(data[11:]) and watch.left(6.05) == pytest.approx(0.05)
     assert not watch.feed(RECORD.pack(DONE, 7.0)) and watch.left(9.0) is None
-    assert watch.feed(RECORD.pack(BEAT, 8.0) + RECORD.pack(HOLD, 8.0)) and watch.left(9.0) is None
+    assert watch.feed(RECORD.pack(HEARTBEAT, 8.0) + RECORD.pack(HOLD, 8.0)) and watch.left(9.0) is None
     assert struct.calcsize("<cd") == RECORD.size
+
+
+@pytest.mark.parametrize("record", [(b"X", 1.0), (HEARTBEAT, float("nan")), (HEARTBEAT, float("inf"))])
+def test_a_record_that_is_none_asks_for_a_hold(record):
+    watch = Watch(DEADLINE)
+    assert not watch.feed(RECORD.pack(HEARTBEAT, 1.0))
+    assert watch.feed(RECORD.pack(*record))
+    assert watch.watching and watch.left(1.0) == pytest.approx(DEADLINE)

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from benchmarks.faults import Bench
-from bt_tasksim.engines.ros.websocket import WebSocket
-from bt_tasksim.errors import MachineError
-from bt_tasksim.twin.environment import environment
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.hardware.ros.websocket import WebSocket
+from bt_tasksim.hardware.twin.environment import environment
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from bt_tasksim.twin.orphans import clear_up, is_orphan, note_bridge
+from bt_tasksim.hardware.twin.bridge_cleanup import clear_up, note_bridge, parent_has_ended
 
 
 def test_whose_parent_is_gone() -> None:
-    assert not is_orphan(os.getppid()) and not is_orphan(0)
-    assert is_orphan(os.getpid())
+    assert not parent_has_ended(os.getppid()) and not parent_has_ended(0)
+    assert parent_has_ended(os.getpid())
 
 
 @pytest.mark.parametrize("runs", ["sleep", "cat"])

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bt_tasksim.engines.ros.messages import in_tool_frame
-from bt_tasksim.errors import InputError
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import ActorConfiguration, Scene
-from bt_tasksim.twin.cell import Cell
-from bt_tasksim.twin.controller import RefusedError, Trajectory
-from bt_tasksim.twin.gap import load_gap
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.hardware.ros.messages import in_tool_frame
+from bt_tasksim.hardware.twin.cell import Cell
+from bt_tasksim.hardware.twin.controller import RefusedTrajectoryError, Trajectory
+from bt_tasksim.hardware.twin.gap import load_gap
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.scene import Scene
 
 pytest.importorskip("mujoco")
 ROBOT = load_robot("panda")
@@ -56,12 +57,12 @@ def first_joint(cell: Cell) -> float:
 
 
 def test_no_command_before_a_run_and_of_no_other_run(cell: Cell) -> None:
-    with pytest.raises(RefusedError, match="no run has begun"):
+    with pytest.raises(RefusedTrajectoryError, match="no run has begun"):
         cell.command("arm", forward(cell))
     cell.begin("one")
-    with pytest.raises(RefusedError, match="another run"):
+    with pytest.raises(RefusedTrajectoryError, match="another run"):
         cell.command("arm", forward(cell, run="two"))
-    with pytest.raises(RefusedError, match="another run"):
+    with pytest.raises(RefusedTrajectoryError, match="another run"):
         cell.command("arm", forward(cell, run=""))
     run(cell, 0.2)
     assert abs(first_joint(cell)) < 1e-3 and cell.refused == 3
@@ -93,7 +94,7 @@ def test_a_hold_lasts_until_a_new_run(cell: Cell) -> None:
     cell.hold("enough")
     for again in ("one", ""):
         cell.begin(again)  # neither the same run nor none ends it
-        with pytest.raises(RefusedError, match="it holds: enough"):
+        with pytest.raises(RefusedTrajectoryError, match="it holds: enough"):
             cell.command("arm", forward(cell))
     run(cell, 0.6)
     before = first_joint(cell)
@@ -117,10 +118,10 @@ def test_the_emergency_stop(cell: Cell) -> None:
     still, note = first_joint(cell), cell.tell()["fault"]
     assert 0.0 < note["fastest"] <= 1.0 and 0.0 < note["hardest"] <= 1.05, "within the arm's limits"
     cell.begin("two")  # as long as it is pressed there is no new run
-    with pytest.raises(RefusedError, match="emergency stop"):
+    with pytest.raises(RefusedTrajectoryError, match="emergency stop"):
         cell.command("arm", forward(cell, run="two"))
     cell.press(False)
-    with pytest.raises(RefusedError, match="emergency stop"):
+    with pytest.raises(RefusedTrajectoryError, match="emergency stop"):
         cell.command("arm", forward(cell))
     cell.begin("two")
     cell.command("arm", forward(cell, run="two"))
@@ -145,7 +146,7 @@ def test_a_run_that_another_one_has_replaced_does_not_come_back(cell: Cell) -> N
     for name in ("one", "two", "one"):
         cell.begin(name)
     cell.command("arm", forward(cell, run="two"))
-    with pytest.raises(RefusedError, match="another run"):
+    with pytest.raises(RefusedTrajectoryError, match="another run"):
         cell.command("arm", forward(cell, run="one"))
 
 
@@ -157,7 +158,7 @@ def test_a_cell_whose_runs_are_not_announced() -> None:
         run(cell, 0.05)
     assert first_joint(cell) > 0.01 and not cell.stopped
     cell.press(True)
-    with pytest.raises(RefusedError, match="emergency stop"):
+    with pytest.raises(RefusedTrajectoryError, match="emergency stop"):
         cell.command("arm", forward(cell))
     run(cell, 0.3)
     still = first_joint(cell)
@@ -241,14 +242,14 @@ def test_factors_are_drawn_as_stated() -> None:
     ("old", "new", "sentence"),
     [
         ("object_mass: [0.8, 1.25]", "object_mass: [1.2, 0.8]", "the lower one first"),
-        ("object_mass: [0.8, 1.25]", "object_mass: 3", "2 finite numbers"),
+        ("object_mass: [0.8, 1.25]", "object_mass: 3", "line 5: 'object_mass' should be 2 numbers"),
         ("state_latency: 0.006", "state_latency: -1", "should not be negative"),
         ("control_rate: 100", "control_rate: 300", "should divide 1000"),
         ("tip_force: 0.03", "tip_forse: 0.03", "did you mean 'tip_force'"),
     ],
 )
 def test_a_wrong_file_of_differences(tmp_path, old: str, new: str, sentence: str) -> None:
-    from bt_tasksim.resources import asset
+    from bt_tasksim.core.resources import asset
 
     text = asset("twin", "gap.yaml").read_text()
     assert old in text

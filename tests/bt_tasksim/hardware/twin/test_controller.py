@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_tasksim.twin.controller import FASTER, Controller, RefusedError, Trajectory
+from bt_tasksim.hardware.twin.controller import FASTER, Controller, RefusedTrajectoryError, Trajectory
 
 LOWER, UPPER, SPEED = np.array([-1.0, -2.0]), np.array([1.0, 2.0]), np.array([1.0, 2.0])
 
@@ -92,7 +92,7 @@ def test_what_is_refused_changes_nothing(changes: dict[str, Any], sentence: str)
     c = controller()
     c.accept(trajectory(), 0.0)
     before = [c.setpoint(t) for t in (0.05, 0.2, 0.5)]
-    with pytest.raises(RefusedError, match=sentence):
+    with pytest.raises(RefusedTrajectoryError, match=sentence):
         c.accept(trajectory(**changes), 0.05)
     after = [c.setpoint(t) for t in (0.05, 0.2, 0.5)]
     for (p, v), (q, w) in zip(before, after, strict=True):
@@ -111,7 +111,7 @@ def test_nothing_but_a_refusal_or_a_motion_that_ends(
     c = controller()
     try:
         c.accept(Trajectory(["a", "b"], positions, velocities, times), 0.0)
-    except RefusedError:
+    except RefusedTrajectoryError:
         assert not c.setpoint(0.1)[0].any()
         return
     end, velocity = c.setpoint(c.ends())
@@ -127,7 +127,7 @@ def test_what_is_accepted_is_no_faster_than_it_may_be(seed: int) -> None:
     c = controller()
     try:
         c.accept(Trajectory(["a", "b"], positions.tolist(), [[]] * 4, times.tolist()), 0.0)
-    except RefusedError:
+    except RefusedTrajectoryError:
         return
     for t in np.linspace(0.0, times[-1] + 0.1, 200):
         assert np.all(np.abs(c.setpoint(t)[1]) <= FASTER * SPEED + 0.01)

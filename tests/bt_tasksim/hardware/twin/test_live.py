@@ -22,16 +22,16 @@ import yaml
 
 from benchmarks.faults import Bench, Seen, bench_of, measure
 from benchmarks.sweep import sweeping
-from bt_tasksim.engines.registry import EngineOptions, build_pipeline
-from bt_tasksim.engines.ros.websocket import WebSocket
-from bt_tasksim.errors import InputError, MachineError
-from bt_tasksim.judge import at_rest, judge
-from bt_tasksim.robot import load_robot
-from bt_tasksim.safety.limits import REACTION
-from bt_tasksim.world import Hidden
-from trees.load import load_source
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.world import Hidden
+from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
+from bt_tasksim.hardware.ros.websocket import WebSocket
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.limits import REACTION
+from bt_tasksim.scene.success import at_rest, evaluate_success
+from bt_tasksim.trees.load import load_source
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 LATEST = REACTION
 """Seconds until a hold."""
 
@@ -48,7 +48,7 @@ def test_a_scenario_on_the_command_line_judged_by_the_twin(bench: Bench, tmp_pat
         configuration = scene.sample(seed)
         bench.evaluation.load(configuration, seed)
         before = bench.evaluation.truth()
-        assert not judge(configuration, world_of(configuration, robot), before).success
+        assert not evaluate_success(configuration, world_of(configuration, robot), before).success
         port, out = bench.twin.port, str(tmp_path / str(seed))
         ran = on_the_command_line(
             "run", "pick_and_throw", "--seed", str(seed), "--engines", f"ros:127.0.0.1:{port}", "--out", out
@@ -56,7 +56,7 @@ def test_a_scenario_on_the_command_line_judged_by_the_twin(bench: Bench, tmp_pat
         assert ran.returncode in (0, 1), ran.stderr
         assert "Traceback" not in ran.stderr and "20 Hz" in ran.stdout
         truth = settled(bench)
-        verdict = judge(configuration, world_of(configuration, robot), truth)
+        verdict = evaluate_success(configuration, world_of(configuration, robot), truth)
         assert at_rest(truth) or not verdict.success
         done.append(ran.returncode == 0 and verdict.success)
         assert bench.evaluation.tell()["stopped"]
@@ -319,9 +319,12 @@ def test_bytes_that_are_no_protocol(bench: Bench) -> None:
     questions += [
         json.dumps({"do": "load", "configuration": text}).encode() + b"\n" for text in ("", "{}", "[]")
     ]
+    with socket.create_connection(("127.0.0.1", bench.twin.evaluation_port), 5.0) as line:
+        line.sendall(questions[0])
+        assert not line.makefile("rb").readline(), "who does not know the secret is told nothing"
     for question in questions:
         with socket.create_connection(("127.0.0.1", bench.twin.evaluation_port), 5.0) as line:
-            line.sendall(question)
+            line.sendall(bench.twin.secret.encode() + b"\n" + question)
             assert b"error" in line.makefile("rb").readline(), question
     junk = WebSocket("127.0.0.1", bench.twin.port)
     for text in ("", "{", "[]", "3", '{"op": "fly"}', '{"op": "publish"}', '{"op": "subscribe", "topic": 3}'):

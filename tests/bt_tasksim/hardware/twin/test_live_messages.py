@@ -15,9 +15,9 @@ import numpy as np
 
 from benchmarks.faults import Bench
 from bt_tasksim.engines.remote.address import Address
-from bt_tasksim.engines.ros import messages
-from bt_tasksim.engines.ros.link import Link
-from bt_tasksim.engines.ros.messages import RefusedError
+from bt_tasksim.hardware.ros import messages
+from bt_tasksim.hardware.ros.link import Link
+from bt_tasksim.hardware.ros.messages import UnusableMessageError
 
 COMMANDS, READINGS = 6000, 4000
 RUN = "run"
@@ -222,7 +222,7 @@ def test_thousands_of_wrong_readings(bench: Bench, stranger: Any) -> None:
         def handle(message: Any, arrived: float) -> None:
             try:
                 value = READ[topic](message)
-            except RefusedError:
+            except UnusableMessageError:
                 refused[topic] += 1
                 raise
             used[topic] += 1

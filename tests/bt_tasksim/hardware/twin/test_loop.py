@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from bt_tasksim.twin import loop
+from bt_tasksim.hardware.twin import loop
 
 
 def ran(steps: int, takes: float, period: float = 0.01) -> tuple[int, list[float], float]:

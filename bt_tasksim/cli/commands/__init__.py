@@ -1,0 +1,1 @@
+"""The commands of ``bt-tasksim``, one file each; a file says all about its command."""

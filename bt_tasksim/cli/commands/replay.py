@@ -1,0 +1,35 @@
+"""``bt-tasksim replay``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bt_tasksim.cli.options.engines import Policy, policies
+from bt_tasksim.cli.progress import progress
+from bt_tasksim.core.registry import register
+
+
+@register("command", "replay")
+def replay(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder or its run.h5.")],
+    robot: Annotated[
+        str | None, typer.Option(metavar="R", help="The run's robot, if it is not a bundled one.")
+    ] = None,
+    policy: Policy = [],  # noqa: B006  # Typer's way
+    objects: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="The run's mesh files, if they are not bundled ones.")
+    ] = None,
+) -> int:
+    """Repeat a logged run and compare it state by state.
+
+    A log is believed in numbers and names only: whatever else it needs is named here.
+    """
+    from bt_tasksim.execution import replay
+
+    with progress("replaying", None):
+        found = replay.replay(run, robot=robot, policies=policies(policy), objects=objects)
+    print(found.why)
+    return 0 if found.identical else 1

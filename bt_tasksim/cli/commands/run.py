@@ -1,0 +1,44 @@
+"""``bt-tasksim run``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bt_tasksim.cli.arguments import Seed
+from bt_tasksim.cli.options.engines import EngineFlags, policies
+from bt_tasksim.cli.options.tree import TreeOptions
+from bt_tasksim.core.registry import register
+
+
+@register("command", "run")
+def run(
+    tree: TreeOptions,
+    engines: EngineFlags,
+    seed: Seed = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write result, log, pictures and report to this folder."),
+    ] = None,
+    video: Annotated[
+        bool, typer.Option("--video", help="Record a video: run.mp4, and in the report.")
+    ] = False,
+    real_time: Annotated[
+        bool, typer.Option("--real-time", help="Keep the control rate in simulation, too.")
+    ] = False,
+) -> int:
+    """Run a tree once."""
+    from bt_tasksim.cli.running import run_into
+
+    source = tree.load(policies(engines.policy))
+    options = engines.options(rendering=video, real_time=real_time)
+    parts = [source.name, Path(source.scene.robot).stem, str(seed)]
+    if options.perception != "state":
+        parts.insert(2, options.perception.partition(":")[0])
+    folder = out or Path("runs") / "-".join(parts)
+    result = run_into(folder, source.build(), source.scene, seed, options, source.name)
+    if result.timing is not None:
+        print(result.timing)
+    return 0 if result.success else 1

@@ -1,0 +1,41 @@
+"""``bt-tasksim show``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bt_tasksim.cli.arguments import picture as svg
+from bt_tasksim.cli.options.tree import TreeOptions
+from bt_tasksim.core.registry import register
+
+
+@register("command", "show")
+def show(
+    tree: TreeOptions,
+    picture: Annotated[Path | None, typer.Option(metavar="F.svg", help="Write a picture.")] = None,
+    xml: Annotated[Path | None, typer.Option(metavar="F", help="Write the tree as XML.")] = None,
+) -> None:
+    """Print a tree, or write its picture."""
+    from bt_tasksim.core.files import write_text
+    from bt_tasksim.report.tree_picture import tree_svg, tree_text
+    from bt_tasksim.trees.load import NoSceneError, load_root, scenarios
+    from bt_tasksim.trees.xml_writer import save_tree
+
+    if picture is not None:
+        svg(picture)
+    try:
+        source = tree.load()
+        root, scene = source.build(), source.scene.name
+    except NoSceneError:  # a tree can be looked at without one
+        root, scene = load_root(tree.tree), ""
+    print(tree_text(root))
+    if picture is not None:
+        write_text(picture, tree_svg(root))
+        print(f"wrote {picture}")
+    if xml is not None:
+        named = tree.scene or (scene if scene in scenarios() else None)
+        save_tree(root, xml, scene=named)
+        print(f"wrote {xml}")

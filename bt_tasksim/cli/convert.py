@@ -1,0 +1,48 @@
+"""People's Python files of version 0.1, whose imports name modules that have moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.files import write_text
+from bt_tasksim.core.former import convert
+
+LARGEST = 2_000_000
+"""Bytes of a Python file."""
+
+
+def convert_files(files: Sequence[Path], check: bool = False) -> list[str]:
+    """Convert the imports of Python files, in place.
+
+    Args:
+        files: The files.
+        check: Change nothing, only say what would be.
+
+    Returns:
+        A line for each change, and for each name that nothing defines any more.
+
+    Raises:
+        InputError: A file cannot be read or is not Python; then none is changed.
+    """
+    found = [(file, convert(_text(file), str(file))) for file in files]
+    lines = []
+    for file, converted in found:
+        lines += [f"{file}, {change}" for change in converted.changes]
+        lines += converted.unknown
+        if converted.changes and not check:
+            write_text(file, converted.text)
+    return lines or ["nothing to convert"]
+
+
+def _text(file: Path) -> str:
+    try:
+        content = file.read_bytes()
+        if len(content) > LARGEST:
+            raise InputError(f"'{file}' has {len(content)} bytes: that is no file of concepts or trees")
+        return content.decode()
+    except OSError as error:
+        raise InputError(f"'{file}' cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"'{file}' is not UTF-8") from error

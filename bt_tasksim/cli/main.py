@@ -1,0 +1,78 @@
+"""The command ``bt-tasksim``.
+
+Bad input ends with one sentence and exit code 2, a failing machine with 1, an interrupt with 130, SIGTERM
+with 143. Everything heavy is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from bt_tasksim.cli.app import NAME, application
+from bt_tasksim.cli.options.plugins import taken
+from bt_tasksim.cli.streams import flush_or_discard, open_missing
+from bt_tasksim.core.errors import BtTasksimError, InputError, Terminated
+
+COMPLETE = f"_{NAME.replace('-', '_').upper()}_COMPLETE"
+"""Environment variable by which a shell asks how a word may go on."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Args:
+        arguments: Words of the command line; by default those of the process.
+
+    Returns:
+        The exit code.
+    """
+    open_missing()
+    logging.basicConfig(format=f"{NAME}: %(message)s", level=logging.WARNING)
+    try:
+        code = _run(list(sys.argv[1:] if arguments is None else arguments))
+        sys.stdout.flush()
+    except KeyboardInterrupt as stop:
+        ended = isinstance(stop, Terminated)
+        _complain(f"{'terminated' if ended else 'interrupted'}{f'; {stop}' if str(stop) else ''}")
+        return 143 if ended else 130
+    except InputError as error:
+        _complain(f"{NAME}: {error}")
+        return 2
+    except BtTasksimError as error:
+        _complain(f"{NAME}: {error}")
+        return 1
+    except BrokenPipeError:
+        flush_or_discard()
+        return 1
+    except OSError as error:
+        flush_or_discard()
+        where = f" '{error.filename}'" if error.filename else ""
+        _complain(f"{NAME}: {error.strerror or error}{where}")
+        return 1
+    return code
+
+
+def _run(words: list[str]) -> int:
+    if COMPLETE in os.environ:
+        application().main(words, prog_name=NAME)
+    plugins, words = taken(words)
+    if plugins:
+        from bt_tasksim.concept.plugins import load_parts
+
+        for plugin in plugins:
+            load_parts(plugin)
+    group = application()
+    try:
+        with group.make_context(NAME, words or ["--help"]) as context:
+            return int(group.invoke(context) or 0)
+    except typer.Exit as end:
+        return end.exit_code
+
+
+def _complain(sentence: str) -> None:
+    print(sentence, file=sys.stderr)

@@ -1,0 +1,54 @@
+"""Which tree, in which scene, with which robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from bt_tasksim.trees.load import TreeSource
+
+
+@dataclass(frozen=True)
+class TreeOptions:
+    """A tree by name, and what it runs in where that is not its own."""
+
+    tree: Annotated[
+        str, typer.Argument(metavar="TREE", help="A scenario, a .py file with build(), or an .xml file.")
+    ]
+    scene: Annotated[
+        str | None,
+        typer.Option(metavar="S", help="A scenario's scene or a .yaml file, if not the tree's own."),
+    ] = None
+    robot: Annotated[
+        str | None, typer.Option(metavar="R", help="panda, xarm7_ability, ... or a .yaml file.")
+    ] = None
+    nodes: Annotated[str | None, typer.Option(metavar="F.py", hidden=True, help="As --plugin.")] = None
+
+    def load(self, policies: Iterable[tuple[str, str]] = ()) -> TreeSource:
+        """The tree and its scene.
+
+        Args:
+            policies: Concepts and the policies that their leaves take, whatever the tree says.
+
+        Raises:
+            InputError: There is no such tree, scene, robot or plugin, or one of them is no good.
+        """
+        from bt_tasksim.trees.load import load_source
+
+        self.load_nodes()
+        return load_source(self.tree, self.robot, self.scene, policies)
+
+    def load_nodes(self) -> None:
+        """Load the plugin that was named in the old way.
+
+        Raises:
+            InputError: There is no such file, or it fails.
+        """
+        if self.nodes is not None:
+            from bt_tasksim.concept.plugins import load_parts
+
+            load_parts(self.nodes)

@@ -1,0 +1,1 @@
+"""Concept models: what a task is, its parameters, and the leaf that runs it."""

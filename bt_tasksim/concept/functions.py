@@ -1,0 +1,187 @@
+"""What a concept is, apart from any tree: class attributes that declare it, and pure functions of arrays."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from bt_tasksim.concept.contact import ContactChange
+from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.demonstrated import Shown, plain_argument, plain_words
+from bt_tasksim.concept.parameters import Parameter, declared_parameters
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.task import Task
+from bt_tasksim.core.outcomes import Outcome, Statement
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.world import Command
+from bt_tasksim.robot.description import RobotDescription
+
+
+class ConceptFunctions(abc.ABC):
+    """What a concept declares and computes; `bt_tasksim.concept.model.ConceptModel` adds its parameters.
+
+    In all functions ``seen`` is a `Seen`, ``memory`` whatever `begin` and `advance` returned, and every array
+    has leading batch dimensions ``(...)``; none of them may change anything.
+    """
+
+    actions: ClassVar[int] = 0
+    """Size of the action's motion part."""
+    observables: ClassVar[tuple[str, ...]] = ()
+    """What a learned policy of this concept may look at, by attribute of `Observation`."""
+    maintains: ClassVar[tuple[str, ...]] = ()
+    """Goals that earlier concepts reached and this one must keep."""
+    reaches: ClassVar[tuple[str, ...]] = ()
+    """Goals that hold after its SUCCESS."""
+    ends: ClassVar[tuple[str, ...]] = ()
+    """Goals that no longer hold after its SUCCESS."""
+    default_timeout: ClassVar[float] = 10.0
+    """Seconds."""
+    default_tolerance: ClassVar[float] = 0.005
+    """Metres."""
+    contact: ClassVar[ContactChange | None] = None
+    """The contact state that it breaks, keeps or makes, by which it is recognised in a demonstration."""
+    presentation: ClassVar[Presentation] = Presentation()
+    """How it is drawn and spoken of."""
+    is_task_model: ClassVar[bool] = True
+    """Nothing is unknown: the programmed policy is the last word."""
+    is_programmed: ClassVar[bool] = True
+    """It has a programmed policy; else a leaf of it needs a learned one."""
+
+    values: Mapping[str, Any]
+    """Values of the declared parameters, by name."""
+    policy: str | None
+    """The policy that decides: ``"programmed"``, or the folder of a learned one; None: the one pinned."""
+    timeout: float
+    """Seconds after which it fails."""
+    tolerance: float
+    """Metres within which its goal counts as reached."""
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """The declared parameters, by name, in the order of the constructor's arguments."""
+        cached: dict[str, Parameter] | None = cls.__dict__.get("_declared")
+        if cached is None:
+            cached = {p.name: p for p in declared_parameters(cls, ConceptFunctions)}
+            cls._declared = cached  # type: ignore[attr-defined]
+        return cached
+
+    @property
+    def actor(self) -> str:
+        """Name of the object that this concept acts on."""
+        return str(self.values.get("target", ""))
+
+    def contradiction(self) -> str:
+        """Why the parameters cannot stand together, as the end of a sentence; empty where they can.
+
+        Asked once, when the leaf is made.
+        """
+        return ""
+
+    def initial_state(self, seen: Seen) -> Outcome | str | None:
+        """Why the concept cannot start now: a registered reason, or words; None when it can."""
+        return None
+
+    def begin(self, seen: Seen) -> Any:
+        """The memory at the first tick: start poses, planned paths. What cannot be batched happens here."""
+        return None
+
+    def advance(self, action: Array, seen: Seen, memory: Any) -> Any:
+        """The memory for the next tick, after the action ``(..., actions)``."""
+        return memory
+
+    @classmethod
+    def layout(cls, robot: RobotDescription) -> Mapping[str, int]:
+        """Names and sizes of what `features` holds, in its order; none: the concept cannot be learned."""
+        return {}
+
+    def features(self, seen: Seen, memory: Any) -> Array:
+        """What a learned policy sees: ``(..., n)``, from the declared observables only, as in `layout`."""
+        raise NotImplementedError(f"{type(self).__name__} declares no features: it cannot be learned")
+
+    def decides(self, seen: Seen, memory: Any) -> Array:
+        """Boolean ``(...)``: a learned policy is asked at this tick; else the reference motion goes on."""
+        return np.True_
+
+    @abc.abstractmethod
+    def command(self, action: Array, seen: Seen, memory: Any) -> Command:
+        """The command for an action ``(..., actions)`` of offsets on the reference motion."""
+
+    def carry_out(self, action: Array, seen: Seen, memory: Any) -> tuple[Command, Any]:
+        """What `command` and `advance` say, of one action; to override where both need the same numbers."""
+        return self.command(action, seen, memory), self.advance(action, seen, memory)
+
+    def programmed_motion(self, seen: Seen, memory: Any) -> Array:
+        """The programmed policy's action ``(..., actions)``; by default none: the reference motion itself."""
+        return zeros(seen.tool, self.actions)
+
+    @abc.abstractmethod
+    def done(self, seen: Seen, memory: Any) -> Array:
+        """The programmed policy's completion signal: boolean ``(...)``."""
+
+    def necessary_cost(self, seen: Seen, memory: Any) -> Array:
+        """How far the observed state is from the necessary goal: ``(...)``, 0 when reached."""
+        return zeros(seen.tool)
+
+    def violated(self, seen: Seen, memory: Any) -> Array:
+        """A limit is exceeded (stress, crushing): boolean ``(...)``."""
+        return np.False_
+
+    def maintained(self, goal: str, seen: Seen, memory: Any) -> Array:
+        """A goal of `maintains` still holds: boolean ``(...)``."""
+        return np.True_
+
+    def sufficient_cost(self, known: Known, memory: Any) -> Array:
+        """How far the hidden state is from the sufficient goal at the completion signal: ``(...)``.
+
+        In units of what is tolerable: below 1 the goal is reached.
+        """
+        return zeros(known.hidden.tool_pose)
+
+    def explain(self, seen: Seen, memory: Any) -> Statement | str | None:
+        """Where things stand: a `Form` with its numbers, or words."""
+        return None
+
+    # ---- demonstrations --------------------------------------------------------------------------------
+
+    @classmethod
+    def recognise(cls, shown: Shown, tasks: Sequence[Task]) -> Sequence[Task]:
+        """The tasks of a demonstration in order of time, with those of this concept found among them.
+
+        Args:
+            shown: The demonstration.
+            tasks: What was recognised so far: whatever breaks, keeps or makes a contact (see `contact`).
+        """
+        return tasks
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """A recognised task in words with numbers and units, without its concept and its target."""
+        return plain_words(parameters, cls.parameters())
+
+    @classmethod
+    def from_task(cls, task: Task, later: Sequence[Task]) -> dict[str, Any]:
+        """Arguments of the leaf that does what was demonstrated.
+
+        Args:
+            task: What was recognised.
+            later: The tasks that follow it.
+
+        Raises:
+            InputError: The demonstration does not tell enough.
+        """
+        declared = cls.parameters()
+        return {
+            name: plain_argument(value, declared[name])
+            for name, value in task.parameters.items()
+            if name in declared
+        }
+
+
+def zeros(like: Array, *shape: int) -> Array:
+    """Zeros ``(..., *shape)`` in the library and with the batch dimensions of ``like (..., n)``."""
+    if type(like) is np.ndarray:
+        return np.zeros(like.shape[:-1] + shape)
+    return array_namespace(like).zeros((*like.shape[:-1], *shape), dtype=like.dtype, device=like.device)

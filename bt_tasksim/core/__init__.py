@@ -1,0 +1,1 @@
+"""What everything else stands on: poses, the world at one instant, errors, files."""

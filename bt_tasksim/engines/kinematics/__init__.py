@@ -1,0 +1,1 @@
+"""Kinematics engines: from commands to joint targets."""

@@ -1,0 +1,1 @@
+"""Post-process engines: from state and pictures to observations."""

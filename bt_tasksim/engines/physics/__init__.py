@@ -1,0 +1,1 @@
+"""Physics engines: from joint targets to the state of the world."""

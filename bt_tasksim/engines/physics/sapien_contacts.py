@@ -1,0 +1,156 @@
+"""What is read from the contacts of a world of SAPIEN."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.rolling import rolling_damping
+from bt_tasksim.engines.physics.sapien_robot import SKIN
+from bt_tasksim.engines.physics.sapien_world import DAMPING, World
+
+TOUCH_DISTANCE = 0.002
+"""Metres of separation beyond which a contact of PhysX carries no force and counts for nothing."""
+SUPPORT_DISTANCE = 5e-4
+"""Metres of separation within which two bodies touch."""
+_ROBOT = ("arm", "hand")
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """What touches what at one instant.
+
+    Attributes:
+        tip_force: Contact force ``(n_tips, 3)`` on each fingertip, N.
+        hand_force: Force of the robot on each object, N.
+        hand_distance: Metres between the robot and each object; infinite where it is far.
+        support: Objects and the objects and fixtures that they touch, by index.
+    """
+
+    tip_force: Array
+    hand_force: list[float]
+    hand_distance: list[float]
+    support: set[tuple[int, int]]
+
+
+class ContactReader:
+    """Reads the contacts of one world, and remembers the deepest overlap.
+
+    Args:
+        world: The world, with its robot.
+        n_tips: Number of fingertips.
+
+    Attributes:
+        penetration: The deepest overlap so far, metres.
+        deepest_pair: Names of its bodies, metres, and seconds since the episode began; None before any.
+    """
+
+    def __init__(self, world: World, n_tips: int) -> None:
+        self._world, self._n_tips = world, n_tips
+        self.penetration = 0.0
+        self.deepest_pair: tuple[str, str, float, float] | None = None
+
+    def read_depth(self, time: float) -> None:
+        """Remember the deepest overlap, also between the ends of periods: fingers close within one."""
+        bodies = self._world.bodies
+        for contact in self._world.system.get_contacts():
+            deepest = -min([point.separation for point in contact.points])
+            if deepest > self.penetration:
+                kinds = [bodies.get(body, ("none", 0))[0] for body in contact.bodies]
+                if "base" not in kinds:
+                    self.penetration = deepest
+                    self.deepest_pair = (*(b.entity.name for b in contact.bodies), deepest, time)
+
+    def read(self, time: float, step: float) -> Touch:
+        """What touches what, and the deepest overlap.
+
+        Args:
+            time: Seconds since the episode began.
+            step: Seconds of the last physics step, over which impulses are forces.
+        """
+        bodies, n = self._world.bodies, len(self._world.objects)
+        on_tip: list[list[list[float]]] = [[] for _ in range(self._n_tips)]
+        on_object: list[list[float]] = [[] for _ in range(n)]
+        distance = [math.inf] * n
+        support: set[tuple[int, int]] = set()
+        rate = 1.0 / step
+        deepest = self.penetration
+        for contact in self._world.system.get_contacts():
+            a, b = contact.bodies
+            kind_a, i = bodies.get(a, ("none", 0))
+            kind_b, j = bodies.get(b, ("none", 0))
+            if kind_a == "base" or kind_b == "base":
+                continue
+            points = contact.points
+            separation = min([point.separation for point in points])
+            if separation > TOUCH_DISTANCE:
+                continue
+            if -separation > deepest:
+                deepest = -separation
+                self.deepest_pair = (a.entity.name, b.entity.name, -separation, time)
+            if kind_b in _ROBOT:
+                a, b, kind_a, kind_b, i, j, sign = b, a, kind_b, kind_a, j, i, -rate
+            else:
+                sign = rate
+            if kind_a not in _ROBOT:  # what stands on what needs no forces
+                if separation < SUPPORT_DISTANCE:
+                    if kind_a == "object":
+                        support.add((i, j))
+                    if kind_b == "object":
+                        support.add((j, i))
+                continue
+            x = y = z = 0.0
+            for point in points:
+                px, py, pz = point.impulse.tolist()
+                x, y, z = x + px, y + py, z + pz
+            x, y, z = x * sign, y * sign, z * sign  # the impulse acts on the first body
+            if kind_a == "hand" and i >= 0:
+                on_tip[i].append([x, y, z])
+            if kind_b == "hand" and j >= 0:
+                on_tip[j].append([-x, -y, -z])
+            if kind_b == "object":
+                on_object[j].append(math.sqrt(x * x + y * y + z * z))
+                distance[j] = min(distance[j], max(separation - SKIN, 0.0))
+        self.penetration = deepest
+        # PhysX lists contacts in an order of its own, so sums must not depend on it: `math.fsum` is exact.
+        tip_force = [
+            [math.fsum(axis) for axis in zip(*forces, strict=True)] or [0.0] * 3 for forces in on_tip
+        ]
+        hand_force = [math.fsum(forces) for forces in on_object]
+        return Touch(np.array(tip_force).reshape(-1, 3), hand_force, distance, support)
+
+
+def resist_rolling(world: World, step: float, hand_force: list[float]) -> None:
+    """Rolling resistance of what lies free, for the next step; PhysX itself knows none.
+
+    It is PhysX's own damping, set anew for each step: unlike a torque, that lets things fall asleep.
+
+    Args:
+        world: The world.
+        step: Seconds of the last physics step, over which impulses are forces.
+        hand_force: Force of the robot on each object, N.
+    """
+    loads: list[list[list[float]]] = [[] for _ in world.objects]
+    rate = 1.0 / step
+    for contact in world.system.get_contacts():
+        kinds = [world.bodies.get(body, ("none", 0)) for body in contact.bodies]
+        if all(kind in ("object", "fixture") for kind, _ in kinds):
+            impulses = [point.impulse.tolist() for point in contact.points]
+            force = [rate * sum(values) for values in zip(*impulses, strict=True)]
+            for kind, k in kinds:
+                if kind == "object":
+                    loads[k].append(force)
+    for k, body in enumerate(world.objects):
+        spin = body.angular_velocity.tolist()
+        damping = DAMPING
+        if loads[k] and hand_force[k] == 0.0 and math.hypot(*spin) > 0.0:
+            axes, inertia = world.inertia[k]
+            turn = poses.inverted(poses.composed([0.0, 0.0, 0.0, *body.entity_pose.q.tolist()], axes))
+            damping += rolling_damping(
+                poses.point(turn, spin), inertia, [poses.point(turn, force) for force in loads[k]]
+            )
+        body.set_angular_damping(damping)

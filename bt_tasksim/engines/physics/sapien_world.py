@@ -1,0 +1,148 @@
+"""A drawn world in SAPIEN: its scene, fixtures and objects; the robot joins it in `sapien_robot`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bt_tasksim.core.poses import Array
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.shapes import BoxPiece
+
+if TYPE_CHECKING:
+    import sapien
+    from sapien import physx
+
+CONTACT_OFFSET = {"robot": 0.001, "object": 0.003, "fixture": 0.027}
+"""Metres by body; PhysX looks for contacts of two bodies within the sum of theirs. It must exceed what a
+falling object covers in one step (2.2 m/s after 25 cm: 22 mm), or the object is stopped only inside."""
+DAMPING = 0.05
+"""Share a second of its spin that air takes from an object."""
+
+
+@dataclass(eq=False)
+class World:
+    """One episode's scene and what is in it.
+
+    Attributes:
+        scene: SAPIEN's scene.
+        system: Its physics.
+        bodies: What each body is (``fixture``, ``object``, ``base``, ``arm`` or ``hand``) and its index: that
+            of `bt_tasksim.core.world.Hidden`, of its fingertip, or -1.
+        objects: The objects' bodies.
+        inertia: Frame of the principal axes (a pose, seven numbers) and principal moments (kg m^2) by object.
+    """
+
+    scene: sapien.Scene
+    system: physx.PhysxCpuSystem
+    bodies: dict[physx.PhysxRigidBaseComponent, tuple[str, int]] = field(default_factory=dict)
+    objects: list[physx.PhysxRigidDynamicComponent] = field(default_factory=list)
+    inertia: list[tuple[list[float], list[float]]] = field(default_factory=list)
+    _materials: dict[float, physx.PhysxMaterial] = field(default_factory=dict)
+    _entities: list[sapien.Entity] = field(default_factory=list)  # SAPIEN does not keep them alive
+
+    def material(self, friction: float) -> physx.PhysxMaterial:
+        """The material of a coefficient of friction."""
+        from sapien import physx
+
+        if friction not in self._materials:
+            self._materials[friction] = physx.PhysxMaterial(friction, friction, 0.0)
+        return self._materials[friction]
+
+    def add(self, body: physx.PhysxRigidBaseComponent, name: str, pose: Iterable[float]) -> None:
+        """Put a body into the scene, at a pose of seven numbers."""
+        import sapien
+
+        entity = sapien.Entity()
+        entity.name = name
+        entity.add_component(body)
+        entity.set_pose(sapien_pose(pose))
+        self.scene.add_entity(entity)
+        self._entities.append(entity)
+
+
+def build_world(configuration: ActorConfiguration, solver_iterations: int) -> World:
+    """A fresh scene with the fixtures and objects of a drawn world.
+
+    Args:
+        configuration: The drawn world.
+        solver_iterations: Position iterations of PhysX's solver.
+    """
+    import sapien
+    from sapien import physx
+
+    physx.set_scene_config(enable_enhanced_determinism=False, bounce_threshold=2.0)
+    physx.set_body_config(solver_position_iterations=solver_iterations, solver_velocity_iterations=0)
+    physx.set_shape_config(contact_offset=CONTACT_OFFSET["object"], rest_offset=0.0)
+    physx.set_default_material(0.5, 0.5, 0.0)
+    system = physx.PhysxCpuSystem()
+    scene = sapien.Scene([system])
+    scene.set_timestep(1.0 / configuration.physics_frequency)
+    world = World(scene, system)
+    _add_fixtures(world, configuration)
+    _add_objects(world, configuration)
+    return world
+
+
+def _add_fixtures(world: World, configuration: ActorConfiguration) -> None:
+    from sapien import physx
+
+    n = len(configuration.objects)
+    for k, fixture in enumerate(configuration.fixtures):
+        body = physx.PhysxRigidStaticComponent()
+        for box in fixture.boxes:
+            shape = physx.PhysxCollisionShapeBox([s / 2 for s in box.size], world.material(box.friction))
+            shape.set_local_pose(sapien_pose(box.pose))
+            shape.set_contact_offset(CONTACT_OFFSET["fixture"])
+            body.attach(shape)
+        world.add(body, fixture.name, fixture.pose)
+        world.bodies[body] = ("fixture", n + k)
+
+
+def _add_objects(world: World, configuration: ActorConfiguration) -> None:
+    from sapien import physx
+
+    for k, actor in enumerate(configuration.objects):
+        geometry = actor.shape()
+        body = physx.PhysxRigidDynamicComponent()
+        material = world.material(actor.friction)
+        for piece in geometry.collision:
+            if isinstance(piece, BoxPiece):
+                shape = physx.PhysxCollisionShapeBox(list(piece.half_size), material)
+                shape.set_local_pose(sapien_pose(piece.pose))
+            else:
+                vertices = np.asarray(piece.vertices, np.float32)
+                shape = physx.PhysxCollisionShapeConvexMesh(vertices, [1.0, 1.0, 1.0], material)
+            body.attach(shape)
+        body.set_mass(actor.mass)
+        body.set_cmass_local_pose(sapien_pose(geometry.mass.pose))
+        inertia = [float(v) * actor.mass for v in geometry.mass.inertia]
+        body.set_inertia(inertia)
+        body.set_angular_damping(DAMPING)
+        body.set_max_depenetration_velocity(1.0)
+        world.add(body, actor.name, actor.pose)
+        world.bodies[body] = ("object", k)
+        world.objects.append(body)
+        axes = [0.0, 0.0, 0.0, *np.asarray(geometry.mass.pose, float)[3:].tolist()]
+        world.inertia.append((axes, inertia))
+
+
+def sapien_pose(pose: Iterable[float]) -> sapien.Pose:
+    """SAPIEN's form of a pose of seven numbers."""
+    import sapien
+
+    p = [float(v) for v in pose]
+    return sapien.Pose(p[:3], p[3:])
+
+
+def floats(pose: sapien.Pose) -> list[float]:
+    """The seven numbers of one of SAPIEN's poses."""
+    return [*pose.p.tolist(), *pose.q.tolist()]
+
+
+def array(pose: sapien.Pose) -> Array:
+    """One of SAPIEN's poses as ``(7,)``."""
+    return np.array(floats(pose))

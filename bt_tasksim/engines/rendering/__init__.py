@@ -1,0 +1,1 @@
+"""Rendering engines: from the state of the world to pictures."""

@@ -1,0 +1,85 @@
+"""Exceptions out of a tree: which node raised, where in the user's own file, and how all nodes end."""
+
+from __future__ import annotations
+
+import sysconfig
+from collections.abc import Generator
+from pathlib import Path
+from types import FrameType, TracebackType
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_tasksim.concept.leaf import Decision
+from bt_tasksim.core.errors import BtTasksimError, LeafError
+
+_INSTALLED = tuple({sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")})
+
+
+def ticking(tree: Behaviour) -> Generator[Behaviour | Decision, None, None]:
+    """One tick of a tree, node by node as it visits them.
+
+    A leaf under training yields a `Decision` before it acts. Closing a tick half-way ends no node.
+
+    Raises:
+        LeafError: A leaf raised; every node has ended.
+        BtTasksimError: A leaf found an error of its own kind; every node has ended.
+    """
+    try:
+        yield from tree.tick()
+    except GeneratorExit:
+        raise
+    except BaseException as error:
+        culprit = _raising_leaf(error, tree)
+        end_all(tree, culprit)
+        if isinstance(error, BtTasksimError) or not isinstance(error, Exception):
+            raise
+        raise _leaf_error(error, tree, culprit) from error
+
+
+def end_all(tree: Behaviour, culprit: Behaviour | None = None) -> None:
+    """End every running node and the one that raised; py_trees' own `stop` misses some of them."""
+    for node in tree.iterate():
+        if node.status == Status.RUNNING or node is culprit:
+            if not node.children:
+                node.stop(Status.INVALID)
+            else:
+                node.terminate(Status.INVALID)
+                node.status = Status.INVALID
+                node.iterator = node.tick()
+
+
+def _leaf_error(error: Exception, tree: Behaviour, culprit: Behaviour | None) -> LeafError:
+    """The error that names the leaf that raised and, where it is the user's own, file and line."""
+    name = culprit.name if culprit is not None else tree.name
+    return LeafError(f"leaf '{name}' raised {type(error).__name__}{_place(error.__traceback__)}: {error}")
+
+
+def _raising_leaf(error: BaseException, tree: Behaviour) -> Behaviour | None:
+    """The innermost behaviour of a tree in whose methods an exception was raised."""
+    nodes = {id(node) for node in tree.iterate()}
+    found = None
+    trace = error.__traceback__
+    while trace is not None:
+        owner = trace.tb_frame.f_locals.get("self")
+        if isinstance(owner, Behaviour) and id(owner) in nodes:
+            found = owner
+        trace = trace.tb_next
+    return found
+
+
+def _place(trace: TracebackType | None) -> str:
+    """`` in my_concept.py:12``, the innermost line of a file that is neither ours nor installed; or empty."""
+    found = ""
+    while trace is not None:
+        if _is_the_users(trace.tb_frame):
+            found = f" in {Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}"
+        trace = trace.tb_next
+    return found
+
+
+def _is_the_users(frame: FrameType) -> bool:
+    module, file = str(frame.f_globals.get("__name__", "")), frame.f_code.co_filename
+    if module.partition(".")[0] == "bt_tasksim" or file.startswith("<frozen"):
+        return False
+    return not file.startswith(_INSTALLED)

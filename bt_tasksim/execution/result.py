@@ -1,0 +1,82 @@
+"""What became of an episode, as a value that shows itself in one line, in a table or as plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+from py_trees.common import Status
+
+from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.engines.clock import Timing
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.success import Verdict
+
+
+@dataclass(repr=False)
+class Result:
+    """What became of an episode.
+
+    Attributes:
+        status: The tree's own status at the end.
+        success: The tree ended SUCCESS and the physics state agrees.
+        outcome: How it ended: what the success evaluator found, or why the tree failed or was stopped.
+        leaf: Name of the leaf that failed or was stopped; empty where the tree succeeded or time was over.
+        verdict: What the success evaluator found, None on a real robot.
+        seed: Seed of the episode.
+        control_steps: Control periods until the tree ended.
+        sim_time: Seconds of the episode until the tree ended.
+        wall_time: Seconds it took.
+        policies: Policy in use by leaf.
+        configuration: The world as drawn.
+        timing: How well the control rate was kept; None where there was none to keep.
+    """
+
+    status: Status
+    success: bool
+    outcome: Outcome
+    leaf: str
+    verdict: Verdict | None
+    seed: int
+    control_steps: int
+    sim_time: float
+    wall_time: float
+    policies: dict[str, str]
+    configuration: ActorConfiguration
+    timing: Timing | None = None
+
+    @property
+    def reason(self) -> str:
+        """The registered name of the reason for failure, to be counted; empty on success."""
+        return "" if self.success else self.outcome.cause.reason.name
+
+    @property
+    def why(self) -> str:
+        """One sentence: what the success evaluator found, or the leaf that failed and why."""
+        return f"{self.leaf}: {self.outcome.sentence}" if self.leaf else self.outcome.sentence
+
+    def __str__(self) -> str:
+        """As the command line prints it."""
+        word = "SUCCESS" if self.success else "FAILURE"
+        return f"{word}: {self.why} ({self.sim_time:.1f} s simulated, {self.wall_time:.1f} s)"
+
+    def __repr__(self) -> str:
+        why = f"reason={self.reason!r}, leaf={self.leaf!r}, " if not self.success else ""
+        return f"<Result {self.status.name} success={self.success} {why}seed={self.seed}>"
+
+    def _repr_html_(self) -> str:
+        """A small table, for notebooks."""
+        rows: dict[str, Any] = {
+            "success": "yes" if self.success else "no",
+            "why": self.why,
+            "reason": self.reason or "none",
+            "tree": self.status.name,
+            "seed": self.seed,
+            "robot": self.configuration.robot,
+            "time": f"{self.sim_time:.1f} s simulated in {self.control_steps} control periods, "
+            f"{self.wall_time:.1f} s on the clock",
+            "policies": ", ".join(f"{leaf}: {policy}" for leaf, policy in self.policies.items()),
+        }
+        cells = (f"<tr><th>{name}</th><td>{escape(str(value))}</td></tr>" for name, value in rows.items())
+        return f"<table>{''.join(cells)}</table>"

@@ -1,0 +1,1 @@
+"""Policies: what decides the action of a concept, and how a learned one is kept on disk."""

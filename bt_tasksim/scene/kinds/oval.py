@@ -1,0 +1,19 @@
+"""Cylinders on an ellipse."""
+
+from __future__ import annotations
+
+from bt_tasksim.core.registry import register
+from bt_tasksim.scene.geometry import Shape, ShapeSize
+from bt_tasksim.scene.kinds.cylinder import elliptic_shape
+from bt_tasksim.scene.shape_kind import ShapeKind
+
+
+@register("shape", "oval")
+class OvalKind(ShapeKind):
+    """An upright cylinder on an ellipse."""
+
+    size_range = ((0.060, 0.038, 0.07), (0.085, 0.056, 0.12))
+
+    def shape(self, size: ShapeSize) -> Shape:
+        """See `ShapeKind.shape`."""
+        return elliptic_shape(size)

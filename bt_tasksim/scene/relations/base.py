@@ -1,0 +1,112 @@
+"""What a goal relation is given, and what it answers."""
+
+from __future__ import annotations
+
+import abc
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Hidden, ObjectModel, PlaceModel, WorldModel
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.specs import Goal
+
+TOUCHING = 1e-4
+"""Metres between hand and object within which the hand touches it."""
+
+
+@dataclass(frozen=True)
+class FinalState:
+    """The physics state at the end of a run, with names resolved.
+
+    Attributes:
+        configuration: The world as it was drawn.
+        world: Names and calibrated facts.
+        hidden: The state.
+    """
+
+    configuration: ActorConfiguration
+    world: WorldModel
+    hidden: Hidden
+
+    def pose(self, name: str) -> Array:
+        """True pose ``(7,)`` of an object."""
+        return self.hidden.objects[self.world.object_index(name)]
+
+    def start(self, name: str) -> Array:
+        """Pose ``(7,)`` in which an object was drawn."""
+        return np.array(self.configuration.objects[self.world.object_index(name)].pose)
+
+    def place(self, name: str) -> PlaceModel:
+        """A place of the scene."""
+        return self.world.place(name)
+
+    def model(self, name: str) -> ObjectModel:
+        """What is known beforehand of an object."""
+        return self.world.object(name)
+
+    def in_place(self, goal: Goal) -> Array:
+        """Pose ``(7,)`` of the goal's object in the frame of the goal's place."""
+        return poses.multiply(poses.inverse(self.place(goal.place).pose), self.pose(goal.object))
+
+    def touched(self, name: str) -> bool:
+        """The hand touches an object."""
+        return float(self.hidden.hand_distance[self.world.object_index(name)]) <= TOUCHING
+
+    def supported(self, name: str) -> bool:
+        """An object touches something besides the hand."""
+        return bool(np.any(self.hidden.support[self.world.object_index(name)]))
+
+
+@dataclass(frozen=True)
+class Placement:
+    """What a relation answers.
+
+    Attributes:
+        reached: The object is as the goal asks.
+        outcome: How it is, or what is wrong.
+        position_error: Metres from where the object should be.
+        angle_error: Radians from how it should be, up to its symmetry.
+    """
+
+    reached: bool
+    outcome: Outcome
+    position_error: float
+    angle_error: float
+
+
+class GoalRelation(abc.ABC):
+    """A relation between an object and a place, judged by the physics state at the end.
+
+    A subclass in one file, ``@register("goal relation", "beside")``, is all that a new relation takes.
+    """
+
+    in_hand: ClassVar[bool] = False
+    """The object is to be held at the end; else it must be let go and at rest, and nothing knocked over."""
+
+    @abc.abstractmethod
+    def evaluate(self, goal: Goal, final: FinalState) -> Placement:
+        """Whether the goal's object is as the goal asks."""
+
+
+def turn(rotation: Array, model: ObjectModel) -> float:
+    """Smallest angle in radians from no rotation at all to ``rotation (4,)``, over an object's symmetries."""
+    if model.symmetry == 0:
+        return float(poses.tilt(rotation))
+    if model.cubic:
+        m = poses.to_matrix(rotation)
+        rows = np.argmax(np.abs(m), axis=1)
+        snapped = np.zeros((3, 3))
+        snapped[np.arange(3), rows] = np.sign(m[np.arange(3), rows])
+        if len(set(rows.tolist())) == 3:
+            cosine = (np.trace(snapped.T @ m) - 1) / 2
+            return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return min(
+        float(poses.angle_between(rotation, poses.yaw(2 * math.pi * k / model.symmetry)))
+        for k in range(max(model.symmetry, 1))
+    )

@@ -1,0 +1,45 @@
+"""On: the object stands upright on the origin of a place, with its heading up to the object's symmetry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bt_tasksim.core.outcomes import register_reason
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import METRES, RADIANS
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, turn
+from bt_tasksim.scene.specs import Goal
+
+STANDS = register_reason(
+    "stands", "{object} stands on {place}, {distance} and {angle} off", distance=METRES, angle=RADIANS
+)
+NOT_IN_PLACE = register_reason(
+    "not_in_place",
+    "{object} does not stand on {place}: {distance} and {angle} off",
+    distance=METRES,
+    angle=RADIANS,
+)
+TILTED_OR_TURNED = register_reason(
+    "tilted_or_turned",
+    "{object} is tilted or turned on {place}: {distance} and {angle} off",
+    distance=METRES,
+    angle=RADIANS,
+)
+
+
+@register("goal relation", "on")
+class On(GoalRelation):
+    """See the file."""
+
+    def evaluate(self, goal: Goal, final: FinalState) -> Placement:
+        """See `GoalRelation.evaluate`."""
+        local, model = final.in_place(goal), final.model(goal.object)
+        distance = float(np.linalg.norm(local[:3] - [0.0, 0.0, model.extent[2] / 2]))
+        angle = turn(local[3:], model)
+        reason = STANDS
+        if distance > goal.position_tolerance:
+            reason = NOT_IN_PLACE
+        elif angle > goal.angle_tolerance:
+            reason = TILTED_OR_TURNED
+        outcome = reason(object=goal.object, place=goal.place, distance=distance, angle=angle)
+        return Placement(reason is STANDS, outcome, distance, angle)

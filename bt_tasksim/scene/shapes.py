@@ -1,0 +1,115 @@
+"""Kinds of objects by name, and the geometry that they give.
+
+The kinds are in `bt_tasksim.scene.kinds`, one file each; `ShapeKind` says what a kind has to say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache, lru_cache
+
+from bt_tasksim.core.files import file_version
+from bt_tasksim.core.registry import part, parts
+from bt_tasksim.core.world import ObjectModel
+from bt_tasksim.scene.geometry import BoxPiece, ConvexPiece, Piece, Shape, ShapeSize, Size
+from bt_tasksim.scene.shape_kind import ShapeKind
+
+__all__ = [
+    "KINDS",
+    "BoxPiece",
+    "ConvexPiece",
+    "Piece",
+    "Shape",
+    "ShapeSize",
+    "object_model",
+    "resting_height",
+    "shape",
+    "shape_kind",
+    "size_range",
+]
+
+
+class _Kinds(Mapping[str, ShapeKind]):
+    """Every kind of object by name, those of plugins included."""
+
+    def __getitem__(self, name: str) -> ShapeKind:
+        return _made(parts("shape")[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(parts("shape"))
+
+    def __len__(self) -> int:
+        return len(parts("shape"))
+
+
+KINDS: Mapping[str, ShapeKind] = _Kinds()
+"""What objects there are."""
+
+
+def shape_kind(name: str) -> ShapeKind:
+    """A kind of object.
+
+    Raises:
+        InputError: There is no such kind; says which are near.
+    """
+    return _made(part("shape", name))
+
+
+def shape(kind: str, size: ShapeSize) -> Shape:
+    """The geometry of an object; the same arguments give the same object, which nobody may change.
+
+    A mesh whose file has changed is another object.
+
+    Raises:
+        InputError: Unknown kind, a size that it cannot have, or a bad mesh.
+    """
+    return _shape(shape_kind(kind), size, () if size.mesh is None else file_version(size.mesh))
+
+
+@lru_cache(maxsize=4096)
+def _shape(kind: ShapeKind, size: ShapeSize, version: tuple[int, ...]) -> Shape:
+    kind.check(size)
+    return kind.shape(size)
+
+
+def size_range(kind: str, mesh: str | None = None) -> tuple[Size, Size]:
+    """Low and high full sizes ``((3,), (3,))`` in metres that a kind has where none are given.
+
+    Raises:
+        InputError: Unknown kind, or its shape comes from a file that cannot be read.
+    """
+    return shape_kind(kind).sizes(mesh)
+
+
+def object_model(name: str, kind: str, size: ShapeSize) -> ObjectModel:
+    """What is known beforehand about an object of this kind and size, see `ObjectModel`.
+
+    Raises:
+        InputError: Unknown kind, or a size that it cannot have.
+    """
+    found = shape_kind(kind)
+    found.check(size)
+    axes = found.grasp_axes(size)
+    return ObjectModel(
+        name,
+        kind,
+        found.extent(size),
+        found.symmetry,
+        tuple(axis for axis, _ in axes),
+        tuple(width for _, width in axes),
+        cubic=found.cubic,
+    )
+
+
+def resting_height(kind: str, size: ShapeSize) -> float:
+    """Metres from the surface an object stands on up to its origin.
+
+    Raises:
+        InputError: Unknown kind.
+    """
+    return shape_kind(kind).resting_height(size)
+
+
+@cache
+def _made(kind: type[ShapeKind]) -> ShapeKind:
+    return kind()

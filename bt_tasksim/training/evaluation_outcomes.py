@@ -1,0 +1,164 @@
+"""The outcomes of an evaluation: one episode in short, all of them together, and how they are written."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bt_tasksim.core.outcomes import Outcome, outcome_from_data, recorded_outcome
+
+CONFIDENCE = 0.95
+
+
+ERRORS = ("position_error", "angle_error", "penetration")
+"""Fields of an outcome that may be unknown."""
+
+
+@dataclass(frozen=True)
+class EpisodeOutcome:
+    """One episode, in short.
+
+    Attributes:
+        seed: Its seed.
+        success: The tree ended SUCCESS and the physics state agrees.
+        status: The tree's status.
+        leaf: Name of the leaf that failed or was stopped; empty where none did.
+        outcome: How it ended.
+        control_steps: Control periods.
+        position_error: Metres, NaN where no goal says so.
+        angle_error: Radians, likewise.
+        penetration: Deepest overlap of two bodies, metres.
+        wall_time: Seconds it took.
+    """
+
+    seed: int
+    success: bool
+    status: str
+    leaf: str
+    outcome: Outcome
+    control_steps: int
+    position_error: float
+    angle_error: float
+    penetration: float
+    wall_time: float
+
+    @property
+    def reason(self) -> str:
+        """Registered name of the reason for failure; empty on success."""
+        return "" if self.success else self.outcome.cause.reason.name
+
+    @property
+    def why(self) -> str:
+        """One sentence."""
+        return f"{self.leaf}: {self.outcome.sentence}" if self.leaf else self.outcome.sentence
+
+    def to_data(self) -> dict[str, Any]:
+        """As plain data, for files: ``reason`` is the name, ``outcome`` has the numbers, None is unknown."""
+        fields = {name: _known(value) for name, value in vars(self).items() if name != "outcome"}
+        return {**fields, "reason": self.reason, "why": self.why, "outcome": self.outcome.to_data()}
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> EpisodeOutcome:
+        """What `to_data` wrote, or an older version, which knew no more than a reason and a sentence."""
+        fields = {key: value for key, value in data.items() if key not in ("reason", "why", "outcome")}
+        fields |= {name: math.nan for name in ERRORS if fields.get(name) is None}
+        if "outcome" in data:
+            return cls(**fields, outcome=outcome_from_data(data["outcome"]))
+        old = recorded_outcome(data["reason"] or "done", data["why"])
+        return cls(**{"leaf": "", **fields}, outcome=old)
+
+
+def _known(value: Any) -> Any:
+    """A value, or None for the NaN that JSON has no word for."""
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The outcomes of an evaluation and what they were measured with."""
+
+    scenario: str
+    robot: str
+    engines: str
+    perception: str
+    policies: dict[str, str]
+    outcomes: tuple[EpisodeOutcome, ...]
+    seconds: float
+    asked: int | None = None
+    """Episodes that were asked for; None for as many as there are outcomes."""
+
+    @property
+    def complete(self) -> bool:
+        """Every episode that was asked for has ended."""
+        return self.asked is None or len(self.outcomes) >= self.asked
+
+    @property
+    def successes(self) -> int:
+        """Count of successful episodes."""
+        return sum(o.success for o in self.outcomes)
+
+    def failure_lines(self) -> list[str]:
+        """A line for each leaf and reason, the most frequent first, with a seed to look at."""
+        groups: dict[tuple[str, str], list[EpisodeOutcome]] = {}
+        for episode in self.outcomes:
+            if not episode.success:
+                groups.setdefault((episode.leaf, episode.reason), []).append(episode)
+        return [
+            f"{len(group):4d} x {f'{leaf}: ' if leaf else ''}{reason}, such as seed {group[0].seed}: "
+            f"{group[0].outcome.sentence}"
+            for (leaf, reason), group in sorted(groups.items(), key=lambda item: -len(item[1]))
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields of ``evaluate --json``."""
+        n = len(self.outcomes)
+        failures = Counter(o.reason for o in self.outcomes if not o.success)
+        return {
+            "scenario": self.scenario,
+            "robot": self.robot,
+            "engines": self.engines,
+            "perception": self.perception,
+            "policies": self.policies,
+            "episodes": n,
+            "successes": self.successes,
+            "complete": self.complete,
+            "success_rate": self.successes / n if n else None,
+            "confidence_interval": list(wilson(self.successes, n)) if n else None,
+            "failures": dict(failures.most_common()),
+            "failed_leaves": dict(Counter(o.leaf for o in self.outcomes if o.leaf).most_common()),
+            "failed_seeds": [o.seed for o in self.outcomes if not o.success],
+            "seconds": round(self.seconds, 3),
+            "control_steps": sum(o.control_steps for o in self.outcomes),
+            "outcomes": [o.to_data() for o in self.outcomes],
+        }
+
+    def lines(self) -> list[str]:
+        """What people read: counts, and the reasons of failures, each with a seed to look at."""
+        n, who = len(self.outcomes), f"{self.scenario} on {self.robot} ({self.engines}, {self.perception})"
+        if not n:
+            return [f"{who}: no episode ended"]
+        low, high = wilson(self.successes, n)
+        steps = sum(o.control_steps for o in self.outcomes)
+        lines = [
+            f"{who}: {self.successes} of {n} ({100 * self.successes / n:.1f} %, "
+            f"95 % interval {100 * low:.1f} to {100 * high:.1f}), "
+            f"{steps / max(self.seconds, 1e-9):.0f} control steps/s"
+        ]
+        if any(o.success and math.isnan(o.position_error) for o in self.outcomes):
+            lines.append("  (the scene has no goal: success is the tree's own word, nothing was judged)")
+        return [*lines, *(f"  {line}" for line in self.failure_lines())]
+
+
+def wilson(successes: int, n: int) -> tuple[float, float]:
+    """Wilson's confidence interval (95 %) of a success rate.
+
+    Source: E. B. Wilson, "Probable inference, the law of succession, and statistical inference", J. American
+    Statistical Association 22, 1927; computed by SciPy.
+    """
+    from scipy.stats import binomtest
+
+    interval = binomtest(successes, n).proportion_ci(CONFIDENCE, method="wilson")
+    return float(interval.low), float(interval.high)

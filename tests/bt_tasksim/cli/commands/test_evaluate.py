@@ -1,0 +1,39 @@
+"""``bt-tasksim evaluate``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.physical
+
+
+def test_evaluate_writes_what_is_promised(call):
+    code, out, err = call(
+        "evaluate", "pick_and_throw", "--episodes", 2, "--seed", 40, "--noise", "none", "--json", "e.json"
+    )
+    assert code == 0 and err == "", "quiet when not on a terminal"
+    content = json.loads(Path("e.json").read_text())
+    assert {
+        "scenario", "robot", "engines", "perception", "policies", "episodes", "successes", "success_rate",
+        "confidence_interval", "failures", "failed_seeds", "seconds", "control_steps",
+    } <= content.keys()  # fmt: skip
+    assert content["episodes"] == 2 and content["perception"] == "state, noise none"
+    assert f"pick_and_throw on panda (sapien, state, noise none): {content['successes']} of 2" in out
+
+
+def test_evaluate_counts_failures_with_a_seed_and_a_reason(call, tree_file):
+    name = tree_file('sequence("far", Grasp("cup"), Pick("cup", distance=2.0))')
+    code, out, _ = call("evaluate", name, "--episodes", 2)
+    assert code == 0 and "tree on panda" in out and "0 of 2 (0.0 %" in out
+    assert "2 x pick cup: out_of_reach, such as seed 0: " in out
+
+
+def test_a_machine_without_the_simulator_says_what_to_install(call, monkeypatch):
+    monkeypatch.setitem(sys.modules, "sapien", None)
+    code, _, err = call("evaluate", "pick_and_place", "--episodes", 1)
+    assert code == 1 and err.count("\n") == 1
+    assert "SAPIEN physics cannot start" in err and "pip install 'bt-tasksim[sim]'" in err

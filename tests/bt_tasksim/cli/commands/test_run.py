@@ -1,0 +1,73 @@
+"""``bt-tasksim run`` and ``replay``: what they write, and what they say of bad trees and names."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.physical
+
+
+def test_run_writes_its_folder_and_replay_finds_the_same(call, until):
+    out, err = until(0, "run", "pick_and_throw", "--out", "here")
+    assert err == "" and out.startswith("SUCCESS: cup is in trash_bin")
+    assert out.strip().endswith("results: here/report.html") and len(out.strip().splitlines()) == 1
+    assert {"result.json", "run.h5", "tree.svg", "report.html"} <= {p.name for p in Path("here").iterdir()}
+    code, out, _ = call("replay", "here")
+    assert (code == 0 and "identical" in out) or "same" in out
+
+
+def test_run_and_evaluate_take_the_policy_of_the_command_line(call, until, policy):
+    folder = policy("mine")
+    words = ("--policy", f"grasp={folder}")
+    until(0, "run", "pick_and_place", *words, "--out", "here")
+    named = json.loads(Path("here/result.json").read_text())["policies"]
+    assert named["grasp target"].startswith("mine@") and named["place target"] == "programmed"
+    assert call("replay", "here")[0] == 2, "a log names no file to load"
+    code, out, _ = call("replay", "here", "--policy", f"grasp={folder}")
+    assert code == 0 and out.startswith("identical")
+    code, out, _ = call("evaluate", "pick_and_place", *words, "--episodes", 1, "--json", "e.json")
+    assert code == 0 and json.loads(Path("e.json").read_text())["policies"] == named
+
+
+def test_a_goal_out_of_reach_is_a_failed_run_with_the_leaf_and_the_distance(until, tree_file):
+    name = tree_file('sequence("far", Grasp("cup"), Pick("cup"), Bring("cup", position=(3.0, 0.0, 0.4)))')
+    out, err = until(1, "run", name, "--out", "far", said="bring cup")
+    assert err == ""
+    assert out.startswith("FAILURE: bring cup: ")
+    assert json.loads(Path("far/result.json").read_text())["reason"] == "out_of_reach"
+    assert " m: the nearest pose misses by " in out and " mm and " in out and " degrees" in out
+    assert json.loads(Path("far/result.json").read_text())["success"] is False
+
+
+def test_a_failed_run_says_which_leaf_and_why(call, tree_file):
+    name = tree_file('sequence("soon", Grasp("cup", timeout=0.5))')
+    code, out, _ = call("run", name, "--out", "soon")
+    assert code == 1
+    assert out.startswith("FAILURE: grasp cup: ") and out.count("grasp cup") == 1
+    content = json.loads(Path("soon/result.json").read_text())
+    assert (content["reason"], content["leaf"]) == ("timed_out", "grasp cup")
+    assert content["outcome"]["numbers"] == {"limit": 0.5}
+    assert content["outcome"]["detail"]["units"]["distance"] == "m"
+
+
+def test_a_run_behind_the_limits_in_real_time_says_how_well_it_kept_time(call, until):
+    out, _ = until(0, "run", "grasp_then_pick", "--safety", "--real-time", "--out", "here")
+    assert "20 Hz: " in out and "periods skipped" in out
+    about = json.loads(Path("here/result.json").read_text())
+    assert about["options"]["safety"] and about["options"]["real_time"]
+    assert about["timing"]["summary"] in out and about["timing"]["ticks"] > 20
+    assert "control rate" in Path("here/report.html").read_text()
+    assert call("replay", "here")[0] == 0
+
+
+def test_a_leaf_that_raises_is_one_sentence_with_its_name(call, tree_file):
+    tree_file(
+        'Broken("cup", name="culprit")',
+        "\nclass Broken(Grasp):\n    def begin(self, seen):\n        return {}['key']\n",
+    )
+    code, _, err = call("run", "tree.py", "--out", "here")
+    assert code == 1 and err == "bt-tasksim: leaf 'culprit' raised KeyError in tree.py:14: 'key'\n"
+    assert not Path("here").exists()

@@ -1,0 +1,79 @@
+"""Rolling resistance: the law, and what it does to a cylinder that rolls over the table."""
+
+import math
+
+import numpy as np
+import pytest
+from physics_cases import Still, lifted, scene
+
+from bt_tasksim.engines.physics.rolling import ROLLING_RESISTANCE, rolling_damping
+
+pytestmark = pytest.mark.physical
+
+INERTIA = (2e-4, 3e-4, 4e-4)
+DOWN = (0.0, 0.0, 1.5)
+"""The force of a floor, N."""
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 20.0])
+def test_the_torque_is_lever_times_normal_force_at_any_speed(speed):
+    for axis, moment in ((0, INERTIA[0]), (1, INERTIA[1])):
+        spin = [0.0, 0.0, 0.0]
+        spin[axis] = -speed
+        torque = rolling_damping(spin, INERTIA, [DOWN]) * moment * speed
+        assert torque == pytest.approx(ROLLING_RESISTANCE * 1.5)
+
+
+def test_contacts_add_up_and_none_resists_nothing():
+    spin = (0.0, 3.0, 0.0)
+    one, wall = rolling_damping(spin, INERTIA, [DOWN]), (0.5, 0.0, 0.0)
+    assert rolling_damping(spin, INERTIA, [DOWN, wall]) == pytest.approx(one * 2.0 / 1.5)
+    assert rolling_damping(spin, INERTIA, []) == 0.0
+    assert rolling_damping(spin, INERTIA, [(0.0, 0.0, 0.0)]) == 0.0
+
+
+def test_spinning_about_the_normal_is_not_rolling():
+    assert rolling_damping((0.0, 0.0, 5.0), INERTIA, [DOWN]) == pytest.approx(0.0)
+    aslant = rolling_damping((3.0, 0.0, 4.0), INERTIA, [DOWN])
+    moment = (2e-4 * 9 + 4e-4 * 16) / 25
+    assert aslant * moment * 5.0 == pytest.approx(ROLLING_RESISTANCE * 1.5 * 3 / 5)
+
+
+def rolling_cylinder(engine, speed):
+    """A cylinder on its side that rolls along x."""
+    configuration = scene("cylinder").sample(1)
+    size = configuration.objects[0].size
+    radius = size[0] / 2
+    still = Still(lifted(configuration, radius - size[2] / 2 + 1e-4, turn=(math.pi / 2, 0.0, 0.0)), engine)
+    still.step(20)
+    velocity, spin = [speed, 0.0, 0.0], [0.0, speed / radius, 0.0]
+    if engine == "sapien":
+        body = still.physics._world.objects[0]
+        body.set_linear_velocity(velocity)
+        body.set_angular_velocity(spin)
+    else:
+        data, address = still.physics._data, still.physics._world.object_dof[0]
+        local = data.xmat[still.physics._world.object_body[0]].reshape(3, 3).T @ spin
+        data.qvel[address] = [*velocity, *local]
+    return still
+
+
+@pytest.mark.parametrize("engine", ["sapien", "mujoco"])
+def test_a_rolling_cylinder_comes_to_rest(engine):
+    """Without rolling resistance it would be a metre away, and still roll at 0.1 m/s."""
+    still = rolling_cylinder(engine, speed=0.12)
+    start = still.state.objects[0, 0]
+    way = [float(still.step().objects[0, 0] - start) for _ in range(80)]
+    assert 0.01 < way[-1] < 0.3, "it rolls, and not far"
+    assert abs(way[-1] - way[-10]) < 1e-3
+    assert np.abs(still.state.velocities).max() < 0.01
+
+
+def test_rolling_resistance_ends_where_the_hand_touches_or_nothing_moves():
+    still = rolling_cylinder("sapien", speed=0.12)
+    body = still.physics._world.objects[0]
+    own = body.angular_damping
+    still.step(4)
+    assert body.angular_damping > own
+    still.step(100)
+    assert body.angular_damping == own

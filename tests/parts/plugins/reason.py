@@ -1,0 +1,29 @@
+"""A reason from outside, beside the condition that gives it: an object stands too far away."""
+
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.parameters import Metres
+from bt_tasksim.concept_nodes import Pick
+from bt_tasksim.core.outcomes import Outcome, register_reason
+from bt_tasksim.core.poses import norm
+from bt_tasksim.core.units import METRES
+
+TOO_FAR = register_reason(
+    "too_far", "{object} is {distance} away, more than {limit}", distance=METRES, limit=METRES
+)
+
+
+class NearPick(Pick):
+    """A pick that stays near the robot.
+
+    Args:
+        limit: How far away the object may be.
+    """
+
+    limit: Metres = 0.8
+
+    def initial_state(self, seen: Seen) -> Outcome | None:
+        """The object must be near."""
+        distance = float(norm(seen.object(self.target)[:3]))
+        if distance > self.limit:
+            return TOO_FAR(object=self.target, distance=distance, limit=self.limit)
+        return super().initial_state(seen)

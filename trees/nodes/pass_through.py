@@ -1,0 +1,42 @@
+"""What decorators share that pass their child's status on, and say why it failed.
+
+None of these nodes commands anything; in a tick in which nothing acts the robot holds its last target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.decorators import Decorator
+
+from bt_tasksim.concept.reporting import Reporting, as_statement, outcome_of
+from bt_tasksim.core.outcomes import Statement
+
+
+class PassThrough(Reporting, Decorator):
+    """A decorator whose status is its child's."""
+
+    def update(self) -> Status:
+        """The child's status."""
+        return self.decorated.status
+
+
+def end_tick(node: Decorator, status: Status) -> Iterator[Behaviour]:
+    """End a node's tick with a status; yields the node, as ``tick`` has to."""
+    if status != Status.RUNNING:
+        node.stop(status)
+    node.status = status
+    yield node
+
+
+def said_below(node: Behaviour) -> Statement | None:
+    """What the deepest node says that has something to say."""
+    tip = node.tip()
+    return (said_by(tip) if tip is not None else None) or said_by(node)
+
+
+def said_by(node: Behaviour) -> Statement | None:
+    """What a node says itself."""
+    return outcome_of(node) or as_statement(node.feedback_message)

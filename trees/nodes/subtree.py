@@ -1,0 +1,27 @@
+"""Subtree: a tree within a tree, which its file keeps as a tree of its own."""
+
+from __future__ import annotations
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_tasksim.trees.nodes.base import free_children
+from bt_tasksim.trees.nodes.pass_through import PassThrough, said_by
+
+
+class SubTree(PassThrough):
+    """A tree within a tree: passes ticks and statuses through. Its file keeps it as a tree of its own."""
+
+    def update(self) -> Status:
+        """The child's status."""
+        self.report(said_by(self.decorated))
+        return self.decorated.status
+
+
+def subtree(name: str, root: Behaviour) -> SubTree:
+    """A tree within a tree, which its file keeps as a tree of its own.
+
+    Raises:
+        InputError: The root is not a behaviour, or already has a parent.
+    """
+    return SubTree(name, free_children(name, (root,))[0])

@@ -1,0 +1,110 @@
+"""Time-out: a child is stopped, and fails, when its episode time is over.
+
+Time is that of the tree's `Context`: the wall clock plays no part, so that simulation is deterministic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.leaf import not_set_up
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.outcomes import TIMED_OUT
+from bt_tasksim.core.registry import register
+from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
+from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick, said_below
+
+SLACK = 1e-9
+"""Seconds by which summed control periods may fall short of a time."""
+
+
+class Timeout(PassThrough):
+    """Stops its child and fails when ``seconds`` of episode time have passed since it began.
+
+    The child is not ticked in the tick in which its time is over.
+
+    Args:
+        name: The node's name.
+        child: What may take only so long.
+        seconds: Its time, a whole number of milliseconds after rounding.
+
+    Raises:
+        InputError: ``seconds`` is not a number of at least 0.001.
+    """
+
+    def __init__(self, name: str, child: Behaviour, seconds: float) -> None:
+        super().__init__(name, child)
+        if isinstance(seconds, bool | str) or not 0.001 <= seconds <= 4e6:
+            raise InputError(f"'{name}': seconds should be a number between 0.001 and 4e6, found {seconds!r}")
+        self.seconds = round(seconds * 1000) / 1000
+        self._context: Context | None = None
+        self._started = 0.0
+
+    def setup(self, **kwargs: Any) -> None:
+        """Take the tree's context.
+
+        Raises:
+            InputError: There is none: the tree was set up without a Runner.
+        """
+        context = kwargs.get("context")
+        if not isinstance(context, Context):
+            raise InputError(f"'{self.name}' counts episode time and needs a context: run it with a Runner")
+        self._context = context
+
+    def tick(self) -> Iterator[Behaviour]:
+        """One tick.
+
+        Raises:
+            RuntimeError: The tree was not set up.
+        """
+        if self._context is None:
+            raise not_set_up(self)
+        now = self._context.now
+        if self.status != Status.RUNNING:
+            self._started = now
+            self.report(None)
+        elif now - self._started >= self.seconds - SLACK:
+            self.report(TIMED_OUT(said_below(self.decorated), limit=self.seconds))
+            self.decorated.stop(Status.INVALID)
+            yield from end_tick(self, Status.FAILURE)
+            return
+        yield from self.decorated.tick()
+        yield from end_tick(self, self.decorated.status)
+
+
+def timeout(seconds: float, child: Behaviour, *, name: str = "Timeout") -> Timeout:
+    """The child, which is stopped and fails after so many seconds of episode time.
+
+    Raises:
+        InputError: The time does not fit, or the child already has a parent.
+    """
+    return Timeout(name, free_children(name, (child,))[0], seconds)
+
+
+@register("tree node", "Timeout")
+class TimeoutKind(NodeKind[Timeout]):
+    """See `Timeout`."""
+
+    category = "Decorator"
+    behaviour = Timeout
+    symbol = "◷"
+    label = "time-out"
+    ports = (Port("msec", doc="milliseconds of episode time"),)
+    helper = staticmethod(timeout)
+
+    def make(self, name: str, children: list[Behaviour], ports: Mapping[str, int]) -> Timeout:
+        """See `NodeKind.make`."""
+        return timeout(ports["msec"] / 1000, children[0], name=name)
+
+    def read(self, node: Timeout) -> dict[str, int]:
+        """See `NodeKind.read`."""
+        return {"msec": round(node.seconds * 1000)}
+
+    def describe(self, node: Timeout) -> str:
+        """See `NodeKind.describe`."""
+        return f"{self.label} {node.seconds:g} s"
