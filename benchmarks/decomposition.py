@@ -1,25 +1,28 @@
-"""How well demonstration logs are decomposed: ``python benchmarks/decomposition.py``.
+"""How well demonstration logs are decomposed: ``python -m benchmarks.decomposition``.
 
 Prints one line per log of the fifty that count: the ten shipped ones of each scenario, and ten recorded ones
 each of ManiSkill's PickCube and StackCube where they are present (``../shared/demonstrations``), with the
-reason for each miss. Then the share of right sequences over fresh synthetic seeds, also with more noise than
-the shipped logs have.
+reason for each miss. Then the share of right sequences over fresh synthetic seeds, with ``--block B0000``
+those of a sealed block, also with more noise than the shipped logs have.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from bt_tasksim.resources import asset
-from demos_decomp.log import Demonstration
-from demos_decomp.readers import open_log
-from demos_decomp.recognition import recognise
-from demos_decomp.synthetic import SHIPPED, make
-from demos_decomp.synthetic_motion import Sensing
+from benchmarks import sealed
+from bt_tasksim.core.errors import BtTasksimError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.demos_decomp.log import Demonstration
+from bt_tasksim.demos_decomp.readers import open_log
+from bt_tasksim.demos_decomp.recognition import recognise
+from bt_tasksim.demos_decomp.synthetic import SHIPPED, make
+from bt_tasksim.demos_decomp.synthetic_motion import Sensing
 
 WHOLE = ("grasp", "pick", "bring", "place", "release")
 EXPECTED = {
@@ -78,31 +81,42 @@ def fifty() -> None:
     print(f"{shown_for / spent:.0f} s of demonstration decomposed a second\n")
 
 
-def fresh(count: int, first: int) -> None:
-    """Share of right sequences over seeds that were not used while building."""
+def fresh(seeds: range) -> dict[str, dict[str, int]]:
+    """Right sequences over synthetic seeds, by scenario and how many times the noise is the shipped logs'."""
+    found: dict[str, dict[str, int]] = {}
     print(f"{'fresh seeds':<18}" + "".join(f"{f'noise x {factor}':<28}" for factor in (1, 2, 3, 4)))
     for scenario in (name for name in EXPECTED if not name.endswith("-v1")):
         row = []
         for factor in (1, 2, 3, 4):
             sensing = Sensing().worse(factor)
             right = 0
-            for seed in range(first, first + count):
+            for seed in seeds:
                 tasks, _ = recognise(make(scenario, seed, sensing)[0])
                 right += tuple(task.concept for task in tasks) == EXPECTED[scenario]
-            row.append(interval(right, count))
+            row.append(interval(right, len(seeds)))
+            found.setdefault(scenario, {})[f"noise x {factor}"] = right
         print(f"{scenario:<18}" + "".join(f"{cell:<28}" for cell in row))
+    return found
 
 
-def main() -> None:
+def main() -> int:
     """Prints both tables."""
     parser = argparse.ArgumentParser(description="How well demonstration logs are decomposed.")
     parser.add_argument("--seeds", type=int, default=200, help="fresh synthetic seeds per scenario and noise")
-    parser.add_argument("--first", type=int, default=900_000, help="the first of them")
+    sealed.add_arguments(parser)
     options = parser.parse_args()
-    fifty()
-    if options.seeds:
-        fresh(options.seeds, options.first)
+    measure = "decomposition/decomposition-fresh"
+    try:
+        seeds = sealed.choose(options.block, options.seed, measure, options.seeds)
+        fifty()
+        if seeds:
+            content = {"first_seed": seeds.start, "seeds": len(seeds), "right": fresh(seeds)}
+            sealed.keep(options.block, measure, content)
+    except BtTasksimError as error:
+        print(f"decomposition: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -26,15 +26,16 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import sealed
 from benchmarks.sweep import SCENE, Sweep, sweeping
 from bt_tasksim import Runner
-from bt_tasksim.engines.ros.setting import load_setting
-from bt_tasksim.engines.ros.websocket import WebSocket
-from bt_tasksim.errors import BtTasksimError, MachineError
-from bt_tasksim.files import write_text
-from bt_tasksim.robot import load_robot
-from bt_tasksim.twin.evaluation import EvaluationClient
-from bt_tasksim.twin.launch import Twin
+from bt_tasksim.core.errors import BtTasksimError, MachineError
+from bt_tasksim.core.files import write_text
+from bt_tasksim.hardware.ros.setting import load_setting
+from bt_tasksim.hardware.ros.websocket import WebSocket
+from bt_tasksim.hardware.twin.evaluation import EvaluationClient
+from bt_tasksim.hardware.twin.launch import Twin
+from bt_tasksim.robot.description import load_robot
 
 SENSORS = {
     "joint states stop": "silent",
@@ -141,7 +142,7 @@ class Bench:
         quiet: Any = subprocess.DEVNULL
         self.twin = Twin(self.robot, self.configuration, domain=domain, ros=ros, log=quiet, camera=camera)
         try:
-            self.evaluation = EvaluationClient(self.twin.evaluation_port)
+            self.evaluation = EvaluationClient(self.twin.evaluation_port, self.twin.secret)
         except BaseException:
             self.twin.close()
             raise
@@ -177,7 +178,7 @@ class Bench:
         if again:
             self.twin.start_node()
             self.evaluation.close()
-            self.evaluation = EvaluationClient(self.twin.evaluation_port)
+            self.evaluation = EvaluationClient(self.twin.evaluation_port, self.twin.secret)
 
     def at_rest(self, patience: float = 5.0) -> dict[str, Any]:
         """What the twin says once the arm was held and stands, or after so many seconds."""
@@ -248,8 +249,7 @@ def _in_process(bench: Bench, fault: str, wait: float) -> Seen:
 
         return _after(bench, said, running, again_after)
     finally:
-        if runner.pipeline is not None:
-            runner.pipeline.close()
+        runner.pipeline.close()
 
 
 def works(runner: Runner, model: Sweep) -> bool:
@@ -328,8 +328,7 @@ def _by_signal(bench: Bench, fault: str, wait: float) -> Seen:
         try:
             return works(runner, model)
         finally:
-            if runner.pipeline is not None:
-                runner.pipeline.close()
+            runner.pipeline.close()
 
     running = [] if "[]" in out or fault == "SIGKILL of the runner" else [out]
     return _after(bench, f"{out} {err}", running, again, told)
@@ -374,8 +373,7 @@ def run_child(port: int, ros: str) -> None:
     except BtTasksimError as error:
         print("error", error, flush=True)
     finally:
-        if runner.pipeline is not None:
-            runner.pipeline.close()
+        runner.pipeline.close()
 
 
 @contextlib.contextmanager
@@ -413,22 +411,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--domain", type=int, default=43)
     parser.add_argument("--ros", default="", metavar="FILE", help="topics, by default the bundled ones")
     parser.add_argument("--json", type=Path)
+    sealed.add_arguments(parser, first=0)
     parser.add_argument("--run", type=int, metavar="PORT", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.run is not None:
         run_child(options.run, options.ros)
         return 0
+    try:
+        seeds = sealed.choose(options.block, options.seed, "faults/faults", options.times)
+    except BtTasksimError as error:
+        print(f"faults: {error}", file=sys.stderr)
+        return 2
     found: dict[str, list[dict[str, Any]]] = {}
     good = True
     print(HEAD)
     with bench_of(options.domain, options.ros) as bench:
         for fault in options.faults:
-            seen = [attempt(bench, fault, seed) for seed in range(options.times)]
+            seen = [attempt(bench, fault, seed) for seed in seeds]
             good = good and all(s.good for s in seen)
             found[fault] = [asdict(s) for s in seen]
             print(row(fault, seen), flush=True)
             if options.json:
                 write_text(options.json, json.dumps(found, indent=1) + "\n")
+    if options.block is not None:
+        sealed.keep(options.block, "faults/faults", found)
     return 0 if good else 1
 
 

@@ -1,16 +1,16 @@
 """The same trees and policies in SAPIEN, in MuJoCo and on the twin over ROS, on the same draws.
 
-``python -m benchmarks.gap --episodes 100 --save`` runs `pick_and_throw` and `shelf_to_shelf`, each with the
-programmed and with the learned grasp, prints a table with 95 % intervals, and writes each row to a file
-``benchmarks/results/gap-<scenario>-<grasp>-<engines>.json``, so that several calls can measure parts of it.
-On the twin, success is judged by its own hidden state, read through the evaluation channel after the run; the
-run is in real time (about ten seconds an episode), in the other two as fast as it goes.
+``python -m benchmarks.gap --episodes 100 --block B0000`` runs `pick_and_throw` and `shelf_to_shelf`, each
+with the programmed and with the learned grasp, prints a table with 95 % intervals, and writes each row to a
+file ``gap-<scenario>-<grasp>-<engines>.json``, so that several calls can measure parts of it: of a block
+(`benchmarks.sealed`) to its folder in ``benchmarks/results``, of other seeds to ``runs/benchmarks``. On the
+twin, success is judged by its own hidden state, read through the evaluation channel after the run; the run
+is in real time (about ten seconds an episode), in the other two as fast as it goes.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections import Counter
@@ -18,21 +18,20 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from benchmarks import sealed
 from benchmarks.faults import bench_of
-from benchmarks.success import RESULTS
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import BtTasksimError
-from bt_tasksim.files import write_text
-from bt_tasksim.judge import at_rest, judge
-from bt_tasksim.robot import load_robot
-from bt_tasksim.runner import SETTLE, Runner
-from bt_tasksim.training.evaluation import Job, evaluate, wilson
-from bt_tasksim.twin.evaluation import EvaluationClient
-from bt_tasksim.world import Hidden
-from trees.load import load_source
+from bt_tasksim.core.errors import BtTasksimError
+from bt_tasksim.core.outcomes import outcome_of_error
+from bt_tasksim.core.world import Hidden
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import SETTLE, Runner
+from bt_tasksim.hardware.twin.evaluation import EvaluationClient
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.success import at_rest, evaluate_success
+from bt_tasksim.training.evaluation import Job, evaluate
+from bt_tasksim.training.evaluation_outcomes import wilson
+from bt_tasksim.trees.load import load_source
 
-FIRST_SEED = 70_000
-"""Seeds from here on were never run while the twin or its engine were changed."""
 SCENARIOS = ("pick_and_throw", "shelf_to_shelf")
 GRASPS = {"programmed": (("Grasp", "programmed"),), "learned": (("Grasp", "grasp-panda"),)}
 ENGINES = ("sapien", "mujoco", "twin")
@@ -67,7 +66,6 @@ def on_the_twin(
         perception = "camera" if camera else "state"
         options = EngineOptions(engines=f"ros:127.0.0.1:{bench.twin.port}", perception=perception)
         runner = Runner(source.build(), source.scene, options)
-        assert runner.pipeline is not None
         try:
             return [_one(runner, robot, bench.evaluation, seed) for seed in seeds]
         finally:
@@ -81,10 +79,11 @@ def _one(runner: Runner, robot: Any, evaluation: EvaluationClient, seed: int) ->
         result = runner.run(seed)
         ended, reason, why = result.status.name == "SUCCESS", result.reason, result.why
     except BtTasksimError as error:
-        ended, reason, why = False, type(error).__name__, str(error)
+        outcome = outcome_of_error(error)
+        ended, reason, why = False, outcome.cause.reason.name, outcome.sentence
     truth = _settled(evaluation)
     model = configuration.world_model([tip.name for tip in robot.tips], robot.opening)
-    verdict = judge(configuration, model, truth)
+    verdict = evaluate_success(configuration, model, truth)
     if ended:
         reason, why = verdict.reason, verdict.why
     return Episode(seed, ended and verdict.success, reason, why)
@@ -105,26 +104,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--episodes", type=int, default=5)
-    parser.add_argument("--seed", type=int, default=FIRST_SEED)
+    sealed.add_arguments(parser)
     parser.add_argument("--scenarios", nargs="*", default=list(SCENARIOS), choices=SCENARIOS)
     parser.add_argument("--grasps", nargs="*", default=list(GRASPS), choices=GRASPS)
     parser.add_argument("--engines", nargs="*", default=list(ENGINES), choices=[*ENGINES, CAMERA])
     parser.add_argument("--domain", type=int, default=45)
-    parser.add_argument("--save", action="store_true", help="write each row to benchmarks/results")
     options = parser.parse_args(arguments)
-    seeds = range(options.seed, options.seed + options.episodes)
+    try:
+        _measure_all(options)
+    except BtTasksimError as error:
+        print(f"gap: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _measure_all(options: argparse.Namespace) -> None:
+    names = [
+        f"gap/gap-{scenario}-{grasp}-{engines}"
+        for scenario in options.scenarios
+        for grasp in options.grasps
+        for engines in options.engines
+    ]
+    for name in names:  # what cannot be measured is refused before anything is
+        seeds = sealed.choose(options.block, options.seed, name, options.episodes)
     print("| scenario | grasp | engines | success | 95 % interval | failures |")
     print("|---|---|---|---|---|---|")
-    for scenario in options.scenarios:
-        for grasp in options.grasps:
-            for engines in options.engines:
-                episodes = _episodes(scenario, grasp, engines, seeds, options.domain)
-                row = _row(scenario, grasp, engines, episodes)
-                print(_line(row), flush=True)
-                if options.save:
-                    name = f"gap-{scenario}-{grasp}-{engines}.json"
-                    write_text(RESULTS / name, json.dumps(row, indent=1) + "\n")
-    return 0
+    for name in names:
+        scenario, grasp, engines = name.removeprefix("gap/gap-").split("-", 2)
+        row = _row(scenario, grasp, engines, _episodes(scenario, grasp, engines, seeds, options.domain))
+        print(_line(row), flush=True)
+        sealed.keep(options.block, name, row)
 
 
 def _episodes(scenario: str, grasp: str, engines: str, seeds: Sequence[int], domain: int) -> list[Episode]:

@@ -1,21 +1,20 @@
 """How often a grasp holds: the learned policy beside the programmed and the untrained one, held-apart draws.
 
-    python -m benchmarks.grasp --robot panda --policy grasp-panda
-    python -m benchmarks.grasp --robot xarm7_ability --policy grasp-xarm7_ability
+    python -m benchmarks.grasp --robot panda --policy grasp-panda --block B0000
+    python -m benchmarks.grasp --robot panda --policy grasp-panda --draws 200    # a look, development seeds
 
-Runs ``grasp_then_pick`` on seeds that were never run while anything was built or trained: kinds of objects,
-sizes and shape exponents that no lesson draws. Counts successes of all draws and of those that
+Runs ``grasp_then_pick``: kinds of objects that no stage draws by name; 42 to 45 % of the draws lie inside
+strips of sizes that stages draw from, on each axis. Counts successes of all draws and of those that
 `benchmarks.oracle` found graspable, by kind of shape; failures by kind; and how far a grasp's completion
 signal can be trusted: of the grasps that said "done", how many outlived the pick.
 
-Writes ``benchmarks/results/grasp-<robot>-<noise>-<learned|untrained|programmed>.json``.
+Writes ``grasp-<robot>-<noise>-<learned|untrained|programmed>.json``: of a block (`benchmarks.sealed`) to its
+folder in ``benchmarks/results``, of other seeds to ``runs/benchmarks``.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import re
 import sys
 import tempfile
 from collections import Counter
@@ -25,50 +24,50 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import oracle
-from benchmarks.success import FIRST_SEED, RESULTS
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import BtTasksimError
-from bt_tasksim.files import write_text
-from bt_tasksim.network import Network
-from bt_tasksim.policy import PROGRAMMED
-from bt_tasksim.policy_files import PolicyCard, save_policy
-from bt_tasksim.robot import load_robot
-from bt_tasksim.training.evaluation import Evaluation, Job, Outcome, evaluate, wilson
-from concept_nodes import Grasp
-from trees.scenarios import grasp_then_pick
+from benchmarks import oracle, sealed
+from benchmarks.success import RESULTS
+from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.core.errors import BtTasksimError
+from bt_tasksim.core.outcomes import CANNOT_START, GOAL_LOST, LIMIT_VIOLATED, OUT_OF_REACH, TIMED_OUT
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.policy.files import PolicyCard, save_policy
+from bt_tasksim.policy.network import Network
+from bt_tasksim.policy.policy import PROGRAMMED
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.training.evaluation import Job, evaluate
+from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation, wilson
+from bt_tasksim.trees.scenarios import grasp_then_pick
 
 NOISES = ("original", "hard")
 WHO = ("learned", "untrained", "programmed")
 LEAF, AFTER = "grasp target", "pick target"
-CLOSED = 97
-"""Per cent of closure from which a hand that exceeded a limit had closed on nothing."""
-VERDICTS = {"penetration": "overlap", "not lifted": "dropped", "tilted or turned": "tilted"}
+CLOSED = 0.97
+"""Closure from which a hand that exceeded a limit had closed on nothing."""
+VERDICTS = {"penetration": "overlap", "not_lifted": "dropped"}
 
 
-def failure(outcome: Outcome) -> str:
+def failure(outcome: EpisodeOutcome) -> str:
     """A countable kind of failure; empty for a success."""
     if outcome.success:
         return ""
-    if outcome.reason == "out of reach" or outcome.status == "INVALID":
+    if outcome.outcome.is_a(OUT_OF_REACH) or outcome.status == "INVALID":
         return outcome.reason
     if outcome.status == "SUCCESS":
         return VERDICTS.get(outcome.reason, outcome.reason)
-    leaf, _, said = outcome.why.partition(": ")
-    if leaf == LEAF:
-        if said.startswith("limit violated"):
-            closed = re.search(r"hand (\d+) % closed", said)
-            empty = closed is not None and int(closed[1]) >= CLOSED
+    if outcome.leaf == LEAF:
+        if outcome.outcome.is_a(LIMIT_VIOLATED):
+            measured = outcome.outcome.detail
+            empty = measured is not None and measured.numbers["closure"] >= CLOSED
             return "closed on nothing" if empty else "pressed against something"
-        return "not done in time" if said.startswith("not done within") else "could not start"
-    if said.startswith("cannot start"):
+        return "not done in time" if outcome.outcome.is_a(TIMED_OUT) else "could not start"
+    if outcome.outcome.is_a(CANNOT_START):
         return "not held when done"
-    return "lost in the pick" if said.startswith("lost") else "pick broken off"
+    return "lost in the pick" if outcome.outcome.is_a(GOAL_LOST) else "pick broken off"
 
 
-def was_done(outcome: Outcome) -> bool:
+def was_done(outcome: EpisodeOutcome) -> bool:
     """The grasp's completion signal was given: its leaf ended SUCCESS."""
-    return outcome.status == "SUCCESS" or outcome.why.startswith(f"{AFTER}:")
+    return outcome.status == "SUCCESS" or outcome.leaf == AFTER
 
 
 def summary(found: Evaluation, kinds: Mapping[int, str], graspable: Mapping[int, bool]) -> dict[str, Any]:
@@ -98,7 +97,7 @@ def summary(found: Evaluation, kinds: Mapping[int, str], graspable: Mapping[int,
     return content
 
 
-def counts(outcomes: list[Outcome], graspable: Mapping[int, bool]) -> dict[str, Any]:
+def counts(outcomes: list[EpisodeOutcome], graspable: Mapping[int, bool]) -> dict[str, Any]:
     """Draws and successes with their interval, and the same of graspable draws."""
     wins = sum(o.success for o in outcomes)
     out: dict[str, Any] = {
@@ -192,18 +191,32 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", nargs="+", choices=WHO, help="whom to measure; by default all")
     parser.add_argument("--draws", type=int, default=oracle.DRAWS)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=RESULTS)
+    parser.add_argument("--out", type=Path, default=sealed.OUT, help="where results go without a block")
+    sealed.add_arguments(parser)
     options = parser.parse_args(arguments)
-    seeds = range(FIRST_SEED, FIRST_SEED + options.draws)
+    try:
+        return _measure_all(options)
+    except BtTasksimError as error:
+        print(f"grasp: {error}", file=sys.stderr)
+        return 2
+
+
+def _measure_all(options: argparse.Namespace) -> int:
+    names = {
+        (noise, who): f"grasp/grasp-{options.robot}-{noise}-{who}"
+        for noise in options.noise
+        for who in options.only or WHO
+    }
+    for name in names.values():  # what cannot be measured is refused before anything is
+        seeds = sealed.choose(options.block, options.seed, name, options.draws)
     scene = grasp_then_pick.scene(options.robot)
     kinds = {seed: scene.sample(seed).objects[0].kind for seed in seeds}
     try:
-        draws = oracle.load(options.robot)
+        draws = oracle.load(options.robot, RESULTS / (options.block or ""))
         graspable = {seed: bool(draws[seed]["graspable"]) for seed in seeds}
     except (BtTasksimError, KeyError) as error:
         print(f"without the oracle: {error}", file=sys.stderr)
         graspable = {}
-    options.out.mkdir(parents=True, exist_ok=True)
     for noise in options.noise:
         both: dict[str, dict[str, Any]] = {}
         for who in options.only or WHO:
@@ -219,8 +232,7 @@ def main(arguments: list[str] | None = None) -> int:
                 print("no learned policy is named or pinned: only the programmed one is measured")
                 continue
             both[who] = summary(found, kinds, graspable)
-            name = f"grasp-{options.robot}-{noise}-{who}.json"
-            write_text(options.out / name, json.dumps(both[who], indent=2) + "\n")
+            sealed.keep(options.block, names[noise, who], both[who], options.out)
             print(text(both[who], who), flush=True)
         if {"learned", "programmed"} <= set(both):
             n = paired(both["learned"], both["programmed"])

@@ -32,16 +32,16 @@ import numpy as np
 from benchmarks.grasp import untrained
 from benchmarks.peer_maniskill import Peer
 from benchmarks.success import RESULTS
-from bt_tasksim.files import write_text
-from bt_tasksim.network import Network
-from bt_tasksim.policy import LearnedPolicy, load_policy
+from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.core.files import write_text
+from bt_tasksim.policy.network import Network
+from bt_tasksim.policy.policy import LearnedPolicy, load_policy
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.episode import EpisodeEnv
-from concept_nodes import Grasp
-from trees.scenarios import grasp_then_pick
+from bt_tasksim.training.env import EpisodeEnv
+from bt_tasksim.trees.scenarios import grasp_then_pick
 
-LANE = 256
-"""Decisions of a lane."""
+ROLLOUT_STEPS = 256
+"""Decisions of an environment."""
 DEVIATION = 0.165
 """Standard deviation of the noise on the actions, as in the middle of a training."""
 
@@ -83,16 +83,16 @@ ROWS = (
 class Ours:
     """``grasp_then_pick`` in processes of its own, as `Peer` is, with actions that were decided beforehand.
 
-    A lane is run once with the reference policy and noise, and its actions are kept; the same worlds with the
-    same actions are the same episodes, and those are timed.
+    An environment is run once with the reference policy and noise, and its actions are kept; the same worlds
+    with the same actions are the same episodes, and those are timed.
     """
 
     def __init__(self) -> None:
         self._workers: list[tuple[Any, Any]] = []
-        self._lane = 0
+        self._environment = 0
 
-    def rate(self, processes: int, lanes: int) -> tuple[float, float]:
-        """Control periods and decisions per second of ``lanes`` lanes of `LANE` decisions in each process."""
+    def rate(self, processes: int, n_envs: int) -> tuple[float, float]:
+        """Control periods and decisions per second; `ROLLOUT_STEPS` decisions of each environment."""
         context = multiprocessing.get_context("fork")
         while len(self._workers) < processes:
             mine, theirs = context.Pipe()
@@ -102,8 +102,8 @@ class Ours:
             self._workers.append((mine, process))
         pipes = [pipe for pipe, _ in self._workers[:processes]]
         for pipe in pipes:
-            pipe.send(range(self._lane, self._lane + lanes))
-            self._lane += lanes
+            pipe.send(range(self._environment, self._environment + n_envs))
+            self._environment += n_envs
         for pipe in pipes:
             pipe.recv()
         started = time.perf_counter()
@@ -111,7 +111,7 @@ class Ours:
             pipe.send("again")
         periods = sum(pipe.recv() for pipe in pipes)
         spent = time.perf_counter() - started
-        return periods / spent, processes * lanes * LANE / spent
+        return periods / spent, processes * n_envs * ROLLOUT_STEPS / spent
 
     def close(self) -> None:
         """End the processes."""
@@ -123,8 +123,8 @@ class Ours:
 
 
 def _serve(pipe: Any) -> None:
-    """Decide lanes, and run them again and count their control periods, until nobody asks any more."""
-    env = EpisodeEnv(grasp_then_pick.build(), grasp_then_pick.scene(), lesson=2)
+    """Decide n_envs, and run them again and count their control periods, until nobody asks any more."""
+    env = EpisodeEnv(grasp_then_pick.build(), grasp_then_pick.scene(), stage=2)
     network, periods, step = untrained(env.scene.robot), [0], env.runner.step
 
     def counted(command: Any) -> None:
@@ -132,17 +132,17 @@ def _serve(pipe: Any) -> None:
         step(command)
 
     env.runner.step = counted  # type: ignore[method-assign]
-    lanes: list[list[tuple[int, list[Any]]]] = []
+    n_envs: list[list[tuple[int, list[Any]]]] = []
     while True:
         try:
             asked = pipe.recv()
         except EOFError:
             return
         if asked != "again":
-            lanes = [decided(env, network, lane) for lane in asked]
+            n_envs = [decided(env, network, environment) for environment in asked]
         periods[0] = 0
         if asked == "again":
-            for episodes in lanes:
+            for episodes in n_envs:
                 for seed, actions in episodes:
                     env.reset(seed=seed)
                     for action in actions:
@@ -150,10 +150,10 @@ def _serve(pipe: Any) -> None:
         pipe.send(periods[0])
 
 
-def decided(env: EpisodeEnv, network: Network, lane: int) -> list[tuple[int, list[Any]]]:
-    """The episodes of a lane: their seeds, and the actions of the network with noise."""
-    rng = np.random.default_rng((0, lane))
-    noise = rng.normal(0.0, DEVIATION, (LANE, Grasp.actions + 1)).astype(np.float32)
+def decided(env: EpisodeEnv, network: Network, environment: int) -> list[tuple[int, list[Any]]]:
+    """The episodes of an environment: their seeds, and the actions of the network with noise."""
+    rng = np.random.default_rng((0, environment))
+    noise = rng.normal(0.0, DEVIATION, (ROLLOUT_STEPS, Grasp.actions + 1)).astype(np.float32)
     noise[:, -1] = 0.0
     episodes: list[tuple[int, list[Any]]] = []
     over = True
@@ -170,7 +170,8 @@ def decided(env: EpisodeEnv, network: Network, lane: int) -> list[tuple[int, lis
 
 def ours_learn(rollouts: int, config: TrainConfig) -> float:
     """Transitions per second of our training: rollouts and updates, without evaluations."""
-    from bt_tasksim.training.ppo import Progress, train
+    from bt_tasksim.training.ppo import train
+    from bt_tasksim.training.record import Progress
 
     rates: list[float] = []
 
@@ -188,7 +189,7 @@ def ours_learn(rollouts: int, config: TrainConfig) -> float:
     return len(rates) / sum(1.0 / rate for rate in rates)
 
 
-def throughput(rounds: int, lanes: int, peer: Peer) -> dict[str, float]:
+def throughput(rounds: int, n_envs: int, peer: Peer) -> dict[str, float]:
     """Steps without a learner, in turns."""
     ours = Ours()
     table: dict[str, list[float]] = {}
@@ -196,10 +197,10 @@ def throughput(rounds: int, lanes: int, peer: Peer) -> dict[str, float]:
         ours.rate(1, 1)
         for _ in range(rounds):
             for processes in (1, 2):
-                periods, decisions = ours.rate(processes, lanes)
+                periods, decisions = ours.rate(processes, n_envs)
                 _note(table, **{f"steps_{processes}": periods, f"decisions_{processes}": decisions})
                 if not peer.missing:
-                    other = peer.steps(processes, 150 * lanes * processes)
+                    other = peer.steps(processes, 150 * n_envs * processes)
                     _note(table, **{f"peer_steps_{processes}": other})
                     _note(table, **{f"steps_ratio_{processes}": periods / other})
     finally:
@@ -227,7 +228,7 @@ def learning(rounds: int, rollouts: int, peer: Peer) -> dict[str, float]:
 
 def inference(repeat: int, policy: str | None) -> dict[str, float]:
     """Microseconds of a decision, and the largest difference to the same network in torch."""
-    env = EpisodeEnv(grasp_then_pick.build(), grasp_then_pick.scene(), lesson=2)
+    env = EpisodeEnv(grasp_then_pick.build(), grasp_then_pick.scene(), stage=2)
     features, _ = env.reset(seed=0)
     if policy is None:
         from bt_tasksim.training.learner import Learner

@@ -17,8 +17,8 @@ from typing import Any
 
 from benchmarks.faults import bench_of
 from benchmarks.sweep import SCENE, sweeping
-from bt_tasksim.files import write_text
-from bt_tasksim.pacing import Timing
+from bt_tasksim.core.files import write_text
+from bt_tasksim.engines.clock import Timing
 
 
 def measure(minutes: float, rate: int, domain: int) -> tuple[str, str, Timing, float]:
@@ -34,12 +34,11 @@ def measure(minutes: float, rate: int, domain: int) -> tuple[str, str, Timing, f
         bench.evaluation.load(configuration)
         try:
             result = runner.finish(configuration, runner.reset(configuration))
-            assert runner.pipeline is not None and result.timing is not None
+            assert result.timing is not None
             engine: Any = runner.pipeline.physics
             way = shortest_way(engine.engine.joints.offset)
         finally:
-            if runner.pipeline is not None:
-                runner.pipeline.close()
+            runner.pipeline.close()
     return result.status.name, result.why, with_way(result.timing, way), way
 
 

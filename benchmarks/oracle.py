@@ -1,15 +1,15 @@
 """What can be grasped at all: a search with full knowledge, in the same physics and under the same judge.
 
-    python -m benchmarks.oracle --robot panda
-    python -m benchmarks.oracle --robot xarm7_ability
+    python -m benchmarks.oracle --robot panda --block B0000
+    python -m benchmarks.oracle --robot panda --draws 20    # a look, on development seeds
 
-For each held-apart draw of ``grasp_then_pick`` the true shape, size and pose are told, and up to 200 grasps
-are tried until the object is held and lifted: the concept's own grasp first, then others that differ in
-depth, turn, closure, tilt and offset, likely ones first. A draw that none of them holds is called
-ungraspable, and success rates are given with and without such draws.
+For each draw of ``grasp_then_pick`` the true shape, size and pose are told, and up to 200 grasps are tried
+until the object is held and lifted: the concept's own grasp first, then others that differ in depth, turn,
+closure, tilt and offset, likely ones first. A draw that none of them holds is called ungraspable, and
+success rates are given with and without such draws.
 
-Writes ``benchmarks/results/oracle-<robot>.json``: kind, size and exponents of each draw, the tries it took,
-and the grasp that held.
+Writes ``oracle-<robot>.json``, of a block to its folder in ``benchmarks/results``: kind, size and exponents
+of each draw, the tries it took, and the grasp that held.
 """
 
 from __future__ import annotations
@@ -28,21 +28,22 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.success import FIRST_SEED, RESULTS
-from bt_tasksim import poses
-from bt_tasksim.context import Seen
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import BtTasksimError, InputError
-from bt_tasksim.files import write_text
-from bt_tasksim.motion import plan
-from bt_tasksim.poses import Array
-from bt_tasksim.runner import Runner
-from bt_tasksim.scene import ActorConfiguration
+from benchmarks import sealed
+from benchmarks.success import RESULTS
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept_nodes import Pick
+from bt_tasksim.concept_nodes.grasp import Grasp, _approach_begins, _way_out
+from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.planning.reference_motion import plan
+from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.training.evaluation import _one_thread_each
-from concept_nodes import Pick
-from concept_nodes.grasp import Grasp, GraspMemory, _approach_begins, _way_out
-from trees.authoring import sequence
-from trees.scenarios import grasp_then_pick
+from bt_tasksim.trees import sequence
+from bt_tasksim.trees.scenarios import grasp_then_pick
 
 MOST_TRIES = 200
 DRAWS = 1000
@@ -234,13 +235,6 @@ def text(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def as_json(found: dict[str, Any]) -> str:
-    """One line a draw."""
-    head = json.dumps({k: v for k, v in found.items() if k != "draws"}, indent=2)
-    rows = ",\n".join(f"    {json.dumps(draw)}" for draw in found["draws"])
-    return f'{head[:-2]},\n  "draws": [\n{rows}\n  ]\n}}\n'
-
-
 def load(robot: str, folder: Path = RESULTS) -> dict[int, dict[str, Any]]:
     """The draws of a robot's results file, by seed.
 
@@ -255,15 +249,22 @@ def load(robot: str, folder: Path = RESULTS) -> dict[int, dict[str, Any]]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Search, print and write."""
-    parser = argparse.ArgumentParser(description="Which held-apart draws can be grasped at all.")
+    parser = argparse.ArgumentParser(description="Which draws can be grasped at all.")
     parser.add_argument("--robot", default="panda")
     parser.add_argument("--draws", type=int, default=DRAWS)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=RESULTS)
+    parser.add_argument("--out", type=Path, default=sealed.OUT, help="where results go without a block")
+    sealed.add_arguments(parser)
     options = parser.parse_args(arguments)
+    measure = f"oracle/oracle-{options.robot}"
+    try:
+        seeds = sealed.choose(options.block, options.seed, measure, options.draws)
+    except BtTasksimError as error:
+        print(f"oracle: {error}", file=sys.stderr)
+        return 2
     started = time.perf_counter()
     draws = []
-    for draw in survey(options.robot, range(FIRST_SEED, FIRST_SEED + options.draws), options.workers):
+    for draw in survey(options.robot, seeds, options.workers):
         draws.append(draw)
         if len(draws) % 100 == 0:
             print(f"{len(draws)} draws, {time.perf_counter() - started:.0f} s", file=sys.stderr, flush=True)
@@ -271,14 +272,13 @@ def main(arguments: list[str] | None = None) -> int:
     found = {
         "robot": options.robot,
         "scenario": "grasp_then_pick",
-        "first_seed": FIRST_SEED,
+        "first_seed": seeds.start,
         "most_tries": MOST_TRIES,
         "kinds": by_kind(draws),
         "tries": sum(d["tried"] for d in draws),
         "draws": draws,
     }
-    options.out.mkdir(parents=True, exist_ok=True)
-    write_text(options.out / f"oracle-{options.robot}.json", as_json(found))
+    sealed.keep(options.block, measure, found, options.out)
     print(text(found))
     return 0
 

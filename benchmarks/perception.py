@@ -17,17 +17,19 @@ import time
 import cv2
 import numpy as np
 
-from bt_tasksim import poses
-from bt_tasksim.engines.camera_errors import PERFECT, CameraErrors
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import ObjectModel, WorldState
 from bt_tasksim.engines.cameras import project
-from bt_tasksim.engines.pipeline import CameraModel
-from bt_tasksim.engines.postprocess_opencv import CameraPostProcess
-from bt_tasksim.engines.rendering_sapien import SapienRendering
-from bt_tasksim.engines.segmentation import NEUTRAL, classify, find_segments
-from bt_tasksim.poses import Array
-from bt_tasksim.robot import load_robot
-from bt_tasksim.scene import ActorConfiguration, ObjectActor, ObjectSpec, Scene
-from bt_tasksim.world import ObjectModel, WorldState
+from bt_tasksim.engines.images import CameraModel
+from bt_tasksim.engines.perception.camera_errors import PERFECT, CameraErrors
+from bt_tasksim.engines.perception.opencv import CameraPostProcess
+from bt_tasksim.engines.perception.segmentation import NEUTRAL, classify, find_segments
+from bt_tasksim.engines.rendering.sapien import SapienRendering
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import ObjectSpec
 
 KINDS = ("box", "cube", "cylinder", "oval", "diamond", "cup", "superellipsoid")
 SCENARIOS = ("pick_and_place", "shelf_to_shelf", "pick_and_throw", "pick_and_place_recovering")
@@ -134,7 +136,8 @@ def tipped(world: ActorConfiguration, rng: np.random.Generator) -> ActorConfigur
 def picture(measure: Measurement, path: str) -> None:
     """Write a picture: what was segmented (bright) and where the fitted shape's outline is (white)."""
     scenes = [
-        importlib.import_module(f"trees.scenarios.{name}").scene(measure.robot.name) for name in SCENARIOS
+        importlib.import_module(f"bt_tasksim.trees.scenarios.{name}").scene(measure.robot.name)
+        for name in SCENARIOS
     ]
     worlds = [scene.sample(seed) for scene, seed in zip(scenes, (1, 2, 3, 3), strict=True)]
     worlds[3] = tipped(
@@ -224,7 +227,7 @@ def main() -> None:
         rng = np.random.default_rng(options.seed)
         measure.row(f"{kind} lying", [tipped(w, rng) for w in worlds], lying=True)
     for name in SCENARIOS:
-        scene = importlib.import_module(f"trees.scenarios.{name}").scene(options.robot)
+        scene = importlib.import_module(f"bt_tasksim.trees.scenarios.{name}").scene(options.robot)
         measure.row(name, [scene.sample(s) for s in seeds])
 
 

@@ -25,12 +25,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from benchmarks.success import RESULTS
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import MachineError
-from bt_tasksim.files import write_text
-from bt_tasksim.runner import Runner, Step
-from bt_tasksim.world import JointTarget
-from trees.load import load_source
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.files import write_text
+from bt_tasksim.core.world import JointTarget
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import Runner, Step
+from bt_tasksim.trees.load import load_source
 
 EVERY = 10
 """Control periods from one picture to the next, where pictures are drawn."""
@@ -112,7 +112,6 @@ def compared(ways: dict[str, EngineOptions], rounds: int, episodes: int, picture
                 rates[name].append(rate(runner, seeds, pictures))
     finally:
         for runner in runners.values():
-            assert runner.pipeline is not None
             runner.pipeline.close()
     first, *others = ways
     out = {f"{name}_steps_per_s": statistics.median(values) for name, values in rates.items()}
@@ -147,7 +146,7 @@ def step_times(options: EngineOptions, steps: int = 2000) -> float:
     """Median microseconds of a step of the physics engine, with the robot at rest."""
     runner = runner_of(options)
     runner.begin(0)
-    assert runner.pipeline is not None and runner.pipeline.state is not None
+    assert runner.pipeline.state is not None
     start = runner.pipeline.state
     target = JointTarget(start.joint_position.copy(), 0.0 * start.joint_velocity)
     times = []

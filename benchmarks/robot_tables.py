@@ -68,7 +68,8 @@ def faults(results: Results) -> str:
 def messages(results: Results) -> str:
     """One message of each fault, as it was shown."""
     lines = ["| fault | said |", "|---|---|"]
-    for fault, seen in (results.get("faults") or {}).items():
+    found = results.get("faults") or {}
+    for fault, seen in ((fault, found[fault]) for fault in FAULTS if fault in found):
         said = seen[0]["said"].replace("|", "/").replace(" []", "").replace("bt-tasksim ", "")
         lines.append(f"| {fault} | `{said}` |")
     return "\n".join(lines)

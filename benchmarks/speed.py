@@ -23,16 +23,17 @@ import numpy as np
 import py_trees
 from py_trees.common import Status
 
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.engines.registry import EngineOptions
+from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core.files import write_text
+from bt_tasksim.core.world import Command
 from bt_tasksim.engines.vulkan import use_software_driver
-from bt_tasksim.files import write_text
-from bt_tasksim.policy import Action
-from bt_tasksim.runner import Runner
-from bt_tasksim.world import Command
-from trees.load import load_source
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.policy.policy import Action
+from bt_tasksim.trees.load import load_source
 
-PURE = ("initial_state", "begin", "violated", "maintained", "command", "looks", "advance", "explain")
+PURE = ("initial_state", "begin", "violated", "maintained", "carry_out", "explain")
 """The concepts' own functions that a tick calls, besides the policy's."""
 MANISKILL_EPISODE = 50
 """Steps of an episode of PickCube-v1, its own limit."""
@@ -61,7 +62,7 @@ def throughput(rounds: int, episodes: int) -> dict[str, Any]:
     runner.run(0)
     # Every control step counts, also those in which things come to rest before the outcome is judged.
     counted: list[None] = []
-    engine: Any = runner.pipeline.physics if runner.pipeline is not None else None
+    engine: Any = runner.pipeline.physics
     step = engine.step
     engine.step = lambda target: (counted.append(None), step(target))[1]
     begins: list[float] = []
@@ -135,16 +136,14 @@ def outside_physics(episodes: int, robot: str = "panda") -> dict[str, Any]:
     """Median microseconds a control step spends in each part; physics is PhysX's own stepping."""
     runner = _runner("pick_and_place", robot)
     runner.run(0)
-    assert runner.pipeline is not None
     clock = _Clock()
     physics: Any = runner.pipeline.physics
     clock.wrap(runner, "tick", "tick")
     for leaf in runner.tree.iterate():
-        for name in PURE:
-            if hasattr(leaf, name):
-                clock.wrap(leaf, name, "concepts")
-        if hasattr(leaf, "_policy"):
-            clock.wrap(leaf._policy, "act", "concepts")
+        if isinstance(leaf, ConceptNode):
+            for name in PURE:
+                clock.wrap(leaf.model, name, "concepts")
+            clock.wrap(leaf.policy_in_use, "act", "concepts")
     clock.wrap(runner.pipeline.kinematics, "solve", "kinematics")
     clock.wrap(runner.pipeline.postprocess, "observe", "observation")
     clock.wrap(physics, "step", "physics engine")
@@ -238,7 +237,7 @@ class _Noop(py_trees.behaviour.Behaviour):  # type: ignore[misc]
 
 def tick_overhead(n: int) -> dict[str, Any]:
     """A tick of five concepts in a sequence, less their own functions, over one of five no-op leaves."""
-    from trees.authoring import sequence
+    from bt_tasksim.trees import sequence
 
     runner = _runner("pick_and_place")
     runner.begin(0)
@@ -248,8 +247,9 @@ def tick_overhead(n: int) -> dict[str, Any]:
     tree = sequence("ours", *leaves)
     for node in tree.iterate():
         node.setup(context=context)
+    policy = _Decided()
     for leaf in leaves:
-        leaf._policy = _Decided()
+        leaf.use(policy)
     observation, first = context.observation, leaves[0]
 
     def tick(root: Any) -> None:
@@ -264,11 +264,9 @@ def tick_overhead(n: int) -> dict[str, Any]:
     seen, motion = context.seen(0.0), _ACTION.motion
 
     def functions() -> None:
-        first.violated(seen, None)
-        first._policy.act(first, seen, None)
-        first.command(motion, seen, None)
-        first.looks(seen, None)
-        first.advance(seen, None)
+        first.model.violated(seen, None)
+        policy.act(first.model, seen, None)
+        first.model.carry_out(motion, seen, None)
 
     def turn() -> tuple[float, ...]:
         return tuple(
@@ -303,7 +301,7 @@ def help_time(rounds: int) -> dict[str, Any]:
         subprocess.run(command, check=True, capture_output=True)
         times.append(time.perf_counter() - started)
     check = (
-        "import sys, bt_tasksim, bt_tasksim.cli; "
+        "import sys, bt_tasksim, bt_tasksim.cli.main; "
         "print(*sorted({'torch', 'sapien', 'mani_skill'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", check], check=True, capture_output=True, text=True)

@@ -1,32 +1,34 @@
-"""How often: every success rate that the documentation quotes, on seeds that were not used while building.
+"""How often: every success rate that the documentation quotes.
 
-    python -m benchmarks.success        # everything: minutes, and an hour for the cameras
-    python -m benchmarks.success --only shelf_to_shelf-panda
+    python -m benchmarks.success --block B0000   # everything: minutes, and an hour for the cameras
+    python -m benchmarks.success --only shelf_to_shelf-panda    # a look, on development seeds
 
-Writes ``benchmarks/results/<scenario>-<robot>[-camera][-fromlogs].json``, as ``bt-tasksim evaluate --json``
-would. For ``-fromlogs`` the ten shipped logs of a scenario become ten trees, and each runs on thirty of the
-three hundred seeds on which the authored tree runs: the two files are paired seed by seed.
+Writes ``<scenario>-<robot>[-camera][-fromlogs].json``, as ``bt-tasksim evaluate --json`` would: of a block
+(`benchmarks.sealed`) to its folder in ``benchmarks/results``, of other seeds to ``runs/benchmarks``. For
+``-fromlogs`` the ten shipped logs of a scenario become ten trees, and each runs on thirty of the three
+hundred seeds on which the authored tree runs: the two files are paired seed by seed.
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.files import write_text
-from bt_tasksim.resources import asset
-from bt_tasksim.training.evaluation import Evaluation, Job, evaluate
-from demos_decomp import decompose_log, open_log
-from trees.from_graph import tree_from_graph
-from trees.xml_writer import save_tree
+from benchmarks import sealed
+from bt_tasksim.core.errors import BtTasksimError
+from bt_tasksim.core.resources import asset
+from bt_tasksim.demos_decomp import decompose_log, open_log
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.training.evaluation import Job, evaluate
+from bt_tasksim.training.evaluation_outcomes import Evaluation
+from bt_tasksim.trees.from_graph import tree_from_graph
+from bt_tasksim.trees.xml_writer import save_tree
 
-FIRST_SEED = 50_000
-"""Seeds from here on were never run while concepts, engines or scenes were changed."""
 RESULTS = Path(__file__).parent / "results"
 SCENARIOS = ("pick_and_place", "shelf_to_shelf", "pick_and_throw")
 
@@ -59,31 +61,43 @@ ROWS = (
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure the rows that are asked for."""
-    parser = argparse.ArgumentParser(description="Success rates on fresh seeds.")
+    parser = argparse.ArgumentParser(description="Success rates.")
+    sealed.add_arguments(parser)
     parser.add_argument("--only", nargs="*", default=[], metavar="ROW", help=", ".join(r.name for r in ROWS))
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--episodes", type=int, metavar="N", help="most episodes of a row, for a look")
     options = parser.parse_args(arguments)
-    RESULTS.mkdir(exist_ok=True)
-    for row in ROWS:
-        if options.only and row.name not in options.only:
-            continue
-        found = measure(row, options.workers).to_json()
-        found.pop("outcomes")
-        write_text(RESULTS / f"{row.name}.json", json.dumps(found, indent=2) + "\n")
-        print(
-            f"{row.name:45} {found['successes']:4d} of {found['episodes']}  {found['failures']}", flush=True
-        )
+    try:
+        for row in ROWS:
+            if not options.only or row.name in options.only:
+                _one(row, options)
+    except BtTasksimError as error:
+        print(f"success: {error}", file=sys.stderr)
+        return 2
     return 0
 
 
-def measure(row: Row, workers: int) -> Evaluation:
+def _one(row: Row, options: argparse.Namespace) -> None:
+    name, episodes = f"success/{row.name}", min(options.episodes or row.episodes, row.episodes)
+    seeds = sealed.choose(options.block, options.seed, name, episodes)
+    found = content(measure(row, seeds, options.workers), seeds.start)
+    sealed.keep(options.block, name, found)
+    print(f"{row.name:45} {found['successes']:4d} of {found['episodes']}  {found['failures']}", flush=True)
+
+
+def content(found: Evaluation, first_seed: int) -> dict[str, Any]:
+    """What is kept of an evaluation."""
+    kept = {k: v for k, v in found.to_json().items() if k not in ("outcomes", "seconds")}
+    return {**kept, "first_seed": first_seed}
+
+
+def measure(row: Row, seeds: Sequence[int], workers: int) -> Evaluation:
     """The evaluation of one row."""
     options = EngineOptions(perception=row.perception)
-    seeds = range(FIRST_SEED, FIRST_SEED + row.episodes)
     if not row.from_logs:
         return evaluate(Job(row.scenario, robot=row.robot, options=options), seeds, workers)
     logs = sorted(asset("demonstrations", row.scenario).glob("*.h5"))
-    share = row.episodes // len(logs)
+    share = len(seeds) // len(logs)
     parts = []
     with tempfile.TemporaryDirectory() as folder:
         for k, log in enumerate(logs):

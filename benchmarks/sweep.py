@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim import Runner, Scene
-from bt_tasksim.concept import ConceptModel
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.world import Command
-from trees import sequence
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core.world import Command
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.trees import sequence
 
 SCENE = Scene("panda", objects={"cup": "on table"})
 AMPLITUDE, RATE = 0.1, 4.0

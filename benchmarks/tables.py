@@ -30,9 +30,9 @@ from typing import Any
 
 from benchmarks import learned_tables, robot_tables
 from benchmarks.experiments import pages as experiment_tables
-from benchmarks.success import FIRST_SEED, RESULTS, SCENARIOS
+from benchmarks.success import RESULTS, SCENARIOS
 from benchmarks.success import ROWS as MEASURED
-from bt_tasksim.files import write_text
+from bt_tasksim.core.files import write_text
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (
@@ -47,14 +47,17 @@ ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
 KINDS = ("camera", "fromlogs")
 OTHER = ("speed", "decomposition", "learning", "remote", "faults", "loop")
-APART = ("oracle-", "grasp-", "experiment-", "training-", "gap-")
+APART = ("oracle-", "grasp-", "experiment-", "training-", "gap-", "logs-", "decomposition-")
 """How results begin whose tables are made in `learned_tables`, `robot_tables` and `experiments.pages`."""
 NOT_YET = "not measured yet"
+SPENT = 50_000
+"""First seed of results that do not say it: measured again and again, see ``docs/evaluation.md``."""
 
 
 def load(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
-    """Results by name."""
-    return {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted(folder.glob("*.json"))}
+    """Results by name; those of a later block before those of an earlier one, and of none."""
+    files = [*sorted(folder.glob("*.json")), *sorted(folder.glob("B[0-9][0-9][0-9][0-9]/*.json"))]
+    return {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in files}
 
 
 def names(results: dict[str, Any]) -> list[str]:
@@ -110,9 +113,10 @@ def full(results: dict[str, Any]) -> str:
             continue
         failures = ", ".join(f"{count} x {reason}" for reason, count in found["failures"].items()) or "none"
         failed = ", ".join(str(s) for s in found["failed_seeds"])
-        last = FIRST_SEED + found["episodes"] - 1
+        first = found.get("first_seed", SPENT)
         lines.append(
-            f"| `{name}` | {FIRST_SEED} to {last} | {found['successes']} of {found['episodes']} "
+            f"| `{name}` | {first} to {first + found['episodes'] - 1} "
+            f"| {found['successes']} of {found['episodes']} "
             f"| {rate(found)} | {failures} | {failed} |"
         )
     return "\n".join(lines)
@@ -139,8 +143,11 @@ def paired(results: dict[str, Any]) -> str:
 
 
 def commands(results: dict[str, Any]) -> str:
-    """The command that repeats each row."""
-    lines = [f"python -m benchmarks.success --only {name}" for name in names(results)]
+    """The command that repeats each row, to look at."""
+    lines = [
+        f"python -m benchmarks.success --only {name} --seed {results.get(name, {}).get('first_seed', SPENT)}"
+        for name in names(results)
+    ]
     return "```\n" + "\n".join(lines) + "\n```"
 
 
@@ -228,7 +235,7 @@ def filled(text: str, results: dict[str, Any]) -> str:
 def measure_decomposition() -> dict[str, list[int]]:
     """Right sequences and logs, by scenario; the logs that are present on this machine."""
     from benchmarks.decomposition import EXPECTED, logs
-    from demos_decomp.recognition import recognise
+    from bt_tasksim.demos_decomp.recognition import recognise
 
     counts: dict[str, list[int]] = {}
     for scenario, _, shown in logs():

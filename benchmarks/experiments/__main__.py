@@ -24,8 +24,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--draws", type=int, help="draws of each measurement")
     parser.add_argument("--steps", type=int, help="decisions of each training")
-    parser.add_argument("--quick", action="store_true", help="few draws and steps, into a temporary folder")
-    parser.add_argument("--results", type=Path, default=RESULTS)
+    parser.add_argument("--quick", action="store_true", help="few draws and steps, into a new folder")
+    parser.add_argument("--results", type=Path, help="folder of the results; with --quick, of everything")
     parser.add_argument("--pictures", type=Path, default=PICTURES)
     options = parser.parse_args(arguments)
     request = Request(
@@ -33,16 +33,16 @@ def main(arguments: list[str] | None = None) -> int:
         workers=options.workers,
         draws=options.draws or (QUICK_DRAWS if options.quick else None),
         steps=options.steps or (QUICK_STEPS if options.quick else None),
-        results=options.results,
+        results=options.results or RESULTS,
         pictures=options.pictures,
     )
     if options.quick:
-        folder = Path(tempfile.gettempdir()) / "bt-tasksim-experiments"
+        folder = options.results or Path(tempfile.mkdtemp(prefix="bt-tasksim-experiments-"))
         folder.mkdir(exist_ok=True)
         request = Request(
             request.policy, request.workers, request.draws, request.steps, folder, folder, folder / "pictures"
         )
-        print(f"quick: everything goes to {folder}", file=sys.stderr)
+        print(f"quick: everything goes to {folder}; go on with --results {folder}", file=sys.stderr)
     module = importlib.import_module(f"benchmarks.experiments.{EXPERIMENTS[options.experiment]}")
     if options.train:
         if not hasattr(module, "train"):

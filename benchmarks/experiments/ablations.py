@@ -20,19 +20,19 @@ from py_trees.common import Status
 from benchmarks.experiments import judged, pictures
 from benchmarks.experiments.common import Request, share
 from benchmarks.experiments.training import POLICIES, finished, history, learn
-from bt_tasksim.context import Seen
-from bt_tasksim.files import write_text
-from bt_tasksim.parameters import Seconds
-from bt_tasksim.policy import PROGRAMMED, Action
-from bt_tasksim.poses import Array
-from bt_tasksim.scene import Scene
+from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.parameters import Seconds
+from bt_tasksim.concept_nodes import Grasp, Pick
+from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
+from bt_tasksim.core.files import write_text
+from bt_tasksim.core.poses import Array
+from bt_tasksim.policy.policy import PROGRAMMED, Action
+from bt_tasksim.scene.scene import Scene
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.decorator import Train
 from bt_tasksim.training.reward import Reward
-from concept_nodes import Grasp, Pick
-from concept_nodes.grasp import GraspMemory
-from trees.authoring import sequence
-from trees.scenarios import grasp_then_pick
+from bt_tasksim.trees import sequence
+from bt_tasksim.trees.nodes.train import Train
+from bt_tasksim.trees.scenarios import grasp_then_pick
 
 VARIANTS = ("full", "fixed time", "shaping alone")
 SEEDS = (0, 1, 2)
@@ -42,7 +42,7 @@ HOLDS = (0.8, 1.2, 1.6, 2.0, 2.4, 2.8)
 """Seconds of closing from which the fixed time is chosen, on training draws."""
 HOLD_FILE = "hold.json"
 WINDOW = 600
-"""Episodes of each lesson but the last: the same for all variants, whatever they succeed in."""
+"""Episodes of each stage but the last: the same for all variants, whatever they succeed in."""
 
 
 class FixedTimeGrasp(Grasp):
@@ -74,9 +74,9 @@ def tree(variant: str, hold: float = 1.2) -> Behaviour:
 
 
 def scene() -> Scene:
-    """That of ``grasp_then_pick``; its lessons end after so many episodes, and not with success."""
-    lessons = [replace(lesson, until=0.01) for lesson in grasp_then_pick.lessons()]
-    return replace(grasp_then_pick.scene("panda"), lessons=lessons)
+    """That of ``grasp_then_pick``; its stages end after so many episodes, and not with success."""
+    stages = [replace(stage, until=0.01) for stage in grasp_then_pick.stages()]
+    return replace(grasp_then_pick.scene("panda"), stages=stages)
 
 
 def config(variant: str, seed: int, steps: int) -> TrainConfig:
@@ -85,7 +85,7 @@ def config(variant: str, seed: int, steps: int) -> TrainConfig:
         steps=steps,
         seed=seed,
         success_window=WINDOW,
-        lesson_share=1.0,
+        stage_share=1.0,
         evaluate_every=12,
         evaluation_draws=100,
         reward=Reward(sufficient=variant != "shaping alone"),
@@ -116,13 +116,13 @@ def train(request: Request) -> None:
 
 
 def best_hold(request: Request) -> float:
-    """The fixed time with which the middle of a learned action succeeds most often in the last lesson."""
+    """The fixed time with which the middle of a learned action succeeds most often in the last stage."""
     path = folder_of(request) / HOLD_FILE
     if not path.is_file():
         path.parent.mkdir(parents=True, exist_ok=True)
-        found, last = {}, len(grasp_then_pick.lessons()) - 1
+        found, last = {}, len(grasp_then_pick.stages()) - 1
         for hold in HOLDS:
-            case = judged.Case(functools.partial(tree, "fixed time", hold), scene(), lesson=last)
+            case = judged.Case(functools.partial(tree, "fixed time", hold), scene(), stage=last)
             draws = judged.judge(case, range(request.draws or 200), request.workers, stream="training")
             found[str(hold)] = sum(d.success for d in draws) / len(draws)
             print(f"done {hold:g} s after closing began: {100 * found[str(hold)]:.1f} %", flush=True)

@@ -16,10 +16,10 @@ from py_trees.behaviour import Behaviour
 from benchmarks.experiments import judged, pictures
 from benchmarks.experiments.common import Request, policy_of, share
 from benchmarks.experiments.training import POLICIES, learn
-from bt_tasksim.policy import PROGRAMMED
+from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.policy.policy import PROGRAMMED
 from bt_tasksim.training.config import TrainConfig
-from concept_nodes import Grasp
-from trees.scenarios import grasp_fast_heavy, grasp_gentle_lift
+from bt_tasksim.trees.scenarios import grasp_fast_heavy, grasp_gentle_lift
 
 FOLLOWERS = {"gentle": grasp_gentle_lift, "fast": grasp_fast_heavy}
 STEPS, DRAWS = 250_000, 300

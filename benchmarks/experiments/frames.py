@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from py_trees.common import Status
 
-from bt_tasksim.poses import Array
-from bt_tasksim.runner import Runner, Step
+from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.runner import Runner, Step
 from bt_tasksim.training.evaluation import Job, _runner
-from concept_nodes import Grasp
 
 CAMERA = "scene"
 CLOSE = (170, 100, 470, 400)
@@ -54,7 +54,6 @@ def film(job: Job, seed: int, caption: str, count: int = 4, part: tuple[int, int
     try:
         runner.run(seed, record=draw)
     finally:
-        assert runner.pipeline is not None
         runner.pipeline.close()
     return Strip(caption, tuple(_cropped(p, part) for p in pictures))
 

@@ -10,15 +10,16 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import InputError
-from bt_tasksim.network import Network
-from bt_tasksim.policy import PROGRAMMED, Action, LearnedPolicy, Policy, ProgrammedPolicy
-from bt_tasksim.policy_files import load_policy
-from bt_tasksim.policy_library import find_policy
-from bt_tasksim.scene import Scene
-from bt_tasksim.training.episode import EpisodeEnv
-from bt_tasksim.training.evaluation import _one_thread_each, wilson
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.policy.files import load_policy
+from bt_tasksim.policy.library import find_policy
+from bt_tasksim.policy.network import Network
+from bt_tasksim.policy.policy import PROGRAMMED, Action, LearnedPolicy, Policy, ProgrammedPolicy
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.training.env import EpisodeEnv
+from bt_tasksim.training.evaluation import _one_thread_each
+from bt_tasksim.training.evaluation_outcomes import wilson
 from bt_tasksim.training.rollouts import _kind
 
 STREAM = "evaluation"
@@ -56,14 +57,14 @@ class Case:
         scene: The scene.
         policy: ``programmed``, or a policy's name or folder.
         noise: Noise model of the estimate.
-        lesson: Number of the scene's lesson that worlds are drawn from; None: the scene itself.
+        stage: Number of the scene's stage that worlds are drawn from; None: the scene itself.
     """
 
     build: Callable[[], Behaviour]
     scene: Scene
     policy: str = PROGRAMMED
     noise: str = "original"
-    lesson: int | None = None
+    stage: int | None = None
 
 
 def judge(
@@ -165,7 +166,7 @@ _worker: dict[str, Any] = {}
 
 def _env(case: Case, stream: str) -> EpisodeEnv:
     options = EngineOptions(noise=case.noise)
-    return EpisodeEnv(case.build(), case.scene, options=options, stream=stream, lesson=case.lesson)
+    return EpisodeEnv(case.build(), case.scene, options=options, stream=stream, stage=case.stage)
 
 
 def _start(case: Case, stream: str) -> None:

@@ -13,10 +13,10 @@ from typing import Any
 from benchmarks.experiments import judged, pictures
 from benchmarks.experiments.common import Request, policy_of, share
 from benchmarks.experiments.training import compact, history
-from bt_tasksim.errors import InputError
-from bt_tasksim.files import write_text
-from bt_tasksim.policy_files import load_card
-from trees.scenarios import grasp_then_pick
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.files import write_text
+from bt_tasksim.policy.files import load_card
+from bt_tasksim.trees.scenarios import grasp_then_pick
 
 ROBOTS = ("panda", "xarm7_ability")
 DRAWS = 200
@@ -62,9 +62,9 @@ def kept(request: Request, robot: str) -> tuple[str, list[dict[str, Any]]]:
 
 
 def table(found: dict[str, Any]) -> str:
-    """Success over time, and by lesson."""
+    """Success over time, and by stage."""
     lines = [
-        "| training | decisions | minutes | lesson | succeeded while exploring | on held-apart draws |",
+        "| training | decisions | minutes | stage | succeeded while exploring | on held-apart draws |",
         "|---|---|---|---|---|---|",
     ]
     for run in found["runs"]:
@@ -72,14 +72,14 @@ def table(found: dict[str, Any]) -> str:
             held = row["held_apart"]
             apart = {"interval": judged.interval(held["successes"], held["draws"]), **held}
             lines.append(
-                f"| `{run['name']}` | {row['steps']} | {row['seconds'] / 60:.0f} | {row['lesson']} "
+                f"| `{run['name']}` | {row['steps']} | {row['seconds'] / 60:.0f} | {stage_of(row)} "
                 f"| {100 * row['success']:.0f} % | {share(apart)} |"
             )
         lines.append(f"| programmed, `{run['robot']}` | | | | | {share(run['programmed'])} |")
-    lines += ["", "| training | lesson | decisions | episodes | succeeded | how episodes ended |"]
+    lines += ["", "| training | stage | decisions | episodes | succeeded | how episodes ended |"]
     lines.append("|---|---|---|---|---|---|")
     for run in found["runs"]:
-        for lesson, rows in lessons(run["rows"]).items():
+        for stage, rows in stages(run["rows"]).items():
             ends = sum((Counter(row["ends"]) for row in rows), Counter[str]())
             n = sum(ends.values())
             said = ", ".join(
@@ -87,7 +87,7 @@ def table(found: dict[str, Any]) -> str:
             )
             size = run["rows"][-1]["steps"] // len(run["rows"])
             lines.append(
-                f"| `{run['name']}` | {lesson} | {size * len(rows)} | {n} "
+                f"| `{run['name']}` | {stage} | {size * len(rows)} | {n} "
                 f"| {100 * ends['success'] / max(n, 1):.0f} % | {said} |"
             )
     return "\n".join(lines)
@@ -105,11 +105,16 @@ def milestones(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return out
 
 
-def lessons(rows: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
-    """Rollouts by lesson, in order."""
+def stage_of(row: dict[str, Any]) -> str:
+    """The curriculum stage of a rollout; earlier results call it a lesson."""
+    return str(row.get("stage", row.get("lesson", "")))
+
+
+def stages(rows: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
+    """Rollouts by stage, in order."""
     out: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
-        out.setdefault(row["lesson"], []).append(row)
+        out.setdefault(stage_of(row), []).append(row)
     return out
 
 
@@ -118,7 +123,7 @@ def draw(found: dict[str, Any], folder: Path) -> None:
     for run in found["runs"]:
         rows = run["rows"]
         smooth = _smoothed([row["success"] for row in rows])
-        marks = [(mine[0]["steps"], lesson) for lesson, mine in lessons(rows).items()]
+        marks = [(mine[0]["steps"], stage) for stage, mine in stages(rows).items()]
         programmed = run["programmed"]
         pictures.curves(
             folder / f"A-{run['name']}.svg",

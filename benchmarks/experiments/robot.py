@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks.experiments import pictures, shapes
 from benchmarks.experiments.common import Request, share
-from bt_tasksim.errors import InputError
+from bt_tasksim.core.errors import InputError
 
 ROBOTS = ("panda", "xarm7_ability")
 

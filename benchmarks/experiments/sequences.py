@@ -11,8 +11,8 @@ from typing import Any
 
 from benchmarks.experiments import frames, pictures
 from benchmarks.experiments.common import Request, policy_of, read, share, write
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.policy import PROGRAMMED
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.policy.policy import PROGRAMMED
 from bt_tasksim.training.evaluation import Job, evaluate
 
 TREES = ("shelf_to_shelf", "pick_and_throw")

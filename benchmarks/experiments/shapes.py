@@ -12,13 +12,12 @@ from typing import Any
 
 from benchmarks import grasp, oracle
 from benchmarks.experiments import frames, pictures
-from benchmarks.experiments.common import Request, policy_of, share
-from benchmarks.success import FIRST_SEED
-from bt_tasksim.engines.registry import EngineOptions
-from bt_tasksim.errors import InputError
-from bt_tasksim.policy import PROGRAMMED
+from benchmarks.experiments.common import FIRST_SEED, Request, policy_of, share
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.policy.policy import PROGRAMMED
 from bt_tasksim.training.evaluation import Job, evaluate
-from trees.scenarios import grasp_then_pick
+from bt_tasksim.trees.scenarios import grasp_then_pick
 
 NOISE, DRAWS = "original", 300
 WHO = ("learned", "programmed")

@@ -11,13 +11,13 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.files import write_text
-from bt_tasksim.scene import Scene
+from bt_tasksim.core.files import write_text
+from bt_tasksim.scene.scene import Scene
 from bt_tasksim.training.config import TrainConfig
 
 POLICIES = Path(__file__).resolve().parents[1] / "policies"
 """Policies of experiments; those that are used elsewhere are in ``assets/policies``."""
-KEPT = ("steps", "episodes", "success", "return", "length", "ends", "lesson", "held_apart", "seconds")
+KEPT = ("steps", "episodes", "success", "return", "length", "ends", "stage", "held_apart", "seconds")
 """What is kept of each rollout."""
 
 
@@ -34,7 +34,7 @@ def learn(
 
     Args:
         build: Builds the tree.
-        scene: Its scene, with lessons.
+        scene: Its scene, with stages.
         out: The policy's folder.
         config: The settings.
         workers: Worker processes.
@@ -44,7 +44,8 @@ def learn(
     Returns:
         Its history.
     """
-    from bt_tasksim.training.ppo import CHECKPOINT, HISTORY, train, training_folder
+    from bt_tasksim.training.ppo import train
+    from bt_tasksim.training.record import CHECKPOINT, HISTORY, training_folder
 
     beside, short = training_folder(out), out.with_name(f"{out.name}.json")
     if finished(out):
@@ -85,7 +86,7 @@ def _said(progress: Any) -> None:
         _last["time"] = now
         held = "" if progress.held_apart is None else " held apart {} of {}".format(*progress.held_apart)
         print(
-            f"{done} of {total}: {100 * progress.success:.0f} %{held}, {progress.lesson}, "
+            f"{done} of {total}: {100 * progress.success:.0f} %{held}, {progress.stage}, "
             f"{progress.rate:.0f}/s, {progress.seconds_left:.0f} s left",
             flush=True,
         )
