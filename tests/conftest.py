@@ -17,7 +17,7 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.model import ConceptModel
-from bt_tasksim.core import poses
+from bt_tasksim.core import plugins, poses
 from bt_tasksim.core.world import Command, Hidden, Observation
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
@@ -46,6 +46,13 @@ def ctrl_c_arrives() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture(autouse=True)
+def parts_are_forgotten() -> Iterator[None]:
+    """What a test announces or loads as a plugin is not there for the next one."""
+    with plugins.scratch():
+        yield
 
 
 SCENE = Scene(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -14,7 +14,6 @@ FOLDER = Path(__file__).parent / "plugins"
 
 
 @pytest.fixture
-def plugin() -> Iterator[Callable[[str], ModuleType]]:
+def plugin() -> Callable[[str], ModuleType]:
     """Loads a file of `plugins/` by its stem."""
-    with plugins.scratch():
-        yield lambda stem: plugins.load_plugin(str(FOLDER / f"{stem}.py"))
+    return lambda stem: plugins.load_plugin(str(FOLDER / f"{stem}.py"))
