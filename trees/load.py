@@ -82,43 +82,33 @@ def load_source(
         )
     elif path.suffix == ".xml":
         source = _from_xml(path, robot, scene)
-    elif path.suffix in (".h5", ".hdf5"):
-        raise InputError(
-            f"'{tree}' is a log: make a tree of it with 'bt-tasksim decompose {tree} --xml tree.xml'"
-        )
     else:
-        if tree not in scenarios():
-            hint = nearest(tree, scenarios())
-            raise InputError(f"no scenario '{tree}'{hint} (or give a .py or .xml file)")
-        module = importlib.import_module(f"bt_tasksim.trees.scenarios.{tree}")
-        source = TreeSource(tree, module.build, _scene(scene or tree, robot))
-    root = source.build()
-    if not isinstance(root, Behaviour):
-        raise InputError(f"'{tree}': build() should return a py_trees behaviour, found {type(root).__name__}")
-    check_tree(root)
-    check_names(root, source.scene)
+        source = TreeSource(tree, _scenario(tree).build, _scene(scene or tree, robot))
+    check_names(_checked(source.build(), tree), source.scene)
     source = replace(source, build=with_policies(source.build, policies))
     source.build()
     return source
 
 
-def load_root(file: str) -> Behaviour:
-    """The tree in a file, whatever its scene.
+def load_root(tree: str) -> Behaviour:
+    """The tree that a name stands for, whatever its scene.
 
     Args:
-        file: Path of a ``.py`` or ``.xml`` file.
+        tree: Name of a scenario, or path of a ``.py`` or ``.xml`` file.
 
     Raises:
-        InputError: There is no such file, or it is no good.
+        InputError: There is no such tree, or the file is no good.
     """
     from bt_tasksim.trees.xml_reader import load_tree
 
-    path = Path(file)
+    path = Path(tree)
     if path.suffix == ".xml":
         return load_tree(path)
-    root: Behaviour = _called(_function(_module(path), "build", path), path)
-    check_tree(root)
-    return root
+    if path.suffix == ".py":
+        root = _called(_function(_module(path), "build", path), path)
+    else:
+        root = _scenario(tree).build()
+    return _checked(root, tree)
 
 
 def with_policies(
@@ -219,6 +209,24 @@ def names_in(root: Behaviour) -> tuple[set[str], set[str]]:
                 if leaf.values[key] is not None and parameter.quantity.kind == "place":
                     places.add(leaf.values[key])
     return objects, places
+
+
+def _scenario(tree: str) -> Any:
+    """The module of a ready-made scenario."""
+    if Path(tree).suffix in (".h5", ".hdf5"):
+        raise InputError(
+            f"'{tree}' is a log: make a tree of it with 'bt-tasksim decompose {tree} --xml tree.xml'"
+        )
+    if tree not in scenarios():
+        raise InputError(f"no scenario '{tree}'{nearest(tree, scenarios())} (or give a .py or .xml file)")
+    return importlib.import_module(f"bt_tasksim.trees.scenarios.{tree}")
+
+
+def _checked(root: Any, tree: str) -> Behaviour:
+    if not isinstance(root, Behaviour):
+        raise InputError(f"'{tree}': build() should return a py_trees behaviour, found {type(root).__name__}")
+    check_tree(root)
+    return root
 
 
 def _from_xml(path: Path, robot: str | None, scene: str | None) -> TreeSource:

@@ -44,8 +44,9 @@ def learn(
     Returns:
         Its history.
     """
+    from bt_tasksim.policy.files import CHECKPOINT, training_folder
     from bt_tasksim.training.ppo import train
-    from bt_tasksim.training.record import CHECKPOINT, HISTORY, training_folder
+    from bt_tasksim.training.record import HISTORY
 
     beside, short = training_folder(out), out.with_name(f"{out.name}.json")
     if finished(out):

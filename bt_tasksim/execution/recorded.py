@@ -144,9 +144,12 @@ def take_policies(
     nodes = nodes_of(root)
     named = {concept.lower(): policy for concept, policy in given.policies}
     had = dict(recorded.policies)
+    statuses = recorded.demonstration.extra["tree/status"]
+    other = trusted and statuses.shape[1:] != (len(nodes),)
     for number in had:
-        if not 0 <= number < len(nodes) or not isinstance(nodes[number], ConceptModel):
-            raise InputError(f"{where} was recorded with another tree; give that one")
+        other = other or not 0 <= number < len(nodes) or not isinstance(nodes[number], ConceptModel)
+    if other:
+        raise InputError(f"{where} was recorded with another tree; give that one")
     concepts = {concept_name(type(leaf)) for leaf in nodes if isinstance(leaf, ConceptModel)}
     for concept in named:
         if concept not in concepts:

@@ -116,7 +116,7 @@ def _tree(text: str, given: Given, where: str) -> Behaviour:
     from bt_tasksim.trees.xml_reader import tree_from_xml
 
     if not text:
-        raise InputError(f"{where} does not hold its tree, which XML could not; replay it from Python")
+        raise InputError(f"{where} does not hold its tree, which XML could not; name it: --tree FILE")
     return tree_from_xml(text, given.nodes, source=f"{where}: run/tree")
 
 

@@ -27,6 +27,8 @@ VERSION = 1
 WEIGHTS, CARD = "policy.safetensors", "card.json"
 FILES = (WEIGHTS, CARD)
 """Names of the files in a policy's folder."""
+CHECKPOINT = "checkpoint.safetensors"
+"""Name of the file from which a training goes on, in the folder beside the policy's own."""
 
 _TOLD = ("measured", "remarks")
 _COUNTS = ("episodes", "successes")
@@ -149,6 +151,25 @@ def save_policy(folder: str | Path, network: Network, card: PolicyCard) -> Polic
     return card
 
 
+def training_folder(policy: Path, suffix: str = "") -> Path:
+    """The folder beside a policy's own in which its training keeps checkpoint, history and events."""
+    return policy.with_name(f"{policy.name}.training{suffix}")
+
+
+def unfinished(folder: Path) -> str:
+    """One sentence where a folder has no policy because its training did not end; empty elsewhere."""
+    several = sorted(folder.glob("*.training")) if folder.is_dir() and not (folder / CARD).exists() else []
+    policies = [folder, *(each.with_suffix("") for each in several)]
+    for policy in policies if folder.name else []:
+        beside = training_folder(policy)
+        if (beside / CHECKPOINT).is_file() and not (policy / CARD).exists():
+            return (
+                f"there is no policy in '{policy}' yet: its training was interrupted; '{beside}' holds the "
+                "checkpoint; go on with the command that began it and --resume: bt-tasksim train ... --resume"
+            )
+    return ""
+
+
 def load_policy(folder: str | Path) -> tuple[Network, PolicyCard]:
     """Read a policy and check that its parts fit together; `check_fits` says whether it fits a concept.
 
@@ -182,6 +203,8 @@ def load_card(folder: str | Path) -> PolicyCard:
         InputError: The folder or the card is missing, or the card is no good.
     """
     folder = Path(folder)
+    if said := unfinished(folder):
+        raise InputError(said)
     if not folder.is_dir():
         what = "is a file; a policy is a folder" if folder.exists() else "does not exist; check the path"
         raise InputError(f"policy folder '{folder}' {what}")

@@ -18,7 +18,15 @@ from bt_tasksim.core.files import write_text
 from bt_tasksim.core.json_text import parse_json
 from bt_tasksim.core.registry import parts
 from bt_tasksim.core.resources import asset
-from bt_tasksim.policy.files import FILES, PolicyCard, PolicySlot, check_fits, load_card, load_policy
+from bt_tasksim.policy.files import (
+    FILES,
+    PolicyCard,
+    PolicySlot,
+    check_fits,
+    load_card,
+    load_policy,
+    unfinished,
+)
 from bt_tasksim.robot.description import RobotDescription, load_robot
 
 PROGRAMMED = "programmed"
@@ -90,6 +98,8 @@ def find_policy(name: str) -> Path | None:
         return path
     if path.exists():
         raise InputError(f"'{name}' is a file; a policy is a folder")
+    if said := unfinished(path):
+        raise InputError(said)
     if len(path.parts) > 1:
         hint = nearest(path.name, _policy_folders(path.parent))
         raise InputError(f"there is no policy folder '{name}'{hint}")
@@ -211,6 +221,8 @@ def list_policies(
     """
     at = asset("policies") if folder is None else Path(folder)
     if folder is not None and not at.is_dir():
+        if said := unfinished(at):
+            raise InputError(said)
         raise InputError(f"there is no folder '{folder}' to look for policies in")
     shipped = at.resolve() == asset("policies").resolve()
     pins = read_pins() if shipped else {}

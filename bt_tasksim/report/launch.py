@@ -1,16 +1,24 @@
-"""One call to run a tree, with or without a video."""
+"""One call to run a tree, with or without a video, and with or without a folder that keeps the run."""
 
 from __future__ import annotations
 
+import dataclasses
+import logging
+from pathlib import Path
 from typing import Any
 
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.files import check_folder, check_writable, write_bytes
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report.video import VideoRecorder
+from bt_tasksim.report.write import FILES, VIDEO, write_run
 from bt_tasksim.scene.scene import Scene
+
+_log = logging.getLogger(__name__)
 
 
 def run(
@@ -18,7 +26,8 @@ def run(
     scene: Scene,
     seed: int = 0,
     *,
-    video: str | None = None,
+    video: str | Path | bool | None = None,
+    out: str | Path | None = None,
     options: EngineOptions | None = None,
     **engines: Any,
 ) -> Result:
@@ -28,20 +37,55 @@ def run(
         tree: The tree's root.
         scene: The scene.
         seed: Seed of the draw.
-        video: Path of a video to write.
+        video: Path of a video to write; or True, for ``run.mp4`` in the folder ``out``.
+        out: Folder that keeps the run, as ``bt-tasksim run --out`` does: result, log, picture of the tree and
+            report, all of them or none. An earlier run's folder is replaced, any other that is not empty is
+            refused. None: nothing is kept.
         options: Which engines; or name them by keyword, such as ``noise="none"``, ``perception="camera"``.
         **engines: See `EngineOptions`.
 
     Returns:
         What became of it; ``result.status`` and ``result.why`` say it in short.
+
+    Raises:
+        InputError: The tree, the scene, an option, or a place to write to is no good.
+        MachineError: An engine failed, the machine cannot film, or the disk is full or not writable.
+        KeyboardInterrupt: The run was interrupted; the folder, if any, holds what was run until then.
     """
+    film = None if isinstance(video, bool) or video is None else Path(video)
+    if video is True and out is None:
+        raise InputError("video=True films into the run's folder: give out=FOLDER, or video='run.mp4'")
+    recorder = None if film is None else VideoRecorder(film)
+    if film is not None:
+        check_writable(film)
+    if out is not None:
+        check_folder(out, FILES)
+    filmed = film is not None or video is True
     if options is None:
-        options = EngineOptions(**({"rendering": video is not None} | engines))
+        options = EngineOptions(**({"rendering": filmed} | engines))
+    elif engines:
+        raise InputError(f"give options= or {next(iter(engines))}=, not both")
+    if filmed:
+        options = dataclasses.replace(options, rendering=True)
     runner = Runner(tree, scene, options)
     try:
-        if video is None:
+        if out is not None:
+            return _kept(Path(out), runner, seed, film)
+        if recorder is None:
             return runner.run(seed)
-        with VideoRecorder(video) as recorder:
+        with recorder:
             return runner.run(seed, record=recorder)
     finally:
         runner.pipeline.close()
+
+
+def _kept(folder: Path, runner: Runner, seed: int, film: Path | None) -> Result:
+    """A run whose folder is written, and whose video lies in another place too."""
+    result, files = write_run(folder, runner, seed)
+    for remark in files.remarks:
+        _log.warning(remark)
+    if film is not None:
+        if VIDEO not in files.paths:
+            raise MachineError(f"there is no video for '{film}'; the rest of the run is in '{folder}'")
+        write_bytes(film, files.paths[VIDEO].read_bytes())
+    return result

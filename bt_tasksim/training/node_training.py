@@ -18,7 +18,7 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.pipelines import EngineOptions
-from bt_tasksim.policy.files import PolicyCard, load_policy, save_policy
+from bt_tasksim.policy.files import CHECKPOINT, PolicyCard, load_policy, save_policy, training_folder
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import LearnedPolicy, Policy
 from bt_tasksim.robot.description import load_robot
@@ -34,7 +34,7 @@ from bt_tasksim.training.checkpoint import (
 )
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.env import EpisodeEnv, shared_layout
-from bt_tasksim.training.record import CHECKPOINT, CLEARLY, HISTORY, Progress, training_folder
+from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
 from bt_tasksim.training.rollouts import EnvironmentRollout, RolloutTask, Workers
 from bt_tasksim.trees.nodes.train import Train
 
@@ -157,12 +157,12 @@ class NodeTraining:
             learner.update(rollouts, self.iteration + 1)
             self.iteration += 1
             row = self._row(rollouts)
+            learned = time.perf_counter() - began
             last = self.iteration == config.rollouts
             if last or (config.evaluate_every and self.iteration % config.evaluate_every == 0):
                 row["held_apart"] = self._evaluate(pool, learner)
-            spent = time.perf_counter() - began
-            self.seconds += spent
-            row |= {"seconds": round(self.seconds, 2), "rate": config.rollout / spent}
+            self.seconds += time.perf_counter() - began
+            row |= {"seconds": round(self.seconds, 2), "rate": config.rollout / learned}
             self.history.append(row)
             self._next_stage()
             self._log(learner, row)

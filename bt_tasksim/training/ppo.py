@@ -14,6 +14,7 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.locks import locked
 from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.policy.files import CHECKPOINT, training_folder
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import LearnedPolicy, Policy
 from bt_tasksim.robot.description import load_robot
@@ -21,7 +22,7 @@ from bt_tasksim.scene.scene import Scene
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.env import find_train, shared_layout
 from bt_tasksim.training.node_training import NodeTraining, TrainingTask
-from bt_tasksim.training.record import CHECKPOINT, Progress, training_folder
+from bt_tasksim.training.record import Progress
 from bt_tasksim.trees.nodes.train import Train, train_nodes
 
 FINE_TUNING = 0.25

@@ -1,11 +1,9 @@
-"""What a training shows of itself: its progress, and the folder that it keeps beside the policy's own."""
+"""What a training shows of itself: its progress and its history."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
-CHECKPOINT = "checkpoint.safetensors"
 HISTORY = "history.json"
 CLEARLY = 0.02
 """Share of held-apart draws by which an earlier policy must have been better than the last one."""
@@ -21,7 +19,7 @@ class Progress:
         success: Share of successes among the last episodes, exploration included.
         held_apart: Successes and draws of the last evaluation on held-apart draws; None before the first.
         stage: Name of the stage.
-        rate: Decisions per second.
+        rate: Decisions per second, evaluations left out.
         seconds_left: Estimate.
     """
 
@@ -32,8 +30,3 @@ class Progress:
     stage: str
     rate: float
     seconds_left: float
-
-
-def training_folder(policy: Path, suffix: str = "") -> Path:
-    """The folder beside a policy's own that keeps checkpoint, history and TensorBoard's events."""
-    return policy.with_name(f"{policy.name}.training{suffix}")

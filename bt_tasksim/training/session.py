@@ -17,8 +17,9 @@ from bt_tasksim.core.files import check_folder
 from bt_tasksim.core.locks import LockedError
 from bt_tasksim.core.plugins import loaded
 from bt_tasksim.core.typed_file import record_model, validate
+from bt_tasksim.policy.files import CHECKPOINT, training_folder
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.record import CHECKPOINT, CLEARLY, HISTORY, Progress, training_folder
+from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
 
 
 @dataclass(frozen=True)

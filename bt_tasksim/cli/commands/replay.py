@@ -15,6 +15,14 @@ from bt_tasksim.core.registry import register
 @register("command", "replay")
 def replay(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder or its run.h5.")],
+    tree: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TREE",
+            help="The run's tree, where the log cannot hold it: a scenario, a .py file with build(), or an "
+            ".xml file.",
+        ),
+    ] = None,
     robot: Annotated[
         str | None, typer.Option(metavar="R", help="The run's robot, if it is not a bundled one.")
     ] = None,
@@ -28,8 +36,10 @@ def replay(
     A log is believed in numbers and names only: whatever else it needs is named here.
     """
     from bt_tasksim.execution import replay
+    from bt_tasksim.trees.load import load_root
 
+    root = None if tree is None else load_root(tree)
     with progress("replaying", None):
-        found = replay.replay(run, robot=robot, policies=policies(policy), objects=objects)
+        found = replay.replay(run, root, robot=robot, policies=policies(policy), objects=objects)
     print(found.why)
     return 0 if found.identical else 1

@@ -42,7 +42,7 @@ def test_old_command_lines_mean_what_they_meant(line):
     if line.startswith("new "):
         was = {"like": None, **was}
     if line.startswith("replay"):
-        was = {"robot": None, "policy": [], "objects": None, **was}
+        was = {"tree": None, "robot": None, "policy": [], "objects": None, **was}
     assert found == {"nodes": None, **was} if "nodes" in found else found == was
 
 

@@ -165,6 +165,27 @@ def test_an_unknown_policy_is_one_sentence(shipped, policy, tmp_path, name, sent
         _resolved(Grasp("cup", policy=name.format(tmp=tmp_path)), PANDA)
 
 
+@pytest.mark.parametrize("named", ["grasp-mine", "."])
+@pytest.mark.parametrize("ended", [False, True])
+def test_a_policy_whose_training_was_interrupted(policy, tmp_path, monkeypatch, named, ended):
+    """Named by its own folder, or by that of a training of several nodes."""
+    monkeypatch.chdir(tmp_path)
+    beside = tmp_path / "runs" / "grasp-mine.training"
+    beside.mkdir(parents=True)
+    (beside / "checkpoint.safetensors").touch()
+    if ended:
+        policy("runs/grasp-mine")
+    name = "runs" if named == "." else f"runs/{named}"
+    if ended and named != ".":
+        assert _resolved(Grasp("cup", policy=name), PANDA).source == str(tmp_path / name)
+        return
+    with pytest.raises(InputError) as error:
+        _resolved(Grasp("cup", policy=name), PANDA)
+    sentence = str(error.value)
+    for word in ("interrupted", "grasp-mine.training", "--resume"):
+        assert (word in sentence) != ended, sentence
+
+
 @pytest.mark.parametrize(
     ("leaf", "robot", "sentence"),
     [

@@ -21,12 +21,13 @@ from toys import SCENE, Check, Raise, Unprogrammed
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.locks import LockedError
 from bt_tasksim.execution.pipelines import EngineOptions
-from bt_tasksim.policy.files import load_policy
+from bt_tasksim.policy.files import CHECKPOINT, load_policy
 from bt_tasksim.scene.scene import CurriculumStage
 from bt_tasksim.training.checkpoint import read_checkpoint, write_checkpoint
 from bt_tasksim.training.config import TrainConfig
+from bt_tasksim.training.node_training import NodeTraining
 from bt_tasksim.training.ppo import train
-from bt_tasksim.training.record import CHECKPOINT, HISTORY
+from bt_tasksim.training.record import HISTORY
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.nodes.train import Train
 
@@ -142,6 +143,7 @@ bt_tasksim.execution.runner.build_pipeline = lambda robot, options: toys.World()
 from bt_tasksim.scene.scene import CurriculumStage
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.trees.nodes.train import Train
+from bt_tasksim.training.node_training import NodeTraining
 from bt_tasksim.training.ppo import train
 from bt_tasksim.trees import sequence
 import json
@@ -397,3 +399,18 @@ def test_nodes_are_trained_in_order_each_with_the_others_as_they_are(tmp_path):
         assert np.abs(network(rows) - old(rows)).max() < 0.3
         assert card.concept == "unprogrammed"
     assert first.name.startswith("a@")
+
+
+def test_the_speed_leaves_evaluations_out(monkeypatch):
+    """An evaluation takes long here: the time left tells, the decisions a second do not."""
+    evaluate = NodeTraining._evaluate
+
+    def slow(self, pool, learner):
+        time.sleep(2.0)
+        return evaluate(self, pool, learner)
+
+    monkeypatch.setattr(NodeTraining, "_evaluate", slow)
+    told = []
+    learn(None, dataclasses.replace(TINY, steps=128, evaluate_every=1), report=told.append)
+    assert [progress.rate > 64 / 2.0 for progress in told] == [True, True]
+    assert told[0].seconds_left > 2.0

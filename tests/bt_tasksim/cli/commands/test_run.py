@@ -71,3 +71,33 @@ def test_a_leaf_that_raises_is_one_sentence_with_its_name(call, tree_file):
     code, _, err = call("run", "tree.py", "--out", "here")
     assert code == 1 and err == "bt-tasksim: leaf 'culprit' raised KeyError in tree.py:14: 'key'\n"
     assert not Path("here").exists()
+
+
+def test_a_run_whose_tree_xml_cannot_hold_is_replayed_with_it(call, refused, tree_file):
+    from bt_tasksim.demos_decomp.log_file import read_log
+    from bt_tasksim.execution.run_log import read_text
+
+    more = """
+from py_trees.behaviours import Success
+
+class Thing(Success):
+    pass
+"""
+    tree_file('sequence("mixed", Thing("mine"), Grasp("cup", timeout=0.5))', more)
+    assert call("run", "tree.py", "--seed", 3, "--out", "here")[0] == 1
+    assert read_text(read_log("here/run.h5").demonstrations[0].extra["run/tree"]) == ""
+    assert "--tree" in refused("replay", "here"), "and nothing is looked for where the log says it ran"
+    code, out, _ = call("replay", "here", "--tree", "tree.py")
+    assert code == 0 and out.startswith("identical"), out
+    assert "another tree" in refused("replay", "here", "--tree", "pick_and_place")
+    assert "pick_and_place" in refused("replay", "here", "--tree", "pick_and_plaice")
+    assert "gone.py" in refused("replay", "here", "--tree", "gone.py")
+
+
+@pytest.mark.parametrize("kind", ["scenario", "xml"])
+def test_a_run_is_replayed_with_any_kind_of_tree(call, kind):
+    assert call("show", "pick_and_throw", "--xml", "tree.xml")[0] == 0
+    tree = "pick_and_throw" if kind == "scenario" else "tree.xml"
+    assert call("run", tree, "--seed", 3, "--out", "here")[0] in (0, 1)
+    code, out, _ = call("replay", "here", "--tree", tree)
+    assert code == 0 and out.startswith("identical"), out
