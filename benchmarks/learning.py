@@ -238,7 +238,7 @@ def inference(repeat: int, policy: str | None) -> dict[str, float]:
         network = learner.network
     else:
         network, _ = load_policy(policy)
-    decision = env._decision
+    decision = env.decision
     assert decision is not None
     model, seen, memory = decision.leaf.model, decision.seen, decision.memory
     learned = LearnedPolicy(network, "measured")

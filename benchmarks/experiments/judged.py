@@ -102,7 +102,7 @@ def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
         return Draw(seed, False, False, "never began", str(error), 0, 0.0)
     decisions, nearer = 0, 0.0
     while True:
-        decision = env._decision
+        decision = env.decision
         assert decision is not None
         action = policy.act(decision.leaf.model, decision.seen, decision.memory)
         nearer += float(action.terminate)

@@ -2,44 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
 import gymnasium
 import numpy as np
 from py_trees.behaviour import Behaviour
-from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import Decision
 from bt_tasksim.concept.model import ConceptModel
-from bt_tasksim.concept.reporting import outcome_of, speaker
-from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError
-from bt_tasksim.core.outcomes import (
-    INTERRUPTED,
-    LIMIT_VIOLATED,
-    TIME_OVER,
-    TIMED_OUT,
-    Outcome,
-    outcome_of_error,
-    register_reason,
-)
+from bt_tasksim.concept.reporting import speaker
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.renamed import renamed_arguments
-from bt_tasksim.execution.leaf_errors import ticking
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import LONGEST, Runner
 from bt_tasksim.policy.policy import Action, Policy, split_action
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.scene import Scene
-from bt_tasksim.training.judge import Judgement, SignalOutcome
+from bt_tasksim.training.episodes import Episode
 from bt_tasksim.training.reward import Reward
-from bt_tasksim.training.reward_parts import End, Transition
+from bt_tasksim.training.transitions import Transitions
 from bt_tasksim.trees.nodes.train import Train, concepts_in, train_nodes
 
-BEGAN_ANEW = register_reason("began_anew", "'{train}' began anew before what follows ended")
-TREE_ENDED = register_reason("tree_ended", "the tree ended before what follows did")
-FOLLOWER_LATE = register_reason("follower_late", "what follows did not end in time")
 REDRAWS = 50
 """Draws in a row in which the subtree may stay inactive."""
 CAMERA = "overview"
@@ -112,14 +98,17 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (n,), np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (m + 1,), np.float32)
         self._action_shape = (m + 1,)
-        self.judgement = Judgement(self.train, self.runner.context)
         self.redrawn = 0
         """Draws so far in which the subtree was never active."""
         self.discarded = 0
         """Episodes so far whose judgement an error spoiled."""
-        self._ticking: Generator[Behaviour | Decision, None, None] | None = None
-        self._decision: Decision | None = None
-        self._limit = 0
+        self._episode: Episode | None = None
+        self._transitions: Transitions | None = None
+
+    @property
+    def decision(self) -> Decision | None:
+        """What the leaf under training sees and remembers while its action is waited for; else None."""
+        return None if self._episode is None else self._episode.waiting
 
     # ---- gymnasium --------------------------------------------------------------------------------------
 
@@ -151,11 +140,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
                     f"ended with {self.tree.status.name}: {leaf.feedback_message if leaf is not None else ''}"
                 )
         self.redrawn += redrawn
-        self._cost0 = self._cost(decision)
-        self._potential = 0.0
-        self._leaf = decision.leaf
-        self._before = decision
-        self._last_motion: Array | None = None
+        self._transitions = Transitions(decision, self.reward.gamma)
         return self._features(decision), {"draw": draw, "redrawn": redrawn}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -176,17 +161,15 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         Raises:
             RuntimeError: There is no episode.
         """
-        decision = self._decision
-        if decision is None:
+        episode, transitions, decision = self._episode, self._transitions, self.decision
+        if episode is None or transitions is None or decision is None:
             raise RuntimeError("step() without an episode: call reset() first")
         decision.leaf.decide(action)
-        self._decision = None
-        self._motion = action.motion
-        found = self._until_decision()
+        transitions.decided(action.motion)
+        found = episode.next_decision()
         if found is None:
-            return self._end()
-        self._decision = found
-        parts = self._pay(found)
+            return self._end(episode, transitions)
+        parts = self.reward.pay(transitions.to(found))
         return self._features(found), sum(parts.values()), False, False, {"reward": parts}
 
     def render(self) -> Array | None:
@@ -205,136 +188,41 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
     # ---- the episode ------------------------------------------------------------------------------------
 
     def _begin(self, draw: int) -> Decision | None:
+        """The first decision in the world of a draw; None where the tree ends without one."""
         self._drop()
-        configuration = self.scene.sample(draw, self.stream, self.stage)
-        self._world = self.runner.reset(configuration)
-        self.judgement.tolerance = configuration.tolerance
-        self.judgement.reset()
-        self._ticks_left = round(self.runner.longest * configuration.control_frequency)
-        self._activation: int | None = None
-        self._judged: SignalOutcome | None = None
-        self._over: Outcome | None = None
-        self._decision = self._until_decision()
-        return self._decision
+        world = self.scene.sample(draw, self.stream, self.stage)
+        self._episode = Episode(self.runner, self.train, world)
+        return self._episode.next_decision()
 
-    def _until_decision(self) -> Decision | None:
-        """Tick and step until a leaf under training is about to act, or the activation has ended (None)."""
-        train = self.train
-        while True:
-            node = self._next_node()
-            if isinstance(node, Decision):
-                if self._activation is None:
-                    self._activation = train.activations
-                    if self.judgement.follower is not None:
-                        self.judgement.reset()  # what it did in earlier rounds
-                if train.activations == self._activation:
-                    return node
-                self._over = INTERRUPTED()
-                return None
-            self.judgement.saw(node)
-            if node is train and train.status != Status.RUNNING:
-                if self._activation is None:  # nothing was decided
-                    self.judgement.reset()
-                    continue
-                if train.status == Status.SUCCESS:
-                    self._judged = self._follow()
-                return None
-            if node is not None:
-                continue
-            if self._activation is not None and train.status != Status.RUNNING:
-                self._over = INTERRUPTED()
-                return None
-            if self.tree.status != Status.RUNNING:
-                return None
-            if not self._control_period():
-                self._over = TIME_OVER(limit=self.runner.longest)
-                return None
-
-    def _follow(self) -> SignalOutcome:
-        """Run what follows to its end."""
-        judgement = self.judgement
-        try:
-            judged = judgement.ended(self.train)
-            while judged is None:
-                node = self._next_node()
-                if isinstance(node, Decision):
-                    return SignalOutcome(False, "INVALID", BEGAN_ANEW(train=self.train.name))
-                judgement.saw(node)
-                judged = judgement.ended(node)
-                if judged is None and node is None:
-                    if self.tree.status != Status.RUNNING:
-                        return SignalOutcome(False, "INVALID", TREE_ENDED())
-                    if not self._control_period():
-                        return SignalOutcome(False, "RUNNING", FOLLOWER_LATE(), discarded=True)
-            return judged
-        except (InputError, LeafError):
-            raise
-        except BtTasksimError as error:
-            return SignalOutcome(False, "INVALID", outcome_of_error(error), discarded=True)
-
-    def _next_node(self) -> Behaviour | Decision | None:
-        """The next node that the present tick visits; None at its end."""
-        if self._ticking is None:
-            self._ticking = ticking(self.tree)
-        node = next(self._ticking, None)
-        if node is None:
-            self._ticking = None
-        return node
-
-    def _control_period(self) -> bool:
-        if self._ticks_left <= 0:
-            return False
-        self._ticks_left -= 1
-        self.runner.step(self.runner.context.command)
-        return True
-
-    def _end(self) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def _end(
+        self, episode: Episode, transitions: Transitions
+    ) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """The last step of an episode: what is paid, and why."""
-        train, judged = self.train, self._judged
-        outcome, truncated = self._before.leaf.outcome, False
-        end: End = "cut"
-        if self._over is not None:
-            outcome, truncated = self._over, self._over.is_a(TIME_OVER)
-        elif judged is not None:
-            outcome, truncated = judged.outcome, judged.discarded
-            if not judged.discarded and self.reward.sufficient:
-                end = "success" if judged.success else "failure"
-        elif outcome is not None and outcome.is_a(LIMIT_VIOLATED):
-            end = "violated"
-        elif outcome is not None and outcome.is_a(TIMED_OUT):
-            end = "timeout"
-        else:
-            failed = speaker(train)
-            outcome = (outcome_of(failed) if failed is not None else None) or outcome
-            end = "failure"
-        kept = truncated or (judged is not None and (judged.success or not self.reward.sufficient))
-        # Where it is kept, the present observation is charged once: there is no state after it.
-        parts = self.reward.pay(self._transition(self._potential if kept else 0.0, end))
-        self.discarded += truncated and judged is not None
+        ending = episode.ending(self.reward.sufficient)
+        parts = self.reward.pay(transitions.to_end(ending.end, ending.kept))
+        self.discarded += ending.discarded
         info = {
             "reward": parts,
-            "is_success": judged is not None and judged.success and not judged.discarded,
-            "status": train.status.name,
-            "follower": "" if judged is None else judged.status,
-            "reason": "" if outcome is None else outcome.cause.reason.name,
-            "why": "" if outcome is None else outcome.sentence,
-            "discarded": judged is not None and judged.discarded,
-            "seconds": self.runner.context.now,
+            "is_success": ending.is_success,
+            "status": ending.status,
+            "follower": "" if ending.judged is None else ending.judged.status,
+            "reason": "" if ending.outcome is None else ending.outcome.cause.reason.name,
+            "why": "" if ending.outcome is None else ending.outcome.sentence,
+            "discarded": ending.discarded,
+            "seconds": ending.seconds,
         }
-        features = self._features(self._before)
+        features = self._features(transitions.decision)
         self._drop()
-        return features, sum(parts.values()), not truncated, truncated, info
+        return features, sum(parts.values()), not ending.truncated, ending.truncated, info
 
     def _drop(self) -> None:
-        """End a tick that is suspended."""
-        self._decision = None
-        if self._ticking is not None:
-            self._ticking.close()
-            self._ticking = None
+        """End the episode where it is."""
+        if self._episode is not None:
+            self._episode.close()
+            self._episode = self._transitions = None
 
     def _features(self, decision: Decision) -> Array:
-        """What the leaf sees; kept for the episode's last step."""
-        self._before = decision
+        """What the leaf sees."""
         model = decision.leaf.model
         found = np.asarray(model.features(decision.seen, decision.memory), np.float32)
         if found.shape != self.observation_space.shape:
@@ -343,25 +231,6 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
                 f"{self.observation_space.shape}"
             )
         return found
-
-    def _cost(self, decision: Decision) -> float:
-        return float(decision.leaf.model.necessary_cost(decision.seen, decision.memory))
-
-    def _pay(self, found: Decision) -> dict[str, float]:
-        """What the last decision pays, now that the next one is there; a new leaf starts from nothing."""
-        cost = self._cost(found)
-        after = self._cost0 - cost
-        if found.leaf is not self._leaf:
-            self._leaf, self._cost0, self._potential, after = found.leaf, cost, 0.0, 0.0
-        parts = self.reward.pay(self._transition(after))
-        self._last_motion = self._motion if found.leaf is self._before.leaf else None
-        self._potential = after
-        return parts
-
-    def _transition(self, after: float, end: End = "") -> Transition:
-        return Transition(
-            self._before, self._motion, self._last_motion, self._potential, after, self.reward.gamma, end
-        )
 
 
 def find_train(tree: Behaviour, name: str | None = None) -> Train:

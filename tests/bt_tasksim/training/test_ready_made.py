@@ -41,7 +41,7 @@ def signal(env):
 
 def honest(env):
     """The reference motion, and done when the concept's own goal is seen."""
-    decision = env.unwrapped._decision
+    decision = env.unwrapped.decision
     return signal(env) if decision.leaf.done(decision.seen, decision.memory) else idle(env)
 
 
