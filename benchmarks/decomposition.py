@@ -75,7 +75,7 @@ def fifty() -> None:
         mark = "" if found == EXPECTED[scenario] else "  MISS"
         print(f"{scenario:<16}{label:<9}{' '.join(found):<42}{sure:>10.2f}{mark}")
         if mark:
-            misses.append(f"{scenario} {label}: {'; '.join(remarks) or 'no remark'}")
+            misses.append(f"{scenario} {label}: {'; '.join(map(str, remarks)) or 'no remark'}")
     print(f"\nright sequence: {right} of {seen}")
     print("\n".join(f"miss: {miss}" for miss in misses))
     print(f"{shown_for / spent:.0f} s of demonstration decomposed a second\n")

@@ -27,6 +27,7 @@ import numpy as np
 from benchmarks import oracle, sealed
 from benchmarks.success import RESULTS
 from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.concept_nodes.grasp import CLOSED_ON_NOTHING
 from bt_tasksim.core.errors import BtTasksimError
 from bt_tasksim.core.outcomes import CANNOT_START, GOAL_LOST, LIMIT_VIOLATED, OUT_OF_REACH, TIMED_OUT
 from bt_tasksim.execution.pipelines import EngineOptions
@@ -41,8 +42,6 @@ from bt_tasksim.trees.scenarios import grasp_then_pick
 NOISES = ("original", "hard")
 WHO = ("learned", "untrained", "programmed")
 LEAF, AFTER = "grasp target", "pick target"
-CLOSED = 0.97
-"""Closure from which a hand that exceeded a limit had closed on nothing."""
 VERDICTS = {"penetration": "overlap", "not_lifted": "dropped"}
 
 
@@ -56,9 +55,11 @@ def failure(outcome: EpisodeOutcome) -> str:
         return VERDICTS.get(outcome.reason, outcome.reason)
     if outcome.leaf == LEAF:
         if outcome.outcome.is_a(LIMIT_VIOLATED):
-            measured = outcome.outcome.detail
-            empty = measured is not None and measured.numbers["closure"] >= CLOSED
-            return "closed on nothing" if empty else "pressed against something"
+            return (
+                "closed on nothing"
+                if outcome.outcome.is_a(CLOSED_ON_NOTHING)
+                else "pressed against something"
+            )
         return "not done in time" if outcome.outcome.is_a(TIMED_OUT) else "could not start"
     if outcome.outcome.is_a(CANNOT_START):
         return "not held when done"

@@ -14,6 +14,7 @@ from bt_tasksim import _names
 if TYPE_CHECKING:
     from bt_tasksim.concept.condition import Condition
     from bt_tasksim.concept.context import Known, Seen
+    from bt_tasksim.concept.limit import Limit
     from bt_tasksim.concept.model import ConceptModel
     from bt_tasksim.concept.parameters import (
         Direction,
@@ -55,6 +56,7 @@ _names.install()
 _HOMES = {
     "bt_tasksim.concept.condition": ("Condition",),
     "bt_tasksim.concept.context": ("Known", "Seen"),
+    "bt_tasksim.concept.limit": ("Limit",),
     "bt_tasksim.concept.model": ("ConceptModel",),
     "bt_tasksim.concept.parameters": (
         "Direction",
@@ -121,6 +123,7 @@ __all__ = [
     "Known",
     "CurriculumStage",
     "Lesson",
+    "Limit",
     "MachineError",
     "Metres",
     "MetresPerSecond",

@@ -6,9 +6,10 @@ import math
 from typing import NamedTuple
 
 from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held, tool_distance
-from bt_tasksim.concept_nodes.limits import force_at_wrist, strained
+from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Outcome, Statement
 from bt_tasksim.core.poses import Array, array_namespace
@@ -49,9 +50,9 @@ class Carry(ConceptModel):
         """Follow the path; the hand keeps its grip."""
         return Command(tool=sample(memory.path, seen.elapsed))
 
-    def violated(self, seen: Seen, memory: MoveMemory) -> Array:
-        """The wrist is strained beyond the limit: the hand or the object presses against something."""
-        return strained(seen, self.force_limit)
+    def limits(self, seen: Seen, memory: MoveMemory) -> tuple[Limit, ...]:
+        """The force at the wrist."""
+        return (strain(seen, self.force_limit),)
 
     def done(self, seen: Seen, memory: MoveMemory) -> Array:
         """The tool has come to the end of the path."""

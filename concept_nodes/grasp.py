@@ -11,6 +11,7 @@ import numpy as np
 from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.demonstrated import coming_from, snapped
+from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Axis, Direction, Metres, MetresPerSecond, Newtons, ObjectName, Ratio
 from bt_tasksim.concept.presentation import Presentation
@@ -20,12 +21,12 @@ from bt_tasksim.concept_nodes.grasp_features import ALONG, CLOSE, HASTE
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.concept_nodes.grasp_pose import grasp_pose, half_extent, resting_place
 from bt_tasksim.concept_nodes.holding import HOLDING, tool_distance
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Outcome, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.units import METRES, NEWTONS, SHARE
+from bt_tasksim.core.units import METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.reference_motion import Path, minimum_jerk, plan, sample
 from bt_tasksim.robot.description import RobotDescription
@@ -33,6 +34,18 @@ from bt_tasksim.robot.description import RobotDescription
 NOT_SEEN = register_reason("not_seen", "{object} is not seen")
 TOO_WIDE = register_reason(
     "too_wide", "{object} is {width} wide, the hand opens {opening}", width=METRES, opening=METRES
+)
+CLOSED_ON_NOTHING = register_reason(
+    "closed_on_nothing",
+    "the hand closed on nothing: {value:.3g} closed, above {limit:.3g}",
+    value=SHARE,
+    limit=SHARE,
+)
+PUSHED_AWAY = register_reason(
+    "pushed_away", "{object} was pushed {value:.3g} away, more than {limit:.3g}", value=METRES, limit=METRES
+)
+TIPPED_OVER = register_reason(
+    "tipped_over", "{object} was tipped by {value}, more than {limit}", value=RADIANS, limit=RADIANS
 )
 GRASPING = Form(
     "hand {closure} closed, {contact}, tool {distance} from {object}, {force} at the wrist",
@@ -50,6 +63,8 @@ its full speed 137 to 140, since what is light tilts in it; the Panda 187 and 18
 SLANTED = 0.01
 """Metres by which the middle of an action is deeper for a horizontal approach than for one from above: where
 a slanted hand meets an object's edge first, its fingers are still before the object's middle."""
+EMPTY = 0.97
+"""Share of its grip beyond which a hand has nothing between its fingers."""
 PUSHED = 0.06
 """Metres by which a grasp may push the object, as it is seen."""
 TIPPED = math.radians(10.0)
@@ -303,25 +318,16 @@ class Grasp(ConceptModel):
         """Opposing contacts and a still hand, some ticks long, that presses as hard as it is to."""
         return (memory.settled >= SETTLED) & (memory.closed >= self._asked(memory.offset))
 
-    def violated(self, seen: Seen, memory: GraspMemory) -> Array:
+    def limits(self, seen: Seen, memory: GraspMemory) -> tuple[Limit, ...]:
         """The hand has closed on nothing, presses too hard, or has pushed the object away or over."""
-        if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
-            return np.bool_(self._violated_one(seen, memory))
-        empty = (memory.closing > 0.8) & (seen.closure > 0.97 * self.grip)
-        now = seen.object(self.target)
-        pushed = poses.norm(now[..., :3] - memory.start[..., :3]) > PUSHED
-        tipped = poses.tilt(now[..., 3:], memory.start[..., 3:]) > TIPPED
-        return empty | strained(seen, self.force_limit) | pushed | tipped
-
-    def _violated_one(self, seen: Seen, memory: GraspMemory) -> bool:
-        """`violated` for one grasp: what is decided first ends it."""
-        if memory.closing > 0.8 and seen.closure > 0.97 * self.grip:
-            return True
-        now = seen.object(self.target)
-        return bool(
-            strained(seen, self.force_limit)
-            or poses.norm(now[:3] - memory.start[:3]) > PUSHED
-            or poses.tilt(now[..., 3:], memory.start[..., 3:]) > TIPPED
+        now, names = seen.object(self.target), {"object": self.target}
+        pushed = poses.norm(now[..., :3] - memory.start[..., :3])
+        tipped = poses.tilt(now[..., 3:], memory.start[..., 3:])
+        return (
+            Limit(CLOSED_ON_NOTHING, seen.closure, EMPTY * self.grip, counts=memory.closing > 0.8),
+            strain(seen, self.force_limit),
+            Limit(PUSHED_AWAY, pushed, PUSHED, names),
+            Limit(TIPPED_OVER, tipped, TIPPED, names),
         )
 
     def necessary_cost(self, seen: Seen, memory: GraspMemory) -> Array:

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.limit import Limit
+from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.poses import Array, norm
+from bt_tasksim.core.units import NEWTONS
 
 FORCE_LIMIT = 60.0
 """N at the wrist: well above what carrying and placing take, well below what breaks a cup or a finger."""
+WRIST_STRAINED = register_reason(
+    "wrist_strained", "force at the wrist is {value:.3g}, above {limit:.3g}", value=NEWTONS, limit=NEWTONS
+)
 
 
-def strained(seen: Seen, limit: float) -> Array:
-    """Boolean ``(...)``: the force at the wrist exceeds ``limit`` N."""
-    return force_at_wrist(seen) > limit
+def strain(seen: Seen, limit: float) -> Limit:
+    """The force at the wrist may be ``limit`` N: else the hand or the object presses against something."""
+    return Limit(WRIST_STRAINED, force_at_wrist(seen), limit)
 
 
 def force_at_wrist(seen: Seen) -> Array:

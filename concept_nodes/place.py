@@ -10,13 +10,14 @@ import numpy as np
 from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.demonstrated import position_words, straight_words
+from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strained
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import Form, Outcome, Statement
@@ -137,9 +138,9 @@ class Place(ConceptModel):
         felt = xp.where(self._supported(seen, memory), memory.felt + 1, 0)
         return memory._replace(felt=felt, progress=self._progress(seen, memory))
 
-    def violated(self, seen: Seen, memory: PlaceMemory) -> Array:
-        """The wrist is strained beyond the limit: the hand or the object presses against something."""
-        return strained(seen, self.force_limit)
+    def limits(self, seen: Seen, memory: PlaceMemory) -> tuple[Limit, ...]:
+        """The force at the wrist."""
+        return (strain(seen, self.force_limit),)
 
     def done(self, seen: Seen, memory: PlaceMemory) -> Array:
         """The support is felt, or the object is where it should stand."""

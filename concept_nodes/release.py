@@ -9,11 +9,12 @@ import numpy as np
 
 from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Seconds
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept_nodes.holding import HOLDING
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.poses import Array, array_namespace
@@ -103,9 +104,9 @@ class Release(ConceptModel):
         )
         return memory._replace(opened=opened)
 
-    def violated(self, seen: Seen, memory: ReleaseMemory) -> Array:
-        """The wrist is strained beyond the limit: the hand or the object presses against something."""
-        return strained(seen, self.force_limit)
+    def limits(self, seen: Seen, memory: ReleaseMemory) -> tuple[Limit, ...]:
+        """The force at the wrist."""
+        return (strain(seen, self.force_limit),)
 
     def done(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """The hand is open, touches nothing, and has drawn back."""

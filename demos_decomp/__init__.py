@@ -2,7 +2,7 @@
 
 log = open_log("kitchen.h5")
 found = decompose_log(log)
-print(text_table(found.tasks))
+print(found.table())
 found.graph                 # networkx.DiGraph, see demos_decomp.graph
 """
 
@@ -14,6 +14,7 @@ from bt_tasksim.demos_decomp.log import Demonstration, Log, Surface, Track, Utte
 from bt_tasksim.demos_decomp.log_file import read_log, write_log
 from bt_tasksim.demos_decomp.picture import picture, write_picture
 from bt_tasksim.demos_decomp.readers import LogReader, open_log
+from bt_tasksim.demos_decomp.remarks import Remark, RemarkKind
 from bt_tasksim.demos_decomp.table import text_table
 
 one_module(__name__)
@@ -26,6 +27,8 @@ __all__ = [
     "decompose",
     "decompose_log",
     "Decomposition",
+    "Remark",
+    "RemarkKind",
     "Task",
     "Log",
     "Demonstration",

@@ -10,9 +10,12 @@ import networkx as nx
 import numpy as np
 
 from bt_tasksim.concept.task import Task
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.demos_decomp.graph import build_graph, graph_to_json, in_order
 from bt_tasksim.demos_decomp.log import Demonstration, Log
 from bt_tasksim.demos_decomp.recognition import recognise
+from bt_tasksim.demos_decomp.remarks import Remark, RemarkKind
+from bt_tasksim.demos_decomp.table import text_table
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,28 @@ class Decomposition:
     tasks: tuple[Task, ...]
     graph: nx.DiGraph[str]
     demonstrations: Mapping[str, tuple[Task, ...]]
-    remarks: Mapping[str, tuple[str, ...]]
+    remarks: Mapping[str, tuple[Remark, ...]]
+
+    @property
+    def seen(self) -> tuple[int, ...]:
+        """In how many of the demonstrations each of ``tasks`` was seen."""
+        if len(self.demonstrations) == 1:
+            return (1,) * len(self.tasks)
+        return tuple(len(self.graph.nodes[name]["evidence"]) for name in in_order(self.graph))
+
+    def table(self) -> str:
+        """One line per task, see `text_table`; of merged ones, with the share of demonstrations."""
+        count = len(self.demonstrations)
+        return text_table(self.tasks, [f"{n} of {count}" for n in self.seen] if count > 1 else None)
+
+    def not_understood(self) -> list[str]:
+        """Sentences about motion that no task explains; where nothing was found, about all that was seen."""
+        return [
+            f"{name}: {remark}"
+            for name, said in self.remarks.items()
+            for remark in said
+            if remark.kind == RemarkKind.MOTION or not self.demonstrations[name]
+        ]
 
     def to_json(self) -> dict[str, Any]:
         """``tasks`` and ``graph`` as plain JSON values, and the tasks of each demonstration if several."""
@@ -39,7 +63,7 @@ class Decomposition:
             "tasks": [task.to_json() for task in self.tasks],
             "graph": graph_to_json(self.graph),
             **({"demonstrations": several} if merged else {}),
-            "remarks": {name: list(said) for name, said in self.remarks.items() if said},
+            "remarks": {name: [r.to_json() for r in said] for name, said in self.remarks.items() if said},
         }
 
 
@@ -61,11 +85,15 @@ def decompose_log(log: Log | Sequence[Log], episode: int | str | None = None) ->
         first sample), mean confidence and merged parameters.
 
     Raises:
-        InputError: There is no such demonstration.
+        InputError: There is no such demonstration, or a log is given twice.
     """
     logs = [log] if isinstance(log, Log) else list(log)
+    paths = [each.path for each in logs if each.path]
+    for path in paths:
+        if paths.count(path) > 1:
+            raise InputError(f"'{path}' is given twice: its demonstrations would count twice")
     demonstrations: dict[str, tuple[Task, ...]] = {}
-    remarks: dict[str, tuple[str, ...]] = {}
+    remarks: dict[str, tuple[Remark, ...]] = {}
     sources: dict[str, tuple[str, str]] = {}
     for number, each in enumerate(logs):
         chosen = each.demonstrations if episode is None else (each.demonstration(episode),)

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from bt_tasksim.concept.contact import ContactChange
 from bt_tasksim.concept.task import Task
 from bt_tasksim.demos_decomp.concepts import CARRIES, GRASPS, LANDS, LIFTS, RELEASES, concepts, name_of
 from bt_tasksim.demos_decomp.evidence import Check, confidence, spoken_odds
 from bt_tasksim.demos_decomp.log import Demonstration, Floats
 from bt_tasksim.demos_decomp.parameters import bring_parameters, grasp_parameters, straight_parameters
+from bt_tasksim.demos_decomp.remarks import Remark, RemarkKind
 from bt_tasksim.demos_decomp.segmentation import DROP, Flight, Hold, find_flights, find_holds
 from bt_tasksim.demos_decomp.signals import Motion, evenly_sampled
 from bt_tasksim.demos_decomp.support import Support, bin_under, resting_on
@@ -24,11 +26,14 @@ SIDEWAYS = 0.015
 CLEARANCE = 0.03
 """Metres that a pick goes where it passes into bring without a bend."""
 
+SLID = 0.03
+"""Metres along its support that a task may move its object before it lifts it, or after it sets it down."""
+
 LONGEST_GAP = 0.6
 """Seconds without data in which a whole task could pass unseen."""
 
 
-def recognise(shown: Demonstration) -> tuple[list[Task], list[str]]:
+def recognise(shown: Demonstration) -> tuple[list[Task], list[Remark]]:
     """Recognises the tasks of a demonstration.
 
     Args:
@@ -49,6 +54,7 @@ def recognise(shown: Demonstration) -> tuple[list[Task], list[str]]:
         since = hold.first
         for flight in flights:
             tasks += _flight_tasks(shown, motion, hold, flight, since)
+            remarks += [remark for _, remark in _slides(motion, hold, flight).values()]
             since = flight.last
         free = hold.last
         if hold.opening is not None:
@@ -95,6 +101,7 @@ def _flight_tasks(shown: Demonstration, motion: Motion, hold: Hold, flight: Flig
     path = motion.objects[name][flight.first : flight.last + 1, :3]
     lands = flight.landed is not None and bool(flight.landed)
     up, down, carried = _phases(shown, motion, hold, flight, lands)
+    slides = _slides(motion, hold, flight)
     tasks: list[Task] = []
     if flight.lifted is not None:
         off = resting_on(
@@ -109,7 +116,7 @@ def _flight_tasks(shown: Demonstration, motion: Motion, hold: Hold, flight: Flig
                 name_of(LIFTS),
                 since,
                 flight.first + up,
-                [*_gap_check(off), flight.lifted],
+                [*_gap_check(off), flight.lifted, *_checks_of(slides, LIFTS)],
                 parameters,
             )
         )
@@ -126,9 +133,35 @@ def _flight_tasks(shown: Demonstration, motion: Motion, hold: Hold, flight: Flig
             parameters["on"] = target.name
         else:
             parameters["position"] = flight.rest_after
-        checks = [*_gap_check(target), flight.landed]
+        checks = [*_gap_check(target), flight.landed, *_checks_of(slides, LANDS)]
         tasks.append(_task(motion, name_of(LANDS), since, flight.last, checks, parameters))
     return tasks
+
+
+def _slides(motion: Motion, hold: Hold, flight: Flight) -> dict[ContactChange, tuple[Check, Remark]]:
+    """Motion along the support before a pick and after a place, which these do not explain, by what they do.
+
+    A short one counts for nothing: hands push what they take, and settle what they set down.
+    """
+    name, noise = hold.target, motion.noise[hold.target]
+    path = motion.objects[name][flight.first : flight.last + 1, :3]
+    ends = {}
+    if flight.lifted is not None:
+        ends[LIFTS] = (path[0] - flight.rest_before, "before it was lifted", flight.first)
+    if flight.landed is not None and flight.landed:
+        ends[LANDS] = (flight.rest_after - path[-1], "after it was set down", flight.last)
+    found = {}
+    for does, (way, when, at) in ends.items():
+        slid = float(np.linalg.norm(way[:2]))
+        if slid > SLID + 4 * noise:
+            check = Check(f"{name} stays {when}, m", slid, SLID, 0.005 + noise, below=True)
+            said = f"{name} moved {slid:.3f} m {when} at {motion.time[at]:.1f} s"
+            found[does] = (check, Remark(RemarkKind.MOTION, said))
+    return found
+
+
+def _checks_of(slides: dict[ContactChange, tuple[Check, Remark]], does: ContactChange) -> list[Check]:
+    return [slides[does][0]] if does in slides else []
 
 
 def _phases(

@@ -16,6 +16,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.demos_decomp.concepts import GRASPS, LANDS, LIFTS, RELEASES, name_of
 from bt_tasksim.demos_decomp.evidence import NAMED, Check, spoken_odds
 from bt_tasksim.demos_decomp.log import Demonstration, Floats
+from bt_tasksim.demos_decomp.remarks import Remark, RemarkKind
 from bt_tasksim.demos_decomp.signals import RATE, Motion, Swing, speed, swings
 from bt_tasksim.demos_decomp.support import bin_under, half_height, resting_on
 
@@ -82,7 +83,7 @@ class Flight:
     rest_after: Floats
 
 
-def find_holds(shown: Demonstration, motion: Motion) -> tuple[list[Hold], list[str]]:
+def find_holds(shown: Demonstration, motion: Motion) -> tuple[list[Hold], list[Remark]]:
     """Finds what the hand holds, and when.
 
     Args:
@@ -102,7 +103,8 @@ def find_holds(shown: Demonstration, motion: Motion) -> tuple[list[Hold], list[s
     for i, swing in enumerate(found):
         if swing.change < 0:
             closed.append((swing, found[i + 1] if i + 1 < len(found) else None))
-    holds, remarks = [], []
+    holds: list[Hold] = []
+    remarks: list[Remark] = []
     for closing, opening in closed:
         first = closing.last if closing else 0
         last = opening.first if opening else end
@@ -110,13 +112,14 @@ def find_holds(shown: Demonstration, motion: Motion) -> tuple[list[Hold], list[s
         if hold is not None:
             holds.append(hold)
         elif closing is not None:
-            remarks.append(f"the hand closed at {motion.time[first]:.1f} s, but held no object ({why_not})")
+            said = f"the hand closed at {motion.time[first]:.1f} s, but held no object ({why_not})"
+            remarks.append(Remark(RemarkKind.EMPTY_HAND, said))
     holds = [_until_parting(motion, hold) for hold in _without_regrips(motion, holds)]
     limits = [later.closing.first if later.closing else later.first for later in holds[1:]] + [end]
     return [replace(hold, until=limit) for hold, limit in zip(holds, limits, strict=False)], remarks
 
 
-def find_flights(shown: Demonstration, motion: Motion, hold: Hold) -> tuple[list[Flight], list[str]]:
+def find_flights(shown: Demonstration, motion: Motion, hold: Hold) -> tuple[list[Flight], list[Remark]]:
     """Finds when a held object is in the air.
 
     Args:
@@ -150,10 +153,8 @@ def find_flights(shown: Demonstration, motion: Motion, hold: Hold) -> tuple[list
             moved = float(np.linalg.norm(piece[:, :2] - stood[:2], axis=1).max())
             if moved > 0.01:
                 at = f"{motion.time[start]:.1f} to {motion.time[pause[0]]:.1f} s"
-                remarks = [
-                    f"{name} moved {moved:.3f} m without being lifted ({height.max():.3f} m) from {at}"
-                ]
-                return flights, remarks
+                said = f"{name} moved {moved:.3f} m without being lifted ({height.max():.3f} m) from {at}"
+                return flights, [Remark(RemarkKind.MOTION, said)]
             return flights, []
         else:
             clear = int(np.argmax(height > min(LIFT, 0.9 * height.max())))

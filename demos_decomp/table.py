@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from bt_tasksim.concept.demonstrated import plain_words
@@ -10,11 +10,12 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.demos_decomp.concepts import concept_of
 
 
-def text_table(tasks: Iterable[Task]) -> str:
+def text_table(tasks: Iterable[Task], seen: Sequence[str] | None = None) -> str:
     """One line per task: seconds, concept, target, what it does, confidence.
 
     Args:
         tasks: In order of time.
+        seen: In how many demonstrations each was seen, in words: one column more.
 
     Returns:
         Lines without a final line break; empty where there are no tasks.
@@ -29,12 +30,14 @@ def text_table(tasks: Iterable[Task]) -> str:
         )
         for task in tasks
     ]
+    more = [f"  {text:>{max(map(len, seen))}}" for text in seen] if seen else [""] * len(rows)
     if not rows:
         return ""
     widths = [max(len(row[i]) for row in rows) for i in range(4)]
     span = max(widths[3], 30)
     return "\n".join(
-        f" {a:>{widths[0]}}  {b:<{widths[1]}}  {c:<{widths[2]}}  {d:<{span}}  {e}" for a, b, c, d, e in rows
+        f" {a:>{widths[0]}}  {b:<{widths[1]}}  {c:<{widths[2]}}  {d:<{span}}  {e}{more}"
+        for (a, b, c, d, e), more in zip(rows, more, strict=True)
     )
 
 

@@ -99,7 +99,12 @@ class Case:
     @property
     def functions(self) -> list[str]:
         """The pure functions that the concept writes itself."""
-        return [f for f in PURE if self.overrides(f) and (f != "maintained" or self.concept.maintains)]
+        written = [f for f in PURE if self.overrides(self._named(f))]
+        return [f for f in written if f != "maintained" or self.concept.maintains]
+
+    def _named(self, function: str) -> str:
+        """What the concept writes for a function that is asked: `limits` where that decides `violated`."""
+        return "limits" if function == "violated" and not self.overrides("violated") else function
 
     def add(self, level: str, function: str, what: str, remedy: str, kind: str = "", line: int = 0) -> None:
         """Note a finding, unless one of this kind was noted for this function.
@@ -112,6 +117,7 @@ class Case:
             kind: What it is about; by default ``what``.
             line: See `Finding`; 0 for that of the function.
         """
+        function = self._named(function)
         key = function, kind or what
         if key in self._said:
             return
@@ -123,7 +129,7 @@ class Case:
 
     def has(self, function: str, kind: str) -> bool:
         """A finding of this kind was noted."""
-        return (function, kind) in self._said
+        return (self._named(function), kind) in self._said
 
     def ask(self, name: str, situation: Situation, like: Situations, seen: Seen | None = None) -> Any:
         """What a function answers; `FAILED`, and a finding, where it raises."""

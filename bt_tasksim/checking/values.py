@@ -10,6 +10,7 @@ import numpy as np
 from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
 from bt_tasksim.checking.situations import Situation, Situations, numbers, parts, perturbed
 from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.outcomes import Outcome, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Command
@@ -254,6 +255,11 @@ def _check_words(case: Case, situations: Situations) -> None:
                 "give a Form with its numbers, or a sentence with numbers and units",
                 "text",
             )
+        case.call("limits", lambda seen=seen, m=situation.memory: _limits_said(leaf, seen, m))  # type: ignore[misc]
+
+
+def _limits_said(leaf: ConceptModel, seen: Seen, memory: Any) -> list[str]:
+    return [limit.outcome().sentence for limit in leaf.limits(seen, memory)]
 
 
 def _check_actions(case: Case, situations: Situations) -> None:

@@ -97,7 +97,7 @@ def check_watching(case: Case, situations: Situations) -> None:
         what = f"reads '{name}', which is not declared"
         if observable(name).gap == "large":
             why = f"{what}, and of which simulation and reality differ ({_why(name)})"
-            case.add(ERROR, "features", why, "leave it out; in violated, against a limit, it is allowed")
+            case.add(ERROR, "features", why, "leave it out; in limits, it is allowed")
         else:
             case.add(ERROR, "features", what, f"add it: observables = (..., {name!r}), or leave it out")
     if case.overrides("features"):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import abc
+import operator
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,6 +13,7 @@ import numpy as np
 from bt_tasksim.concept.contact import ContactChange
 from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.demonstrated import Shown, plain_argument, plain_words
+from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.parameters import Parameter, declared_parameters
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.task import Task
@@ -125,9 +128,14 @@ class ConceptFunctions(abc.ABC):
         """How far the observed state is from the necessary goal: ``(...)``, 0 when reached."""
         return zeros(seen.tool)
 
+    def limits(self, seen: Seen, memory: Any) -> Sequence[Limit]:
+        """What must not be exceeded (stress, crushing), each with its reason; the first exceeded is said."""
+        return ()
+
     def violated(self, seen: Seen, memory: Any) -> Array:
-        """A limit is exceeded (stress, crushing): boolean ``(...)``."""
-        return np.False_
+        """A limit is exceeded: boolean ``(...)``; to override where it is more than `limits` can say."""
+        limits = self.limits(seen, memory)
+        return reduce(operator.or_, (limit.exceeded for limit in limits)) if limits else np.False_
 
     def maintained(self, goal: str, seen: Seen, memory: Any) -> Array:
         """A goal of `maintains` still holds: boolean ``(...)``."""

@@ -24,6 +24,7 @@ from bt_tasksim.core.outcomes import (
     PRECONDITION_UNMET,
     TIMED_OUT,
     Outcome,
+    Statement,
 )
 from bt_tasksim.policy.policy import PROGRAMMED, Action, Policy, PolicySlot, concept_name, named_policy
 from bt_tasksim.robot.description import RobotDescription
@@ -196,7 +197,7 @@ class ConceptNode(ContextLeaf, abc.ABC):
             seen = context.seen(context.now - self._started)
         memory = self.memory
         if bool(model.violated(seen, memory)):
-            return self._fail(LIMIT_VIOLATED(as_statement(model.explain(seen, memory))))
+            return self._fail(LIMIT_VIOLATED(_exceeded(model, seen, memory)))
         for goal in model.maintains:
             if context.reached(goal, model.actor) and not bool(model.maintained(goal, seen, memory)):
                 self._lost += 1
@@ -240,6 +241,13 @@ class ConceptNode(ContextLeaf, abc.ABC):
     def _fail(self, why: Outcome) -> Status:
         self.report(why)
         return Status.FAILURE
+
+
+def _exceeded(model: ConceptFunctions, seen: Seen, memory: Any) -> Statement | None:
+    """Which limit, and by how much; where the concept does not say it, where things stand."""
+    measured = as_statement(model.explain(seen, memory))
+    exceeded = (limit.outcome(measured) for limit in model.limits(seen, memory) if bool(limit.exceeded))
+    return next(exceeded, measured)
 
 
 def not_set_up(node: Behaviour) -> RuntimeError:

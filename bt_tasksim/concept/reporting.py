@@ -20,6 +20,10 @@ class Reporting(Behaviour):
         self.outcome = said if isinstance(said, Outcome) else None
         self.feedback_message = "" if said is None else said.sentence
 
+    def seen_from_here(self, outcome: Outcome) -> Outcome:
+        """What a failure below, which made this node fail, comes to here: with what was tried before."""
+        return outcome
+
 
 def outcome_of(node: Behaviour) -> Outcome | None:
     """What a node that has ended says; the words of a behaviour that knows no outcomes are `FAILED`."""
@@ -37,6 +41,15 @@ def speaker(root: Behaviour) -> Behaviour | None:
         return found
     failed = [n for n in root.iterate() if n.status == Status.FAILURE and n.feedback_message]
     return failed[-1] if failed else found
+
+
+def whole_outcome(node: Behaviour) -> Outcome | None:
+    """What a node that has failed says, with what the nodes above it have to add."""
+    outcome, above = outcome_of(node), node.parent
+    while outcome is not None and above is not None:
+        outcome = above.seen_from_here(outcome) if isinstance(above, Reporting) else outcome
+        above = above.parent
+    return outcome
 
 
 def as_statement(said: Statement | str | None) -> Statement | None:

@@ -15,7 +15,7 @@ import re
 import secrets
 import shutil
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from bt_tasksim.core.errors import InputError, MachineError
@@ -43,6 +43,26 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 def write_text(path: str | Path, content: str) -> None:
     """Write a text file as UTF-8; see `write_bytes`."""
     write_bytes(path, content.encode())
+
+
+def write_texts(contents: Mapping[str | Path, str]) -> None:
+    """Write several text files as UTF-8: all of them, or none where one of them cannot be written.
+
+    Args:
+        contents: What each shall hold, by its path.
+
+    Raises:
+        InputError: A folder does not exist, a path is a folder, or two are the same file.
+        MachineError: The disk is full or not writable.
+    """
+    check_targets(contents)
+    with contextlib.ExitStack() as files:
+        for path, content in contents.items():
+            unfinished = files.enter_context(whole_file(path))
+            with open(unfinished, "xb") as file:
+                file.write(content.encode())
+                file.flush()
+                os.fsync(file.fileno())
 
 
 @contextlib.contextmanager
@@ -171,6 +191,22 @@ def check_writable(path: str | Path) -> None:
         trial.unlink()
     except OSError as error:
         raise _cannot_write(path, error) from error
+
+
+def check_targets(paths: Iterable[str | Path]) -> None:
+    """Check that `write_texts` may write here, before there is anything to write.
+
+    Raises:
+        InputError: See `check_writable`, or two paths are the same file.
+        MachineError: A folder is not writable.
+    """
+    known: set[str] = set()
+    for path in paths:
+        check_writable(path)
+        whole = os.path.realpath(path)
+        if whole in known:
+            raise InputError(f"cannot write two things into '{path}': give each a name of its own")
+        known.add(whole)
 
 
 def clear_away(path: Path) -> None:

@@ -17,7 +17,7 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import ConceptNode
-from bt_tasksim.concept.reporting import as_statement, outcome_of, speaker
+from bt_tasksim.concept.reporting import as_statement, speaker, whole_outcome
 from bt_tasksim.core.errors import LeafError, UnreachableError
 from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import FAILED, OUT_OF_REACH, TIME_OVER, Outcome, register_reason
@@ -256,7 +256,7 @@ class Runner:
 
     def _failure(self, node: Behaviour | None) -> Outcome:
         """What the node says that made the tree fail, and why its object was not seen, where it was not."""
-        outcome = None if node is None else outcome_of(node)
+        outcome = None if node is None else whole_outcome(node)
         if outcome is None:
             return FAILED(text="the tree failed, and no node says why")
         actor = node.model.actor if isinstance(node, ConceptNode) else ""

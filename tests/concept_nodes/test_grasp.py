@@ -7,8 +7,9 @@ import pytest
 from py_trees.common import Status
 
 from bt_tasksim.concept_nodes import Grasp
-from bt_tasksim.concept_nodes.grasp import TOO_WIDE
+from bt_tasksim.concept_nodes.grasp import CLOSED_ON_NOTHING, PUSHED_AWAY, TIPPED_OVER, TOO_WIDE
 from bt_tasksim.concept_nodes.grasp_pose import grasp_pose
+from bt_tasksim.concept_nodes.limits import WRIST_STRAINED
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import CANNOT_START, DONE, LIMIT_VIOLATED, TIMED_OUT
 
@@ -92,9 +93,11 @@ def test_done_only_after_contacts_on_both_sides_and_a_still_hand(toy):
     leaf = Grasp("cup", timeout=30)
     stage = toy(leaf)
     assert stage.tick(400) == Status.FAILURE  # the toy hand closes on nothing
-    assert leaf.outcome.is_a(LIMIT_VIOLATED)
-    assert leaf.outcome.detail.numbers["closure"] == 1.0
-    assert leaf.outcome.detail.names["contact"] == "no contact"
+    limit = leaf.outcome.cause
+    assert leaf.outcome.is_a(LIMIT_VIOLATED) and limit.is_a(CLOSED_ON_NOTHING)
+    assert limit.numbers == {"value": 1.0, "limit": 0.97}
+    assert limit.detail.numbers["closure"] == 1.0
+    assert limit.detail.names["contact"] == "no contact"
 
     for contacts, status in (([True, False], Status.FAILURE), ([True, True], Status.SUCCESS)):
         leaf = Grasp("cup", timeout=6)
@@ -117,6 +120,31 @@ def test_done_only_after_contacts_on_both_sides_and_a_still_hand(toy):
         else:
             assert leaf.outcome.is_a(TIMED_OUT) and measured.names["contact"] == "contact at left"
             assert not stage.context.reached("holding", "cup")
+
+
+@pytest.mark.parametrize(
+    ("reason", "changed", "value", "limit"),
+    [
+        (WRIST_STRAINED, {"wrench": np.array([0, 0, 71.0, 0, 0, 0])}, 71.0, 60.0),
+        (PUSHED_AWAY, {"move": [0.1, 0, 0, 0, 0, 0, 0]}, 0.1, 0.06),
+        (TIPPED_OVER, {"turn": 0.3}, 0.3, math.radians(10.0)),
+    ],
+)
+def test_each_limit_says_which_it_is_and_by_how_much(toy, reason, changed, value, limit):
+    leaf = Grasp("cup")
+    stage = toy(leaf)
+    stage.tick(3)
+    objects, i = stage.world.now.objects.copy(), stage.world.model.object_index("cup")
+    objects[i] += changed.get("move", 0.0)
+    if "turn" in changed:
+        half = changed["turn"] / 2
+        turn = np.array([math.cos(half), math.sin(half), 0.0, 0.0])
+        objects[i, 3:] = poses.quat_multiply(turn, objects[i, 3:])
+    stage.world.put(objects=objects, **{k: v for k, v in changed.items() if k == "wrench"})
+    stage.look()
+    assert stage.tick() == Status.FAILURE
+    assert leaf.outcome.is_a(LIMIT_VIOLATED) and leaf.outcome.cause.reason == reason
+    assert leaf.outcome.cause.numbers == pytest.approx({"value": value, "limit": limit})
 
 
 def test_an_unknown_object_is_named(toy):

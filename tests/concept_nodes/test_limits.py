@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strained
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, WRIST_STRAINED, force_at_wrist, strain
 
 
 class Felt:
@@ -15,11 +15,17 @@ class Felt:
 
 @pytest.mark.parametrize(("force", "too_much"), [([0, 0, 59.9], False), ([36.0, 0, -48.1], True)])
 def test_strained_by_force_and_not_by_torque(force, too_much):
-    assert bool(strained(Felt([*force, 1e3, 0, 0]), FORCE_LIMIT)) is too_much
+    assert bool(strain(Felt([*force, 1e3, 0, 0]), FORCE_LIMIT).exceeded) is too_much
+
+
+def test_a_strained_wrist_says_how_much_and_how_much_is_allowed():
+    outcome = strain(Felt([0, 0, 71.2, 0, 0, 0]), FORCE_LIMIT).outcome()
+    assert outcome.is_a(WRIST_STRAINED) and outcome.numbers == {"value": 71.2, "limit": 60.0}
+    assert outcome.to_data()["units"] == {"value": "N", "limit": "N"}
 
 
 def test_batched():
     wrench = np.random.default_rng(0).normal(0, 60, (4, 5, 6))
-    one_by_one = [[strained(Felt(w), 60.0) for w in row] for row in wrench]
-    assert np.array_equal(strained(Felt(wrench), 60.0), one_by_one)
+    one_by_one = [[strain(Felt(w), 60.0).exceeded for w in row] for row in wrench]
+    assert np.array_equal(strain(Felt(wrench), 60.0).exceeded, one_by_one)
     assert np.allclose(force_at_wrist(Felt(wrench)), np.linalg.norm(wrench[..., :3], axis=-1))

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from bt_tasksim.core import poses
 from bt_tasksim.demos_decomp.log import Surface, Track, Utterance
 from bt_tasksim.demos_decomp.recognition import recognise
+from bt_tasksim.demos_decomp.remarks import RemarkKind
 from bt_tasksim.demos_decomp.synthetic import make
 from bt_tasksim.demos_decomp.synthetic_motion import Sensing
 
@@ -255,8 +256,9 @@ def test_closing_beside_the_object_is_remarked_and_not_recognised(act):
     frames = [(0, beside, 0.09, None), (1, beside, 0.03, None), (2, (0.5, 0.3, 0.2), 0.03, None)]
     tasks, remarks = recognise(act(frames, {"box": A}))
     assert tasks == []
-    assert "held no object" in remarks[0]
-    assert "box" in remarks[0]
+    assert remarks[0].kind == RemarkKind.EMPTY_HAND
+    assert "held no object" in str(remarks[0])
+    assert "box" in str(remarks[0])
 
 
 def test_sliding_without_lifting_is_remarked(act):
@@ -269,7 +271,35 @@ def test_sliding_without_lifting_is_remarked(act):
     ]
     tasks, remarks = recognise(act(frames, {"box": A}))
     assert [t.concept for t in tasks] == ["grasp", "release"]
-    assert "without being lifted" in remarks[0]
+    assert remarks[0].kind == RemarkKind.MOTION
+    assert "without being lifted" in str(remarks[0])
+
+
+@pytest.mark.parametrize("slid", [0.01, 0.34])
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_sliding_before_a_lift_or_after_a_landing_is_no_sure_pick_or_place(act, slid, when):
+    """It comes out as a pick or a place over all that way, which it was not."""
+    aside = (A[0], A[1] + slid, A[2])
+    start, end = (aside, aside) if when == "before" else (A, aside)
+    high = (start[0], start[1], 0.2)
+    frames = [
+        (0, (*A[:2], 0.2), 0.09, None),
+        (1, A, 0.09, None),
+        (1.4, A, 0.05, "box"),
+        (3, start, 0.05, "box"),
+        (4, high, 0.05, "box"),
+        (5, (high[0] + 0.1, *high[1:]), 0.05, "box"),
+        (6, (start[0] + 0.1, *start[1:]), 0.05, "box"),
+        (8, (end[0] + 0.1, *end[1:]), 0.05, "box"),
+        (8.5, (end[0] + 0.1, *end[1:]), 0.09, None),
+        (9, (end[0] + 0.1, end[1], 0.2), 0.09, None),
+    ]
+    tasks, remarks = recognise(act(frames, {"box": A}))
+    sure = {task.concept: task.confidence for task in tasks}
+    assert list(sure) == WHOLE
+    doubtful = {"before": "pick", "after": "place"}[when] if slid > 0.1 else None
+    assert {name for name, confidence in sure.items() if confidence < 0.5} == ({doubtful} - {None})
+    assert [remark.kind for remark in remarks] == ([RemarkKind.MOTION] if doubtful else [])
 
 
 def test_narration_settles_what_motion_leaves_open_and_no_more(act, carried):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.core.outcomes import register_reason
+from bt_tasksim.concept.reporting import outcome_of, speaker
+from bt_tasksim.core.outcomes import Outcome, Statement, register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
@@ -15,9 +18,19 @@ from bt_tasksim.trees.nodes.pass_through import said_below
 from bt_tasksim.trees.nodes.rounds import Rounds
 
 ATTEMPT_FAILED = register_reason(
-    "attempt_failed", "attempt {attempt} of {attempts} failed", attempt=COUNT, attempts=COUNT
+    "attempt_failed", "attempt {attempt} of {attempts} failed{before}", attempt=COUNT, attempts=COUNT
 )
-ENDLESS_ATTEMPT_FAILED = register_reason("endless_attempt_failed", "attempt {attempt} failed", attempt=COUNT)
+ENDLESS_ATTEMPT_FAILED = register_reason(
+    "endless_attempt_failed", "attempt {attempt} failed{before}", attempt=COUNT
+)
+
+
+class Cause(NamedTuple):
+    """Why an attempt failed: the leaf, the reason it is counted by, and the sentence."""
+
+    leaf: str
+    reason: str
+    sentence: str
 
 
 class Retry(Rounds):
@@ -39,13 +52,43 @@ class Retry(Rounds):
         super().__init__(name, child, attempts, again_on=Status.FAILURE)
         self.attempts = attempts
 
+    def initialise(self) -> None:
+        """Begin to count."""
+        super().initialise()
+        self.causes: list[Cause] = []
+
     def report_round(self) -> None:
-        """Say which attempt failed, and why."""
-        why = said_below(self.decorated)
+        """Say which attempt failed, and why, and why those before it did."""
+        failed = speaker(self.decorated) or self.decorated
+        self.report(self._failed(said_below(self.decorated)))
+        outcome = outcome_of(failed)
+        if outcome is not None:
+            cause = outcome.cause
+            self.causes.append(Cause(failed.name, cause.reason.name, cause.own_sentence))
+
+    def seen_from_here(self, outcome: Outcome) -> Outcome:
+        """The last attempt's failure, with the causes of those before it."""
+        return self._failed(outcome) if self.rounds > 1 else outcome
+
+    def _failed(self, why: Statement | None) -> Outcome:
+        before = self.causes[: self.rounds - 1]
+        said = f" (before it: {summary(before)})" if before else ""
         if self.attempts > 0:
-            self.report(ATTEMPT_FAILED(why, attempt=self.rounds, attempts=self.attempts))
-        else:
-            self.report(ENDLESS_ATTEMPT_FAILED(why, attempt=self.rounds))
+            return ATTEMPT_FAILED(why, attempt=self.rounds, attempts=self.attempts, before=said)
+        return ENDLESS_ATTEMPT_FAILED(why, attempt=self.rounds, before=said)
+
+
+def summary(causes: Sequence[Cause]) -> str:
+    """The causes in a few words: like ones are counted, and the first of them is said."""
+    first: dict[tuple[str, str], Cause] = {}
+    for cause in causes:
+        first.setdefault(cause[:2], cause)
+    often = Counter(cause[:2] for cause in causes)
+    said = [
+        f"{cause.leaf}: {cause.sentence}{f', {often[kind]} times' if often[kind] > 1 else ''}"
+        for kind, cause in first.items()
+    ]
+    return "; ".join(said)
 
 
 def retry(attempts: int, child: Behaviour, *, name: str = "RetryUntilSuccessful") -> Retry:

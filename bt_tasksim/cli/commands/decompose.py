@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,11 +19,15 @@ if TYPE_CHECKING:
 
 @register("command", "decompose")
 def decompose(
-    log: Annotated[
-        str, typer.Argument(metavar="LOG", help="An HDF5 log, a ManiSkill trajectory, or a run's log.")
+    logs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="LOG...",
+            help="HDF5 logs, ManiSkill trajectories, or logs of runs; several are merged, as one activity.",
+        ),
     ],
     episode: Annotated[
-        str | None, typer.Option(metavar="K", help="One demonstration of the log, by number or name.")
+        str | None, typer.Option(metavar="K", help="One demonstration of each log, by number or name.")
     ] = None,
     json_: Annotated[
         Path | None, typer.Option("--json", metavar="F", help="Write tasks and graph as JSON.")
@@ -32,40 +37,51 @@ def decompose(
         Path | None, typer.Option(metavar="F.svg", help="Write the graph as a picture.")
     ] = None,
 ) -> None:
-    """Turn a demonstration log into tasks, a graph and a tree."""
-    from bt_tasksim.core.files import write_text
-    from bt_tasksim.demos_decomp import decompose_log, open_log, text_table, write_picture
+    """Turn demonstration logs into tasks, a graph and a tree.
+
+    A line a task: seconds, concept, object, what it does, confidence; of several demonstrations, in how many
+    it was seen. Motion that no task explains is said below.
+    """
+    from bt_tasksim.core.files import check_targets, write_texts
+    from bt_tasksim.demos_decomp import decompose_log
+    from bt_tasksim.demos_decomp.picture import picture as picture_of
     from bt_tasksim.trees.from_graph import tree_from_graph
-    from bt_tasksim.trees.xml_writer import save_tree
+    from bt_tasksim.trees.xml_writer import tree_to_xml
 
     if picture is not None:
         svg(picture)
-    logged = Path(log) / "run.h5"
-    opened = open_log(logged if logged.is_file() else log)
+    check_targets(path for path in (json_, xml, picture) if path is not None)
+    opened = [_opened(log) for log in logs]
     with progress("decomposing", None):
-        found = decompose_log(opened, episode)
-    print(text_table(found.tasks) or f"no task was recognised in '{log}'")
-    for name in (name for name, tasks in found.demonstrations.items() if not tasks):
-        for remark in found.remarks[name]:
-            print(f"{name}: {remark}")
-    scene, wrote = _scene(opened), []
+        found = decompose_log(opened[0] if len(opened) == 1 else opened, episode)
+    named = ", ".join(f"'{log}'" for log in logs)
+    print(found.table() or f"no task was recognised in {named}")
+    for sentence in found.not_understood():
+        print(f"not understood: {sentence}")
+    scene, contents = _scene(opened), dict[str | Path, str]()
     if json_ is not None:
-        write_text(json_, json.dumps(found.to_json(), indent=2) + "\n")
-        wrote.append(json_)
+        contents[json_] = json.dumps(found.to_json(), indent=2) + "\n"
     if xml is not None:
-        save_tree(tree_from_graph(found.graph, scene or Path(log).stem), xml, scene=scene)
-        wrote.append(xml)
+        tree = tree_from_graph(found.graph, scene or Path(logs[0]).stem)
+        contents[xml] = tree_to_xml(tree, scene=scene)
     if picture is not None:
-        write_picture(found.graph, picture)
-        wrote.append(picture)
-    if wrote:
-        print("wrote " + ", ".join(map(str, wrote)))
+        contents[picture] = picture_of(found.graph)
+    write_texts(contents)
+    if contents:
+        print("wrote " + ", ".join(map(str, contents)))
 
 
-def _scene(log: Log) -> str | None:
+def _opened(log: str) -> Log:
+    from bt_tasksim.demos_decomp import open_log
+
+    logged = Path(log) / "run.h5"
+    return open_log(logged if logged.is_file() else log)
+
+
+def _scene(logs: Sequence[Log]) -> str | None:
     """The scenario whose name the demonstrations carry as their task, if there is one."""
     from bt_tasksim.trees.load import scenarios
 
-    tasks = {d.task for d in log.demonstrations}
+    tasks = {d.task for log in logs for d in log.demonstrations}
     name = next(iter(tasks)) if len(tasks) == 1 else ""
     return name if name in scenarios() else None

@@ -19,23 +19,26 @@ def show(
     xml: Annotated[Path | None, typer.Option(metavar="F", help="Write the tree as XML.")] = None,
 ) -> None:
     """Print a tree, or write its picture."""
-    from bt_tasksim.core.files import write_text
+    from bt_tasksim.core.files import check_targets, write_texts
     from bt_tasksim.report.tree_picture import tree_svg, tree_text
     from bt_tasksim.trees.load import NoSceneError, load_root, scenarios
-    from bt_tasksim.trees.xml_writer import save_tree
+    from bt_tasksim.trees.xml_writer import tree_to_xml
 
     if picture is not None:
         svg(picture)
+    check_targets(path for path in (picture, xml) if path is not None)
     try:
         source = tree.load()
         root, scene = source.build(), source.scene.name
     except NoSceneError:  # a tree can be looked at without one
         root, scene = load_root(tree.tree), ""
     print(tree_text(root))
+    contents: dict[str | Path, str] = {}
     if picture is not None:
-        write_text(picture, tree_svg(root))
-        print(f"wrote {picture}")
+        contents[picture] = tree_svg(root)
     if xml is not None:
         named = tree.scene or (scene if scene in scenarios() else None)
-        save_tree(root, xml, scene=named)
-        print(f"wrote {xml}")
+        contents[xml] = tree_to_xml(root, scene=named)
+    write_texts(contents)
+    for path in contents:
+        print(f"wrote {path}")

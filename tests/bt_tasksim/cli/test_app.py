@@ -41,6 +41,9 @@ def test_old_command_lines_mean_what_they_meant(line):
         was = {k: v for k, v in was.items() if k != "real_time"}
     if line.startswith("new "):
         was = {"like": None, **was}
+    if line.startswith("decompose"):
+        was = {**was, "logs": [was["log"]]}
+        del was["log"]
     if line.startswith("replay"):
         was = {"tree": None, "robot": None, "policy": [], "objects": None, **was}
     assert found == {"nodes": None, **was} if "nodes" in found else found == was

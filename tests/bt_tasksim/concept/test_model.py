@@ -1,11 +1,14 @@
 """The life of a leaf: it acts, it completes, it fails with a reason, it is interrupted."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from py_trees.common import Status
 
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.leaf import LOST_TICKS
+from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Metres, ObjectName
 from bt_tasksim.concept_nodes import Grasp, TimePassed, catalogue
@@ -19,7 +22,9 @@ from bt_tasksim.core.outcomes import (
     PRECONDITION_UNMET,
     TEXT,
     TIMED_OUT,
+    register_reason,
 )
+from bt_tasksim.core.units import METRES, SECONDS
 from bt_tasksim.core.world import Command
 from bt_tasksim.policy.policy import Action
 from bt_tasksim.trees import reactive_fallback, repeat, retry, sequence
@@ -80,6 +85,10 @@ def test_shares_of_done_add_up_within_an_activation_and_no_further(toy, act):
     assert stage.tick(2) == Status.SUCCESS
 
 
+TOO_LOW = register_reason("test_too_low", "{what} lower than {value}: {limit}", value=METRES, limit=METRES)
+TOO_LATE = register_reason("test_too_late", "{value} are more than {limit}", value=SECONDS, limit=SECONDS)
+
+
 class Careful(ConceptModel):
     """Maintains that something is held, and has a limit and a precondition."""
 
@@ -127,6 +136,37 @@ def test_a_violated_limit_is_a_failure_with_numbers(toy):
     leaf = Careful("cup", limit=0.12)
     assert toy(leaf).tick(100) == Status.FAILURE
     assert leaf.outcome == LIMIT_VIOLATED(TEXT(text="0.15 s gone"))
+
+
+class Heights(Careful):
+    """Two limits, as data."""
+
+    def limits(self, seen, memory):
+        return (
+            Limit(TOO_LOW, 0.1, seen.tool[..., 2], {"what": "tool"}),
+            Limit(TOO_LATE, seen.elapsed, self.limit, counts=seen.tool[..., 2] > 0.0),
+        )
+
+    def violated(self, seen, memory):
+        return ConceptModel.violated(self, seen, memory)
+
+
+def test_a_limit_that_is_data_is_the_cause_with_its_numbers_and_units(toy):
+    leaf = Heights("cup", limit=0.12)
+    assert toy(leaf).tick(100) == Status.FAILURE
+    cause = leaf.outcome.cause
+    assert leaf.outcome.is_a(LIMIT_VIOLATED) and cause.reason == TOO_LATE
+    assert cause.numbers == pytest.approx({"value": 0.15, "limit": 0.12})
+    assert cause.to_data()["units"] == {"value": "s", "limit": "s"}
+    assert cause.detail == TEXT(text="0.15 s gone"), "where things stood is kept"
+
+
+def test_limits_are_batched(toy):
+    leaf, tool = Heights("cup", limit=0.12), np.zeros((2, 3, 7))
+    tool[..., 2] = [[0.05, 0.2, 0.3], [0.4, 0.0, 0.6]]
+    elapsed = np.array([[0.0, 0.0, 0.2], [0.1, 0.2, 0.3]])
+    seen = SimpleNamespace(tool=tool, elapsed=elapsed)
+    assert np.array_equal(leaf.violated(seen, None), [[True, False, True], [False, True, True]])
 
 
 def test_a_goal_that_flickers_is_not_lost_and_one_that_stays_away_is(toy, careful):

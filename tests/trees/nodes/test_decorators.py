@@ -8,6 +8,7 @@ from py_trees.common import Status
 
 from bt_tasksim import trees
 from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.reporting import speaker, whole_outcome
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import FAILED, TEXT, TIMED_OUT
 from bt_tasksim.trees.nodes.parallel import CHILDREN_FAILED
@@ -58,6 +59,31 @@ def test_retry_waits_a_tick_after_a_failure_at_once():
     assert tree.outcome.is_a(ATTEMPT_FAILED) and tree.outcome.numbers == {"attempt": 3, "attempts": 3}
     assert tree.outcome.cause == FAILED(text="answer 3"), "what a plain behaviour says is kept"
     assert ticks(tree, 3) == "RRF"
+
+
+def test_after_the_last_attempt_every_cause_is_said():
+    leaf = Scripted("F", "grasp")
+    tree = trees.sequence("root", trees.retry(3, leaf))
+    assert ticks(tree, 3) == "RRF"
+    found = whole_outcome(speaker(tree))
+    assert found.is_a(ATTEMPT_FAILED) and found.cause == FAILED(text="answer 3"), "the last one is the reason"
+    assert "grasp: answer 1, 2 times" in found.names["before"], "like causes are counted"
+    assert found == tree.children[0].outcome
+
+    class Other(Scripted):
+        def update(self):
+            self.name = f"leaf {self.asked + 1}"
+            return super().update()
+
+    tree = trees.retry(3, Other("F"))
+    ticks(tree, 3)
+    assert all(f"leaf {k}: answer {k}" in tree.outcome.names["before"] for k in (1, 2))
+
+
+def test_one_attempt_says_no_more_than_its_child():
+    tree = trees.retry(1, Scripted("F"))
+    ticks(tree, 1)
+    assert whole_outcome(speaker(tree)) == FAILED(text="answer 1")
 
 
 def test_retry_without_end():

@@ -120,3 +120,64 @@ def test_what_was_not_understood_is_said(call):
 def test_pictures_are_svg_and_nothing_else(refused):
     assert ".svg" in refused("decompose", LOG, "--picture", "a.png")
     assert list(Path().iterdir()) == []
+
+
+@pytest.mark.parametrize("bad", ["gone/d.xml", "folder", "d.json"])
+def test_nothing_is_written_where_one_of_the_targets_cannot_be(refused, bad):
+    Path("folder").mkdir()
+    before = sorted(Path().rglob("*"))
+    refused("decompose", LOG, "--json", "d.json", "--xml", bad, "--picture", "d.svg")
+    refused("show", "pick_and_place", "--picture", "d.svg", "--xml", bad if bad != "d.json" else "d.svg")
+    assert sorted(Path().rglob("*")) == before
+
+
+def test_nothing_is_written_where_there_is_no_tree(refused):
+    spoiled(lambda demonstration: demonstration["hand/opening"].write_direct(np.full(
+        demonstration["hand/opening"].shape, 0.08)))  # fmt: skip
+    refused("decompose", "log.h5", "--json", "d.json", "--xml", "d.xml")
+    assert not Path("d.json").exists()
+
+
+def test_several_logs_are_merged_and_each_task_says_in_how_many_it_was_seen(call, refused):
+    logs = [asset("demonstrations", "pick_and_place", f"{k:02d}.h5") for k in range(3)]
+    code, out, _ = call("decompose", *logs, "--json", "d.json", "--xml", "d.xml")
+    lines = out.splitlines()
+    assert code == 0 and len(lines) == 6
+    assert all(line.endswith("  3 of 3") for line in lines[:5]), out
+    assert len(json.loads(Path("d.json").read_text())["demonstrations"]) == 3
+    assert 'scene="pick_and_place"' in Path("d.xml").read_text()
+    code, out, _ = call("decompose", logs[0], logs[1], asset("demonstrations", "pick_and_throw", "00.h5"))
+    assert code == 0 and "2 of 3" in out
+    assert not any(" of " in line for line in call("decompose", logs[0])[1].splitlines())
+    assert str(logs[0]) in refused("decompose", logs[0], logs[0])
+
+
+def test_motion_that_was_not_understood_is_said_beside_what_was(call):
+    """A cup that is pushed on after it was set down; a hand that closed on nothing is not worth a line."""
+
+    def pushed(demonstration):
+        (name,) = demonstration["objects"]
+        time, hand = demonstration["time"][()], demonstration["hand/pose"][()]
+        cup, opening = demonstration[f"objects/{name}/pose"][()], demonstration["hand/opening"][()]
+        height = cup[:, 2]
+        top = int(np.argmax(height))
+        lands = top + int(np.argmax(np.abs(height[top:] - np.median(height[-10:])) < 0.002))
+        rows = np.concatenate([np.arange(lands), np.full(90, lands), np.arange(lands, len(time))])
+        way = np.concatenate([np.zeros(lands), np.linspace(0, 0.2, 90), np.full(len(time) - lands, 0.2)])
+        changed = {"hand/pose": hand, f"objects/{name}/pose": cup, "hand/opening": opening}
+        for key, values in changed.items():
+            del demonstration[key]
+            moved = values[rows]
+            if moved.ndim == 2:
+                moved[:, 0] += way
+            demonstration[key] = moved
+        del demonstration["time"]
+        demonstration["time"] = np.arange(len(rows)) * float(np.median(np.diff(time)))
+
+    spoiled(pushed)
+    code, out, _ = call("decompose", "log.h5", "--json", "d.json")
+    lines = out.splitlines()
+    assert code == 0 and len(lines) == 7, out
+    assert lines[5].startswith("not understood: ") and "moved" in lines[5] and " m " in lines[5]
+    (said,) = json.loads(Path("d.json").read_text())["remarks"].values()
+    assert {remark["kind"] for remark in said} == {"motion", "empty hand"}
