@@ -264,6 +264,9 @@ def _scene(name: str | None, robot: str | None) -> Scene:
 
         scene = load_scene(name)
         return scene if robot is None else scene.with_robot(robot)
+    if Path(name).suffix:
+        own = "; a tree in a Python file brings the scene() of its own file" if name.endswith(".py") else ""
+        raise InputError(f"'{name}' is no scene: give a scenario's name or a .yaml file{own}")
     if name not in scenarios():
         raise InputError(f"no scene '{name}'{nearest(name, scenarios())} (or give a .yaml file)")
     module = importlib.import_module(f"bt_tasksim.trees.scenarios.{name}")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import keyword
 import re
 from pathlib import Path
 
-from bt_tasksim.core.errors import InputError, nearest
-from bt_tasksim.core.files import write_text
+from bt_tasksim.core.errors import InputError, MachineError, nearest
+from bt_tasksim.core.files import write_texts
 from bt_tasksim.core.resources import asset
 from bt_tasksim.policy.policy import concept_name
 
@@ -30,16 +31,16 @@ def write_concept(name: str, folder: str | Path = ".", like: str | None = None) 
 
     Args:
         name: Its name, lower-case words joined by underscores.
-        folder: Where to.
+        folder: Where to; it is made where there is none.
         like: The worked example that it begins as; by default a frame to fill in.
 
     Returns:
         What was written, and what to do next.
 
     Raises:
-        InputError: The name is no good or taken, there is no such example or folder, or a file is there
+        InputError: The name is no good or taken, there is no such example, or a file is there
             already; then nothing is written.
-        MachineError: The disk is full or not writable; what was written is removed.
+        MachineError: The disk is full or not writable; then nothing is written.
     """
     folder = Path(folder)
     class_name = "".join(word.capitalize() for word in name.split("_"))
@@ -47,21 +48,24 @@ def write_concept(name: str, folder: str | Path = ".", like: str | None = None) 
     _check_name(name, class_name)
     if like is not None and like not in examples():
         raise InputError(f"there is no example '{like}' to begin with{nearest(like, examples())}")
-    if not folder.is_dir():
-        raise InputError(f"there is no folder '{folder}': make it first, or name another one with --out")
+    above = next(path for path in (folder, *folder.parents) if path.exists())
+    if not above.is_dir():
+        raise InputError(f"'{above}' is a file: name another folder with --out")
     for path in paths.values():
         if path.exists() or path.is_symlink():
             raise InputError(f"'{path}' is there already: remove it, or choose another name or --out")
     _check_free(name)
     texts = {template: _filled(template, like or PLAIN, name, class_name) for template in paths}
-    written: list[Path] = []
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
-        for template, path in paths.items():
-            write_text(path, texts[template])
-            written.append(path)
-    except BaseException:
-        for path in written:
-            path.unlink(missing_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_texts({path: texts[template] for template, path in paths.items()})
+    except BaseException as error:
+        for path in made:
+            with contextlib.suppress(OSError):
+                path.rmdir()
+        if isinstance(error, OSError):
+            raise MachineError(f"cannot make the folder '{folder}': {error.strerror or error}") from error
         raise
     concept, tree, _ = paths.values()
     return (

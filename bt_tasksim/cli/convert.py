@@ -13,7 +13,7 @@ LARGEST = 2_000_000
 """Bytes of a Python file."""
 
 
-def convert_files(files: Sequence[Path], check: bool = False) -> list[str]:
+def convert_files(files: Sequence[Path], check: bool = False) -> tuple[list[str], int]:
     """Convert the imports of Python files, in place.
 
     Args:
@@ -21,19 +21,20 @@ def convert_files(files: Sequence[Path], check: bool = False) -> list[str]:
         check: Change nothing, only say what would be.
 
     Returns:
-        A line for each change, and for each name that nothing defines any more.
+        A line for each change, and for each name that nothing defines any more; and the count of changes.
 
     Raises:
         InputError: A file cannot be read or is not Python; then none is changed.
     """
     found = [(file, convert(_text(file), str(file))) for file in files]
-    lines = []
+    lines, changes = [], 0
     for file, converted in found:
         lines += [f"{file}, {change}" for change in converted.changes]
         lines += converted.unknown
+        changes += len(converted.changes)
         if converted.changes and not check:
             write_text(file, converted.text)
-    return lines or ["nothing to convert"]
+    return lines or ["nothing to convert"], changes
 
 
 def _text(file: Path) -> str:

@@ -216,7 +216,20 @@ def _home(module: str, name: str) -> tuple[str | None, str]:
         found = others[0] if len(others) == 1 else None
     home = _handed_on().get(name)
     ours = found is not None and home is not None and (found == home or found.startswith(f"{home}."))
-    return (PACKAGE if ours else found), name
+    if ours or found is None:
+        return (PACKAGE if ours else None), name
+    return _door(found, name, full=module.startswith(f"{PACKAGE}.")), name
+
+
+def _door(home: str, name: str, full: bool) -> str:
+    """The package that hands a name of this module on to authors, where one does; else the module itself.
+
+    Its short name, ``trees``, unless the file has names in ``full``.
+    """
+    for short in SHORT:
+        if home.startswith(f"{PACKAGE}.{short}.") and name in _offered(f"{PACKAGE}.{short}"):
+            return f"{PACKAGE}.{short}" if full else short
+    return home
 
 
 def _moved(module: str) -> str | None:
@@ -271,6 +284,15 @@ def _defined(module: str) -> frozenset[str]:
         elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
             found.add(node.target.id)
     return frozenset(found)
+
+
+@functools.cache
+def _offered(package: str) -> frozenset[str]:
+    """Names in a package's ``__all__``."""
+    for node in ast.parse(_file(package).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            return frozenset(ast.literal_eval(node.value))
+    return frozenset()
 
 
 @functools.cache

@@ -35,6 +35,13 @@ def write(tmp_path):
     return to
 
 
+@pytest.mark.parametrize("name", ["use.py", "tree.xml", "scene.json"])
+def test_what_no_scene_can_be_is_said_with_what_one_can(name):
+    sentence = refused("pick_and_place", None, name)
+    assert name in sentence and "scenario" in sentence and ".yaml" in sentence
+    assert ("scene()" in sentence) == name.endswith(".py")
+
+
 def refused(*arguments):
     with pytest.raises(InputError) as error:
         load_source(*arguments)

@@ -13,12 +13,17 @@ from bt_tasksim.core.registry import register
 @register("command", "convert")
 def convert(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Python files of your own.")],
-    check: Annotated[bool, typer.Option("--check", help="Change nothing; print what would change.")] = False,
-) -> None:
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Change nothing; print what would change; exit code 1 if any."),
+    ] = False,
+) -> int:
     """Update your Python files from version 0.1.
 
     Modules have moved since: imports are changed, in place, to where things are now.
     """
     from bt_tasksim.cli.convert import convert_files
 
-    print("\n".join(convert_files(files, check)))
+    lines, changes = convert_files(files, check)
+    print("\n".join(lines))
+    return 1 if check and changes else 0

@@ -11,10 +11,10 @@ from bt_tasksim.concept.demonstrated import Shown
 from bt_tasksim.concept.parameters import Direction, MetresPerSecond, Newtons, ObjectName, Radians
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.task import Task
-from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
 from bt_tasksim.core import poses
 from bt_tasksim.core.registry import register
 from bt_tasksim.planning.reference_motion import plan
+from concept_nodes.carry import Carry, MoveMemory
 
 
 @register("concept")

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from bt_tasksim.core.registry import register
-from bt_tasksim.demos_decomp.log import Demonstration, Log, Surface, Track, checked_log
-from bt_tasksim.demos_decomp.readers import LogReader
+from demos_decomp.log import Demonstration, Log, Surface, Track, checked_log
+from demos_decomp.readers import LogReader
 
 
 @register("log reader", "hands")

@@ -2,10 +2,10 @@
 
 from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.parameters import Metres
-from bt_tasksim.concept_nodes import Pick
 from bt_tasksim.core.outcomes import Outcome, register_reason
 from bt_tasksim.core.poses import norm
 from bt_tasksim.core.units import METRES
+from concept_nodes import Pick
 
 TOO_FAR = register_reason(
     "too_far", "{object} is {distance} away, more than {limit}", distance=METRES, limit=METRES

@@ -8,7 +8,7 @@ from py_trees.decorators import Decorator
 
 from bt_tasksim.concept.context import Context
 from bt_tasksim.core.registry import register
-from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
+from trees.nodes.base import NodeKind, Port, free_children
 
 
 class Delay(Decorator):

@@ -23,8 +23,10 @@ def test_a_file_is_converted_in_place_and_a_second_time_nothing_is_left(tmp_path
 def test_a_check_changes_nothing(tmp_path: Path, capsys):
     file = tmp_path / "mine.py"
     file.write_text(OLD)
-    assert main(["convert", "--check", str(file)]) == 0
+    assert main(["convert", "--check", str(file)]) == 1
     assert file.read_text() == OLD and "line 1" in capsys.readouterr().out
+    file.write_text("from bt_tasksim import Command\n")
+    assert main(["convert", "--check", str(file)]) == 0
 
 
 @pytest.mark.parametrize("bad", [None, b"def (", b"\xff\xfe", b"x = 1\n" * 400_000])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 
 from bt_tasksim.checking import new_concept
 from bt_tasksim.cli.main import main
+from bt_tasksim.core import files
 from bt_tasksim.core.errors import InputError, MachineError
 
 FILES = ["push.py", "test_push.py", "train_push.py"]
@@ -82,9 +84,18 @@ def test_bad_names(name, words, capsys):
     assert words in err and err.count("\n") == 1 and here() == []
 
 
-def test_missing_folder_and_files_that_are_there(capsys):
-    assert main(["new", "concept", "push", "--out", "nowhere"]) == 2
-    assert "there is no folder 'nowhere'" in capsys.readouterr().err and here() == []
+def test_a_missing_folder_is_made(capsys):
+    assert main(["new", "concept", "push", "--out", "some/where"]) == 0
+    assert sorted(os.listdir("some/where")) == FILES
+    assert main(["new", "concept", "lambda", "--out", "other/where"]) == 2
+    Path("file").touch()
+    for out in ("file", "file/in"):
+        assert main(["new", "concept", "push", "--out", out]) == 2
+        assert "'file' is a file" in capsys.readouterr().err
+    assert here() == ["file", "some"]
+
+
+def test_files_that_are_there():
     Path("test_push.py").touch()
     with pytest.raises(InputError, match=r"'test_push\.py' is there already"):
         new_concept.write_concept("push")
@@ -92,17 +103,16 @@ def test_missing_folder_and_files_that_are_there(capsys):
 
 
 def test_nothing_stays_half_written(monkeypatch):
-    whole, count = new_concept.write_text, []
+    count = []
 
-    def full(path, text):
-        count.append(path)
+    def full(file):
+        count.append(file)
         if len(count) == 3:
-            raise MachineError("the disk is full")
-        whole(path, text)
+            raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(new_concept, "write_text", full)
-    with pytest.raises(MachineError):
-        new_concept.write_concept("push")
+    monkeypatch.setattr(files.os, "fsync", full)
+    with pytest.raises(MachineError, match="No space left"):
+        new_concept.write_concept("push", "some/where")
     assert len(count) == 3 and here() == []
 
 
