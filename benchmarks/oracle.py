@@ -16,10 +16,10 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
 import itertools
 import json
 import math
-import multiprocessing
 import sys
 import time
 from collections.abc import Iterator
@@ -37,11 +37,11 @@ from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.planning.reference_motion import plan
 from bt_tasksim.scene.configuration import ActorConfiguration
-from bt_tasksim.training.evaluation import _one_thread_each
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.scenarios import grasp_then_pick
 
@@ -186,24 +186,20 @@ def told(configuration: ActorConfiguration) -> ActorConfiguration:
 
 def survey(robot: str, seeds: range, workers: int) -> Iterator[dict[str, Any]]:
     """The search for each seed, in the order in which they are done."""
-    with _one_thread_each():
-        pool = multiprocessing.get_context("spawn").Pool(workers, initializer=_start, initargs=(robot,))
-    with pool:
-        yield from pool.imap_unordered(_work, seeds)
+    with Workers(functools.partial(Oracle, robot), workers, "spawn") as pool:
+        for _, found in pool.each([Search(seed) for seed in seeds]):
+            yield found
 
 
-_worker: dict[str, Oracle] = {}
+@dataclasses.dataclass(frozen=True)
+class Search:
+    """The search in the world of one seed."""
 
+    seed: int
 
-def _start(robot: str) -> None:
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the workers
-    _worker["oracle"] = Oracle(robot)
-
-
-def _work(seed: int) -> dict[str, Any]:
-    return _worker["oracle"].search(seed)
+    def run(self, oracle: Oracle, /) -> dict[str, Any]:
+        """See `Oracle.search`."""
+        return oracle.search(self.seed)
 
 
 def by_kind(draws: list[dict[str, Any]]) -> dict[str, dict[str, int]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -11,6 +10,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.policy.files import load_policy
 from bt_tasksim.policy.library import find_policy
@@ -18,7 +18,6 @@ from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import PROGRAMMED, Action, LearnedPolicy, Policy, ProgrammedPolicy
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.training.env import EpisodeEnv
-from bt_tasksim.training.evaluation import _one_thread_each
 from bt_tasksim.training.evaluation_outcomes import wilson
 from bt_tasksim.training.rollouts import _kind
 
@@ -86,10 +85,20 @@ def judge(
             return [episode(env, chosen, seed) for seed in seeds]
         finally:
             env.close()
-    with _one_thread_each():
-        pool = multiprocessing.get_context("fork").Pool(workers, initializer=_start, initargs=(case, stream))
-    with pool:
-        return list(pool.imap(_work, seeds, chunksize=4))
+    with Workers(lambda: (_env(case, stream), load(case.policy)), workers) as pool:
+        found = dict(pool.each([DrawTask(seed) for seed in seeds]))
+    return [found[k] for k in range(len(seeds))]
+
+
+@dataclass(frozen=True)
+class DrawTask:
+    """One draw, for a worker that keeps an environment and a policy."""
+
+    seed: int
+
+    def run(self, kept: tuple[EpisodeEnv, Policy], /) -> Draw:
+        """See `episode`."""
+        return episode(*kept, self.seed)
 
 
 def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
@@ -161,20 +170,6 @@ def plain(draws: Iterable[Draw]) -> list[dict[str, Any]]:
     return [asdict(d) for d in draws]
 
 
-_worker: dict[str, Any] = {}
-
-
 def _env(case: Case, stream: str) -> EpisodeEnv:
     options = EngineOptions(noise=case.noise)
     return EpisodeEnv(case.build(), case.scene, options=options, stream=stream, stage=case.stage)
-
-
-def _start(case: Case, stream: str) -> None:
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the workers
-    _worker["env"], _worker["policy"] = _env(case, stream), load(case.policy)
-
-
-def _work(seed: int) -> Draw:
-    return episode(_worker["env"], _worker["policy"], seed)

@@ -27,9 +27,13 @@ from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import part
 from bt_tasksim.core.resources import is_file
 from bt_tasksim.robot.limits import SafetyLimits, read_limits
+from bt_tasksim.robot.urdf_links import joint_limits
 
 if TYPE_CHECKING:
     from bt_tasksim.robot.schema import EnvelopeEntry, RobotFile
+
+ROUNDED = 1e-3
+"""Rad or m by which a robot file's joint positions may differ from its URDF's, which are often rounded."""
 
 
 @dataclass(frozen=True)
@@ -283,6 +287,7 @@ def _description(data: RobotFile, path: Path) -> RobotDescription:
         source=path,
     )
     _check(robot)
+    _check_urdf(robot)
     if data.safety is None:
         return robot
     with within("safety"):
@@ -311,6 +316,22 @@ def _check(robot: RobotDescription) -> None:
         for i in group:
             if not 0 <= i < len(robot.tips):
                 raise FieldError(f"'opposition' names tip {i} of {len(robot.tips)}", "opposition", k)
+
+
+def _check_urdf(robot: RobotDescription) -> None:
+    """No joint of the hand is sent to where its URDF does not let it go."""
+    limits = joint_limits(robot.urdf)
+    for name, values in (("open", robot.hand_open), ("closed", robot.hand_closed)):
+        for i, (joint, value) in enumerate(zip(robot.hand_joints, values.tolist(), strict=True)):
+            lower, upper = limits.get(joint, (-np.inf, np.inf))
+            if not lower - ROUNDED <= value <= upper + ROUNDED:
+                raise FieldError(
+                    f"'hand.{name}' puts joint '{joint}' at {value:g}, and its URDF lets it go "
+                    f"from {lower:g} to {upper:g}",
+                    "hand",
+                    name,
+                    i,
+                )
 
 
 def _fixed(array: Array) -> Array:

@@ -15,6 +15,8 @@ from bt_tasksim.robot.urdf_visuals import origin, read_urdf
 
 MOVING = ("revolute", "continuous", "prismatic")
 """Kinds of joints that move; every other one but ``fixed`` is refused."""
+LIMITED = ("revolute", "prismatic")
+"""Those of them that have limits."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,23 @@ def load_links(urdf: Path) -> tuple[LinkJoint, ...]:
     return tuple(ordered)
 
 
+def joint_limits(urdf: Path) -> dict[str, tuple[float, float]]:
+    """Lower and upper position, rad or m, of those joints of a URDF that state both.
+
+    Raises:
+        InputError: The file is no URDF, or a limit is no number.
+    """
+    found = {}
+    for joint in read_urdf(urdf).findall("joint"):
+        limit = joint.find("limit")
+        if joint.get("type") in LIMITED and limit is not None and {"lower", "upper"} <= limit.attrib.keys():
+            try:
+                found[str(joint.get("name"))] = (float(limit.get("lower", "")), float(limit.get("upper", "")))
+            except ValueError as error:
+                raise InputError(f"URDF '{urdf}': limit of joint '{joint.get('name')}': {error}") from error
+    return found
+
+
 def links_below(links: tuple[LinkJoint, ...], root: str) -> set[str]:
     """Names of a link and of all links that it carries."""
     names = {root}
@@ -145,7 +164,7 @@ def _link_joint(joint: ElementTree.Element, inertials: dict[str, Inertial | None
         raise ValueError(f"joint '{name}' carries '{child}', which is no link")
     limit, mimic = joint.find("limit"), joint.find("mimic")
     limits = None
-    if kind in ("revolute", "prismatic"):
+    if kind in LIMITED:
         if limit is None:
             raise ValueError(f"joint '{name}' has no limits")
         limits = (float(limit.get("lower", "0")), float(limit.get("upper", "0")))

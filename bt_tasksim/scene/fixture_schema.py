@@ -56,8 +56,8 @@ class PlaceEntry(Model):
 
     name: Name
     """Its name in trees and scenes."""
-    kind: Name
-    """`table`, `board` or `bin`."""
+    kind: Literal["table", "board", "bin", "spot"]
+    """What it is; a spot is marked with a colour."""
     position: Vector3
     """Its origin in the fixture's frame, m: where something stands that is put there without an offset."""
     extent: Extent2
@@ -67,9 +67,9 @@ class PlaceEntry(Model):
     height: Length = 10.0
     """Free height above it, m; of a bin, that of its rim."""
     access: Direction = (0.0, 0.0, -1.0)
-    """Direction in which the hand comes, fixture's frame."""
+    """Direction in which the hand comes, fixture's frame; scaled to length one."""
     exit: Direction = (0.0, 0.0, 1.0)
-    """Direction in which things leave it, fixture's frame."""
+    """Direction in which things leave it, fixture's frame; scaled to length one."""
     clearance: Annotated[NotNegative, Field(le=10.0)] = 0.1
     """Distance along `access` that a hand keeps before it comes close, m."""
 

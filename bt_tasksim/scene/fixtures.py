@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,6 +25,10 @@ from bt_tasksim.core.world import PlaceModel
 
 if TYPE_CHECKING:
     from bt_tasksim.scene.fixture_schema import FixtureFile
+
+
+ROUNDED = 1e-3
+"""By how much the length of a unit vector in a file may differ from one."""
 
 
 @renamed_fields(look="material")
@@ -81,6 +86,11 @@ class Fixture:
         """The pose as an array ``(7,)``."""
         return np.array(self.pose)
 
+    def distance(self, point: Array) -> float:
+        """Metres from a point ``(3,)`` in the robot base frame to the nearest box; inf without boxes."""
+        inside = poses.transform(poses.inverse(self.pose_array()), point)
+        return min((_distance(box, inside) for box in self.boxes), default=math.inf)
+
     def place_models(self) -> tuple[PlaceModel, ...]:
         """Its places in the robot base frame."""
         frame = self.pose_array()
@@ -126,10 +136,33 @@ class Fixture:
             for box in file.boxes
         )
         places = tuple(
-            Place(p.name, p.kind, p.position, p.extent, p.centre, p.height, p.access, p.exit, p.clearance)
+            Place(
+                p.name,
+                p.kind,
+                p.position,
+                p.extent,
+                p.centre,
+                p.height,
+                _scaled(p.access),
+                _scaled(p.exit),
+                p.clearance,
+            )
             for p in file.places
         )
         return cls(file.name, file.pose, boxes, places)
+
+
+def _distance(box: Box, point: Array) -> float:
+    """Metres from a point ``(3,)`` in the fixture's frame to a box; 0 inside."""
+    local = poses.transform(poses.inverse(np.array(box.pose)), point)
+    return float(np.linalg.norm(np.maximum(np.abs(local) - np.array(box.size) / 2, 0.0)))
+
+
+def _scaled(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A direction of length one; one that is rounded in its file is kept as it stands there."""
+    x, y, z = direction
+    length = math.sqrt(x * x + y * y + z * z)
+    return direction if abs(length - 1.0) < ROUNDED else (x / length, y / length, z / length)
 
 
 def load_fixture(name: str) -> Fixture:

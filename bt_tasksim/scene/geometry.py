@@ -99,7 +99,7 @@ def prism_shape(
 
     Args:
         extent: Full size of its bounding box, metres.
-        solid: Outline ``(n, 2)`` of what is weighed, counter-clockwise, metres.
+        solid: Corners ``(n, 2)`` of what is weighed, in order, metres.
         seen: Outline ``(m, 2)`` of what is drawn.
         footprint: Of its outer surface.
         collision: Convex pieces that together are the solid.
@@ -125,5 +125,5 @@ def upright_piece(outline: Array, low: float, high: float) -> ConvexPiece:
 
 
 def polygon(corners: Array) -> Polygon:
-    """The footprint with these corners ``(n, 2)``, counter-clockwise, metres."""
-    return Polygon(tuple((float(x), float(y)) for x, y in corners))
+    """The footprint with these corners ``(n, 2)``, in order, metres."""
+    return Polygon(tuple((float(x), float(y)) for x, y in meshes.counter_clockwise(corners)))

@@ -66,14 +66,22 @@ def rounded_rectangle(half_x: float, half_y: float, radius: float, segments: int
     return np.concatenate(corners)
 
 
+def counter_clockwise(outline: Array) -> Array:
+    """The corners ``(n, 2)`` as they are, or in the other order where they were given clockwise."""
+    following = np.roll(outline, -1, axis=0)
+    area = float(np.sum(outline[:, 0] * following[:, 1] - outline[:, 1] * following[:, 0]))
+    return outline[::-1] if area < 0.0 else outline
+
+
 def loft(outline: Array, profile: Array) -> TriangleMesh:
     """The solid between scaled copies of an outline, one above the other.
 
     Args:
-        outline: Corners ``(n, 2)``, counter-clockwise around the z axis, metres (or unit lengths).
+        outline: Corners ``(n, 2)`` in order around the z axis, metres (or unit lengths).
         profile: ``(m, 2)`` scale of the outline and height z of each copy, from the bottom's centre (scale 0)
             outwards to the top's centre (scale 0); may turn inwards, as a cup's does.
     """
+    outline = counter_clockwise(outline)
     n, rings = len(outline), profile[1:-1]
     ring_vertices = np.concatenate(
         [np.column_stack([scale * outline, np.full(n, z)]) for scale, z in rings], axis=0
@@ -95,11 +103,11 @@ def prism(outline: Array, height: float, bevel: float = 0.0) -> TriangleMesh:
     """An upright prism centred on the origin.
 
     Args:
-        outline: Convex footprint ``(n, 2)``, counter-clockwise, metres.
+        outline: Corners ``(n, 2)`` of the convex footprint in order, metres.
         height: Metres.
         bevel: Metres by which the edges of top and bottom are broken.
     """
-    h = height / 2
+    h, outline = height / 2, counter_clockwise(outline)
     if bevel <= 0:
         return loft(outline, np.array([[0, -h], [1, -h], [1, h], [0, h]]))
     edges = np.roll(outline, -1, axis=0) - outline

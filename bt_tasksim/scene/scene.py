@@ -110,6 +110,13 @@ class Scene:
             places.add(spot.name)
         for name, spec in specs.items():
             _require_place(f"object '{name}'", spec.on, places, ("objects", name, "on"))
+        if self.goal is not None and self.goal.place in specs and self.goal.place not in places:
+            raise FieldError(
+                f"the scene's goal is on the object '{self.goal.place}', and goals on objects are "
+                f"not supported: name a place instead: {', '.join(sorted(places))}",
+                "goal",
+                "place",
+            )
         for where, wanted, known in (
             (("goal", "object"), self.goal.object if self.goal else None, specs),
             (("disturbed",), self.disturbed, specs),

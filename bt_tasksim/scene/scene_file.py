@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from bt_tasksim.core.beside import beside
@@ -22,6 +22,8 @@ from bt_tasksim.scene.specs import Goal, ObjectSpec, SpotSpec
 
 _DENSEST = 20000.0
 _TRIED = 3
+FLOATING = 0.02
+"""Metres from the nearest box beyond which a place stands on nothing."""
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -62,6 +64,7 @@ def _scene(content: SceneFile, file: Path) -> Scene:
         name=content.name or file.stem,
     )
     _check_areas(scene)
+    _check_supports(scene, fixtures)
     return scene
 
 
@@ -150,6 +153,23 @@ def _check_areas(scene: Scene) -> None:
                     f"{what} may be drawn {1000 * (reach - extent[axis] / 2):.0f} mm beyond the edge of "
                     f"'{spec.on}' along {letter}: change 'at' or 'area'",
                     *where,
+                )
+
+
+def _check_supports(scene: Scene, named: Sequence[str]) -> None:
+    """No place of the fixtures ``named`` in the file is in mid-air; it may stand on another fixture."""
+    fixtures = [load_fixture(name) for name in scene.fixtures]
+    for i, name in enumerate(named):
+        for k, place in enumerate(load_fixture(name).place_models()):
+            origin = place.pose[:3]
+            gap = min(fixture.distance(origin) for fixture in fixtures)
+            if gap > FLOATING:
+                raise FieldError(
+                    f"place '{place.name}' of fixture '{place.fixture}' is in mid-air: its origin, "
+                    f"'places[{k}].position' in the fixture's file, is {1000 * gap:.0f} mm from the nearest "
+                    f"box of any fixture",
+                    "fixtures",
+                    i,
                 )
 
 

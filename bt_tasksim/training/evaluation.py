@@ -8,23 +8,23 @@ from __future__ import annotations
 
 import json
 import math
-import multiprocessing
-import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from py_trees.common import Status
 
 from bt_tasksim.concept.plugins import load_all
 from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
 from bt_tasksim.core.files import check_writable, write_text
-from bt_tasksim.core.interrupts import ending, held_back, terminable
+from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import outcome_of_error
 from bt_tasksim.core.plugins import loaded
+from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.scene.configuration import check_seed
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
@@ -128,7 +128,7 @@ def evaluate(
         EvaluationTerminated: By SIGTERM or SIGHUP; likewise.
         InputError: The tree, scene, robot or engines are no good, or there are no seeds.
         LostEngine: An engine in another process has gone away.
-        MachineError: A robot has failed.
+        MachineError: A robot has failed, or a worker process ended.
     """
     if not seeds:
         raise InputError("an evaluation needs at least one episode")
@@ -194,12 +194,8 @@ def _run_all(
         for seed in seeds:
             ended(episode(runner, seed, stream))
         return
-    with _one_thread_each(), held_back(spawning=True):
-        pool = multiprocessing.get_context("spawn").Pool(
-            min(workers, len(seeds)), initializer=_start, initargs=(job, stream)
-        )
-    with pool:
-        for outcome in pool.imap_unordered(_work, seeds):
+    with Workers(partial(_runner, job), min(workers, len(seeds)), "spawn") as pool:
+        for _, outcome in pool.each([_EpisodeTask(seed, stream) for seed in seeds]):
             ended(outcome)
 
 
@@ -239,23 +235,15 @@ def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOut
     )
 
 
-_worker: dict[str, Any] = {}
-"""A worker process's own runner; this process never fills it."""
+@dataclass(frozen=True)
+class _EpisodeTask:
+    """One episode, for a worker that keeps a runner."""
 
+    seed: int
+    stream: str
 
-def _start(job: Job, stream: str) -> None:
-    """Begin a worker. A pool replaces one that fails here by another, for ever: so `_work` raises it."""
-    _worker["stream"] = stream
-    try:
-        _worker["runner"] = _runner(job)
-    except Exception as error:
-        _worker["error"] = error
-
-
-def _work(seed: int) -> EpisodeOutcome:
-    if "error" in _worker:
-        raise _worker["error"]
-    return episode(_worker["runner"], seed, _worker["stream"])
+    def run(self, runner: Runner, /) -> EpisodeOutcome:
+        return episode(runner, self.seed, self.stream)
 
 
 def _runner(job: Job) -> Runner:
@@ -277,19 +265,3 @@ def _policies(runner: Runner) -> dict[str, str]:
     return {
         leaf.name: leaf.policy_in_use.name for leaf in runner.tree.iterate() if isinstance(leaf, ConceptNode)
     }
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Worker processes inherit one thread for linear algebra: they are the parallelism."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value

@@ -17,6 +17,7 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.policy.files import CHECKPOINT, PolicyCard, load_policy, save_policy, training_folder
 from bt_tasksim.policy.network import Network
@@ -35,7 +36,7 @@ from bt_tasksim.training.checkpoint import (
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.env import EpisodeEnv, shared_layout
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
-from bt_tasksim.training.rollouts import EnvironmentRollout, RolloutTask, Workers
+from bt_tasksim.training.rollouts import DrawTask, EnvironmentRollout, RolloutTask
 from bt_tasksim.trees.nodes.train import Train
 
 if TYPE_CHECKING:
@@ -124,7 +125,9 @@ class NodeTraining:
         finally:
             pool.close()
 
-    def _learn(self, pool: Workers, resume: bool, report: Callable[[Progress], None] | None) -> LearnedPolicy:
+    def _learn(
+        self, pool: Workers[EpisodeEnv], resume: bool, report: Callable[[Progress], None] | None
+    ) -> LearnedPolicy:
         import gymnasium
         import torch
 
@@ -184,50 +187,45 @@ class NodeTraining:
     # ---- one rollout ------------------------------------------------------------------------------------
 
     def _collect(
-        self, pool: Workers, learner: Learner, decisions: int, warm: bool = False
+        self, pool: Workers[EpisodeEnv], learner: Learner, decisions: int, warm: bool = False
     ) -> list[EnvironmentRollout]:
         arrays, std = learner.network.arrays(), learner.std
         stage = self.stage if self.task.scene.stages else None
         tasks = [
-            RolloutTask(
-                "environment", arrays, std, (self.config.seed, int(warm), self.iteration, k), decisions, stage
-            )
+            RolloutTask(arrays, std, (self.config.seed, int(warm), self.iteration, k), decisions, stage)
             for k in range(self.config.n_envs)
         ]
         found = dict(pool.each(tasks))
         return [found[k] for k in range(self.config.n_envs)]
 
-    def _warm_up(self, pool: Workers, learner: Learner) -> None:
+    def _warm_up(self, pool: Workers[EpisodeEnv], learner: Learner) -> None:
         rollouts = self._collect(pool, learner, WARM_UP, warm=True)
         learner.statistics.update(np.concatenate([rollout.features for rollout in rollouts]))
 
-    def _evaluate(self, pool: Workers, learner: Learner) -> dict[str, Any]:
+    def _evaluate(self, pool: Workers[EpisodeEnv], learner: Learner) -> dict[str, Any]:
         """Successes on held-apart draws, the same ones each time; keeps the best policy so far."""
         arrays = learner.decisive.arrays()
-        tasks = [
-            RolloutTask("draw", arrays, learner.std, (), 0, None, draw=k)
-            for k in range(self.config.evaluation_draws)
-        ]
+        tasks = [DrawTask(arrays, draw) for draw in range(self.config.evaluation_draws)]
         found = [result for _, result in pool.each(tasks)]
         if not found:
             return {}
-        wins = sum(success for _, success, _ in found)
+        wins = sum(result.success for result in found)
         if self.best is None or wins / len(found) >= self.best[0]:
             self.best = (wins / len(found), arrays)
-        reasons = Counter(reason for _, success, reason in found if not success)
+        reasons = Counter(result.reason for result in found if not result.success)
         return {"successes": wins, "draws": len(found), "failures": dict(reasons.most_common())}
 
     def _row(self, rollouts: list[EnvironmentRollout]) -> dict[str, Any]:
         ends = [end for rollout in rollouts for end in rollout.ends]
-        self.recent.extend(end[0] for end in ends)
+        self.recent.extend(end.success for end in ends)
         stages = self.task.scene.stages
         return {
             "steps": self.iteration * self.config.rollout,
             "episodes": len(ends),
-            "success": float(np.mean([e[0] for e in ends])) if ends else 0.0,
-            "return": float(np.mean([e[2] for e in ends])) if ends else 0.0,
-            "length": float(np.mean([e[1] for e in ends])) if ends else 0.0,
-            "ends": dict(Counter(e[3] for e in ends).most_common()),
+            "success": float(np.mean([end.success for end in ends])) if ends else 0.0,
+            "return": float(np.mean([end.total for end in ends])) if ends else 0.0,
+            "length": float(np.mean([end.decisions for end in ends])) if ends else 0.0,
+            "ends": dict(Counter(end.reason for end in ends).most_common()),
             "redrawn": sum(rollout.redrawn for rollout in rollouts),
             "stage": stages[self.stage].name if stages else "",
         }

@@ -6,25 +6,47 @@ its own seeds, in whichever worker is free: so the number of workers changes the
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing
-import os
-import traceback
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
-from bt_tasksim.core.interrupts import held_back
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import split_action
+from bt_tasksim.training.env import EpisodeEnv
 
-EnvMaker = Callable[[], Any]
-"""Builds an environment in a worker process."""
+
+class EpisodeEnd(NamedTuple):
+    """How an episode of a rollout ended.
+
+    Attributes:
+        success: The completion signal was right.
+        decisions: How many it had.
+        total: What it paid in all.
+        reason: A countable one: ``success``, ``discarded``, ``violated``, ``timeout``, ``follower failed``
+            or ``failed``.
+    """
+
+    success: bool
+    decisions: int
+    total: float
+    reason: str
+
+
+class DrawResult(NamedTuple):
+    """What came of a held-apart draw.
+
+    Attributes:
+        draw: The seed of its world.
+        success: The completion signal was right.
+        reason: As of an `EpisodeEnd`, or why the draw has no episode.
+    """
+
+    draw: int
+    success: bool
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -38,7 +60,7 @@ class EnvironmentRollout:
         starts: ``(n,)`` boolean, the decision is the first one of its episode.
         cut: Features ``(k, n_features)`` after decisions ``cut_at (k,)`` at which an episode was truncated.
         cut_at: See ``cut``; the environment's last decision is among them unless its episode ended there.
-        ends: For each episode that ended: success, decisions, return and reason.
+        ends: One for each episode that ended.
         redrawn: Draws in which the subtree was never active.
     """
 
@@ -48,24 +70,51 @@ class EnvironmentRollout:
     starts: Array
     cut: Array
     cut_at: Array
-    ends: list[tuple[bool, int, float, str]]
+    ends: list[EpisodeEnd]
     redrawn: int
 
 
 @dataclass(frozen=True)
 class RolloutTask:
-    """What a worker is to do: an environment of a rollout, or the evaluation of one draw."""
+    """An environment of a rollout, for a worker that keeps an environment.
 
-    kind: str
+    Attributes:
+        network: Arrays of the policy's network.
+        std: Standard deviations ``(n_actions,)`` of the noise on its outputs.
+        seed: Of draws and noise.
+        decisions: How many.
+        stage: Number of the scene's stage that worlds are drawn from; None: the scene itself.
+    """
+
     network: dict[str, Array]
     std: Array
     seed: tuple[int, ...]
     decisions: int
-    stage: int | None
-    draw: int = 0
+    stage: int | None = None
+
+    def run(self, env: EpisodeEnv, /) -> EnvironmentRollout:
+        """See `collect`."""
+        return collect(env, self)
 
 
-def collect(env: Any, task: RolloutTask) -> EnvironmentRollout:
+@dataclass(frozen=True)
+class DrawTask:
+    """The evaluation of one held-apart draw, for a worker that keeps an environment.
+
+    Attributes:
+        network: Arrays of the policy's network.
+        draw: The seed of its world.
+    """
+
+    network: dict[str, Array]
+    draw: int
+
+    def run(self, env: EpisodeEnv, /) -> DrawResult:
+        """See `judge_draw`."""
+        return judge_draw(env, self)
+
+
+def collect(env: EpisodeEnv, task: RolloutTask) -> EnvironmentRollout:
     """One environment: episodes until there are enough decisions."""
     network = Network.from_arrays(task.network)
     env.stage = task.stage
@@ -89,7 +138,7 @@ def collect(env: Any, task: RolloutTask) -> EnvironmentRollout:
             cut.append(features)
             cut_at.append(k)
         if over:
-            ends.append((bool(info["is_success"]), length, total, _kind(info)))
+            ends.append(EpisodeEnd(bool(info["is_success"]), length, total, _kind(info)))
             total, length, episode = 0.0, 0, episode + 1
             if k < task.decisions - 1:
                 features, info = env.reset(seed=draws[episode])
@@ -106,8 +155,8 @@ def collect(env: Any, task: RolloutTask) -> EnvironmentRollout:
     )
 
 
-def judge_draw(env: Any, task: RolloutTask) -> tuple[int, bool, str]:
-    """One held-apart draw with the policy's own decisions: its seed, whether it succeeded, and the reason."""
+def judge_draw(env: EpisodeEnv, task: DrawTask) -> DrawResult:
+    """One held-apart draw with the policy's own decisions."""
     network = Network.from_arrays(task.network)
     env.stage = None
     stream, env.stream = env.stream, "validation"
@@ -120,9 +169,9 @@ def judge_draw(env: Any, task: RolloutTask) -> tuple[int, bool, str]:
             action = np.append(motion, 1.0 if nearer >= 1.0 else -1.0)
             features, _, terminated, truncated, info = env.step(action)
             if terminated or truncated:
-                return task.draw, bool(info["is_success"]), _kind(info)
+                return DrawResult(task.draw, bool(info["is_success"]), _kind(info))
     except InputError as error:
-        return task.draw, False, str(error)
+        return DrawResult(task.draw, False, str(error))
     finally:
         env.stream = stream
 
@@ -135,91 +184,3 @@ def _kind(info: dict[str, Any]) -> str:
         return "discarded"
     part = next((p for p in ("violated", "timeout") if info["reward"][p] != 0.0), "")
     return part or ("follower failed" if info["status"] == "SUCCESS" else "failed")
-
-
-class Workers:
-    """Worker processes that each keep one environment.
-
-    They are forked, so the environment's maker may hold a tree; a worker ends when its parent is gone.
-
-    Args:
-        make: Builds the environment.
-        count: How many.
-    """
-
-    def __init__(self, make: EnvMaker, count: int) -> None:
-        context = multiprocessing.get_context("fork")
-        self._pipes: list[Connection] = []
-        self._processes: list[Any] = []
-        for _ in range(count):
-            mine, theirs = context.Pipe()
-            process = context.Process(target=_work, args=(make, theirs, [*self._pipes, mine]), daemon=True)
-            with held_back():
-                process.start()
-            theirs.close()
-            self._pipes.append(mine)
-            self._processes.append(process)
-
-    def each(self, tasks: Sequence[RolloutTask]) -> Iterator[tuple[int, Any]]:
-        """The tasks' numbers and results, in the order in which they are done.
-
-        Raises:
-            BtTasksimError: A worker found an error.
-            MachineError: A worker ended.
-        """
-        waiting = list(enumerate(tasks))[::-1]
-        busy: dict[Connection, int] = {}
-        idle = list(self._pipes)
-        try:
-            while waiting or busy:
-                while waiting and idle:
-                    pipe = idle.pop()
-                    number, task = waiting.pop()
-                    pipe.send(task)
-                    busy[pipe] = number
-                for ready in wait(list(busy)):
-                    assert isinstance(ready, Connection)
-                    kind, result = ready.recv()
-                    if kind == "error":
-                        raise result
-                    idle.append(ready)
-                    yield busy.pop(ready), result
-        except (EOFError, ConnectionError, BrokenPipeError) as error:
-            raise MachineError("a worker process ended; is there enough memory?") from error
-
-    def close(self) -> None:
-        """End the workers."""
-        for pipe in self._pipes:
-            with contextlib.suppress(OSError):
-                pipe.close()
-        for process in self._processes:
-            process.join(timeout=2.0)
-            if process.is_alive():
-                process.kill()
-                process.join()
-
-
-def _work(make: EnvMaker, pipe: Connection, others: list[Connection]) -> None:
-    os.environ["OMP_NUM_THREADS"] = "1"
-    for other in others:
-        other.close()
-    parent, env = os.getppid(), None
-    while os.getppid() == parent:
-        try:
-            if not pipe.poll(1.0):
-                continue
-            task = pipe.recv()
-        except (EOFError, OSError):
-            break
-        try:
-            if env is None:
-                env = make()
-            pipe.send(("done", collect(env, task) if task.kind == "environment" else judge_draw(env, task)))
-        except BtTasksimError as error:
-            own = InputError if isinstance(error, InputError) else MachineError
-            pipe.send(("error", own(str(error))))
-        except BrokenPipeError:
-            break
-        except Exception as error:
-            pipe.send(("error", MachineError(f"{error!r}: {traceback.format_exc(limit=-3)}")))
-    os._exit(0)

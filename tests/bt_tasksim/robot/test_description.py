@@ -162,6 +162,8 @@ BAD: list[tuple[str, Any, str]] = [
     ("arm.drive", {"stiffness": 1, "damping": 1}, "'arm.drive.force_limit' is missing"),
     ("hand.speed", "fast", "'hand.speed' should be a number"),
     ("hand.closed", [0.04, 0.04], "are the same"),
+    ("hand.open", [0.04, 0.3], "'hand.open' puts joint 'panda_finger_joint2' at 0.3"),
+    ("hand.closed", [-0.02, 0.0], "from 0 to 0.04"),
     ("hand.synergies", {"spread": [1]}, "'hand.synergies.spread' should be 2 numbers"),
     ("hand.drive_scale", {"thumb": 2}, "'hand.drive_scale' names 'thumb'"),
     ("tool.pose", [0, 0, 0, 1, 1, 0, 0], "unit quaternion"),

@@ -65,6 +65,25 @@ def test_moved_fixture_moves_its_places():
     assert turned.boxes[0].look == "matte" and shelf.boxes[0].look == "wood"
 
 
+@pytest.mark.parametrize(
+    ("given", "meant"), [([0, 0, -2], (0, 0, -1)), ([0.6, 0, -0.8001], (0.6, 0, -0.8001))]
+)
+def test_a_direction_is_scaled_to_length_one_and_a_rounded_one_is_kept(given, meant):
+    place = {"name": "p", "kind": "board", "position": [0, 0, 0], "extent": [1, 1], "access": given}
+    found = Fixture.from_data({"name": "x", "boxes": [], "places": [{**place, "exit": [0, 3, 0]}]}).places[0]
+    assert found.access == meant and found.exit == (0, 1, 0)
+
+
+def test_an_unknown_kind_of_place_is_refused(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "name: x\nboxes: []\nplaces:\n"
+        "  - name: p\n    kind: shelf\n    position: [0, 0, 0]\n    extent: [1, 1]\n"
+    )
+    with pytest.raises(InputError, match=r"line 5: 'places\[0\].kind'.*'board'"):
+        load_fixture(str(file))
+
+
 BOX = "{name: x, boxes: [{position: [0, 0, 0], size: [1, 1, 1], %s}], places: []}"
 PLACE = "{name: x, boxes: [], places: [{name: p, kind: board, position: [0, 0, 0], %s}]}"
 

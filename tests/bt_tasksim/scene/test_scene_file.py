@@ -142,6 +142,34 @@ def test_the_line_is_that_of_the_field(tmp_path):
         load_scene(write(tmp_path, "robot: panda\nobjects:\n  cup: on table\nfixtrues: [shelf]\n"))
 
 
+def test_a_goal_on_an_object_says_that_places_are_meant(tmp_path):
+    file = write(
+        tmp_path,
+        "objects:\n  cup: on table\n  tin: cylinder on table\nspots: [{name: mat, on: table}]\n"
+        "goal:\n  object: cup\n  place: tin\n",
+    )
+    with pytest.raises(InputError, match=r"line 7: .*goals on objects are not supported.*: mat, table"):
+        load_scene(file)
+
+
+STOOL = """name: stool
+boxes: [{position: [0.5, 0, 0.1], size: [0.3, 0.3, 0.2]}]
+places:
+  - {name: seat, kind: board, position: [0.5, 0, %s], extent: [0.3, 0.3]}
+"""
+
+
+@pytest.mark.parametrize(("height", "floats"), [(0.2, False), (0.0, False), (0.3, True)])
+def test_a_place_in_mid_air_is_refused(tmp_path, height, floats):
+    (tmp_path / "stool.yaml").write_text(STOOL % height)
+    file = write(tmp_path, "name: room\nfixtures: [./stool.yaml]\n")
+    if not floats:
+        assert load_scene(file).fixtures[-1].endswith("stool.yaml")
+        return
+    with pytest.raises(InputError, match=r"line 2: place 'seat' .*'places\[0\].position'.* 100 mm"):
+        load_scene(file)
+
+
 def test_a_goal_of_being_lifted_keeps_its_height(tmp_path):
     goal = "goal: {object: cup, place: table, relation: lifted, height: 0.12}"
     found = load_scene(write(tmp_path, f"objects: {{cup: on table}}\n{goal}\n")).goal

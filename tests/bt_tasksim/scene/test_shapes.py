@@ -10,6 +10,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.resources import asset
 from bt_tasksim.scene import meshes
+from bt_tasksim.scene.geometry import polygon
 from bt_tasksim.scene.kinds.cup import WALL
 from bt_tasksim.scene.kinds.diamond import diamond_width
 from bt_tasksim.scene.mesh_file import mesh_extent
@@ -272,3 +273,12 @@ def test_every_kind_is_drawn_by_a_scene():
         assert np.all(np.array(actor.size) >= np.array(low) - 1e-12)
         assert np.all(np.array(actor.size) <= np.array(high) + 1e-12)
         assert actor.pose[2] == pytest.approx(actor.size[2] / 2)
+
+
+def test_corners_may_be_given_clockwise():
+    outline = meshes.circle(7) * 0.03
+    for bevel in (0.0, 0.001):
+        one, other = (meshes.prism(order, 0.1, bevel) for order in (outline, outline[::-1]))
+        assert meshes.mass_properties(one).volume == pytest.approx(meshes.mass_properties(other).volume)
+    x, y, inside = polygon(outline[::-1]).nearest(0.001, 0.001)
+    assert inside and (x, y) == pytest.approx(polygon(outline).nearest(0.001, 0.001)[:2])
