@@ -307,7 +307,7 @@ def test_subtrees_that_multiply_are_refused_soon():
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="there is no tree file"):
         trees.load_tree(tmp_path / "nowhere.xml")
-    with pytest.raises(InputError, match="there is no tree file"):
+    with pytest.raises(InputError, match="not an ordinary file"):
         trees.load_tree(tmp_path)
 
 
