@@ -289,7 +289,7 @@ def test_deep_files_are_refused_without_recursion():
 def test_large_files_are_refused(tmp_path):
     path = tmp_path / "large.xml"
     path.write_bytes(b" " * (LARGEST + 10))
-    with pytest.raises(InputError, match=r"2.0 MB, at most 2 MB are read"):
+    with pytest.raises(InputError, match="is larger than"):
         trees.load_tree(path)
 
 
