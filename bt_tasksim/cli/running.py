@@ -13,11 +13,18 @@ if TYPE_CHECKING:
 
     from bt_tasksim.execution.pipelines import EngineOptions
     from bt_tasksim.execution.result import Result
+    from bt_tasksim.report.video import Film
     from bt_tasksim.scene.scene import Scene
 
 
 def run_into(
-    folder: Path, tree: Behaviour, scene: Scene, seed: int, engines: EngineOptions, name: str
+    folder: Path,
+    tree: Behaviour,
+    scene: Scene,
+    seed: int,
+    engines: EngineOptions,
+    name: str,
+    film: Film | None = None,
 ) -> Result:
     """Run a tree once, keep everything of it in a folder, and print what became of it.
 
@@ -28,6 +35,7 @@ def run_into(
         seed: Seed of the draw.
         engines: Which engines; where they say rendering and this machine cannot draw, the run is not filmed.
         name: What is run: a scenario's name or the tree's file.
+        film: How it is filmed, where engines say rendering; None as by default.
 
     Raises:
         InputError: The folder, the tree or the scene is no good.
@@ -46,7 +54,9 @@ def run_into(
         runner = Runner(tree, scene, engines)
     try:
         with progress("running", None):
-            result, files = write_run(folder, runner, seed, scenario=name, no_video=why or NO_VIDEO)
+            result, files = write_run(
+                folder, runner, seed, scenario=name, film=film, no_video=why or NO_VIDEO
+            )
     finally:
         runner.pipeline.close()
     for remark in files.remarks:

@@ -222,11 +222,20 @@ class RenderingEngine(Engine):
         """Prepare for an episode; by default nothing to do."""
 
     @abstractmethod
-    def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
+    def render(
+        self, state: WorldState, camera: str, *, depth: bool = False, size: tuple[int, int] | None = None
+    ) -> Image:
         """What the named camera sees now.
 
+        Args:
+            state: Unbatched.
+            camera: Its name.
+            depth: Fetch the depth image, too.
+            size: Width and height in pixels, with the same opening angle from top to bottom; None for the
+                camera's own.
+
         Raises:
-            InputError: There is no such camera.
+            InputError: There is no such camera, or it has no pictures of this size.
         """
 
 

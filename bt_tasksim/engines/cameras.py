@@ -14,6 +14,23 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.images import CameraModel
 
+LARGEST = 8192
+"""Most pixels of a picture from side to side, and from top to bottom."""
+
+
+def check_size(size: tuple[int, int], owner: str) -> None:
+    """Width and height of a picture that can be made.
+
+    Args:
+        size: In pixels.
+        owner: What it belongs to, for the error's sentence.
+
+    Raises:
+        InputError: It cannot.
+    """
+    if not all(1 <= side <= LARGEST for side in size):
+        raise InputError(f"{owner}: {size[0]}x{size[1]} pixels; from 1x1 to {LARGEST}x{LARGEST} are possible")
+
 
 @dataclass(frozen=True)
 class CameraSpec:
@@ -53,10 +70,9 @@ class CameraSpec:
         except (KeyError, TypeError, ValueError) as error:
             reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
             raise InputError(f"{owner}: {reason}") from error
-        if not (1 <= width <= 8192 and 1 <= height <= 8192 and 0 < angle < math.pi):
-            raise InputError(
-                f"{owner}: a camera of {width}x{height} pixels and {math.degrees(angle):g} degrees"
-            )
+        check_size((width, height), owner)
+        if not 0 < angle < math.pi:
+            raise InputError(f"{owner}: a camera that opens {math.degrees(angle):g} degrees")
         if math.dist((px, py, pz), (tx, ty, tz)) < 1e-6:
             raise InputError(f"{owner}: it looks at the point where it stands")
         return cls((px, py, pz), (tx, ty, tz), (width, height), angle)

@@ -101,15 +101,18 @@ class EnginePipeline:
         """Why perception has never seen an object, one sentence each, by the object's name."""
         return dict(self.postprocess.unseen())
 
-    def render(self, camera: str, *, depth: bool = False) -> Image:
-        """A picture for a recording.
+    def render(self, camera: str, *, depth: bool = False, size: tuple[int, int] | None = None) -> Image:
+        """A picture for a recording, see `RenderingEngine.render`.
 
         Raises:
+            InputError: There is no such camera, or it has no pictures of this size.
             RuntimeError: There is no rendering engine or no episode.
         """
         if self.rendering is None or self.state is None:
             raise RuntimeError("nothing can be drawn: the pipeline has no rendering engine or was not reset")
-        return self.rendering.render(self.state, camera, depth=depth)
+        if size is None:  # engines that know no sizes are engines, too
+            return self.rendering.render(self.state, camera, depth=depth)
+        return self.rendering.render(self.state, camera, depth=depth, size=size)
 
     @property
     def real(self) -> bool:

@@ -14,7 +14,7 @@ from bt_tasksim.core.files import check_folder, check_writable, write_bytes
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import Runner
-from bt_tasksim.report.video import VideoRecorder
+from bt_tasksim.report.video import Film, VideoRecorder
 from bt_tasksim.report.write import FILES, VIDEO, write_run
 from bt_tasksim.scene.scene import Scene
 
@@ -28,6 +28,7 @@ def run(
     *,
     video: str | Path | bool | None = None,
     out: str | Path | None = None,
+    film: Film | None = None,
     options: EngineOptions | None = None,
     **engines: Any,
 ) -> Result:
@@ -41,6 +42,7 @@ def run(
         out: Folder that keeps the run, as ``bt-tasksim run --out`` does: result, log, picture of the tree and
             report, all of them or none. An earlier run's folder is replaced, any other that is not empty is
             refused. None: nothing is kept.
+        film: How a video is made: camera, size, frames a second.
         options: Which engines; or name them by keyword, such as ``noise="none"``, ``perception="camera"``.
         **engines: See `EngineOptions`.
 
@@ -52,15 +54,15 @@ def run(
         MachineError: An engine failed, the machine cannot film, or the disk is full or not writable.
         KeyboardInterrupt: The run was interrupted; the folder, if any, holds what was run until then.
     """
-    film = None if isinstance(video, bool) or video is None else Path(video)
+    film, path = film or Film(), None if isinstance(video, bool) or video is None else Path(video)
     if video is True and out is None:
         raise InputError("video=True films into the run's folder: give out=FOLDER, or video='run.mp4'")
-    recorder = None if film is None else VideoRecorder(film)
-    if film is not None:
-        check_writable(film)
+    recorder = None if path is None else VideoRecorder(path, film.camera, size=film.size, every=film.every)
+    if path is not None:
+        check_writable(path)
     if out is not None:
         check_folder(out, FILES)
-    filmed = film is not None or video is True
+    filmed = path is not None or video is True
     if options is None:
         options = EngineOptions(**({"rendering": filmed} | engines))
     elif engines:
@@ -70,7 +72,7 @@ def run(
     runner = Runner(tree, scene, options)
     try:
         if out is not None:
-            return _kept(Path(out), runner, seed, film)
+            return _kept(Path(out), runner, seed, path, film)
         if recorder is None:
             return runner.run(seed)
         with recorder:
@@ -79,13 +81,13 @@ def run(
         runner.pipeline.close()
 
 
-def _kept(folder: Path, runner: Runner, seed: int, film: Path | None) -> Result:
+def _kept(folder: Path, runner: Runner, seed: int, video: Path | None, film: Film) -> Result:
     """A run whose folder is written, and whose video lies in another place too."""
-    result, files = write_run(folder, runner, seed)
+    result, files = write_run(folder, runner, seed, film=film)
     for remark in files.remarks:
         _log.warning(remark)
-    if film is not None:
+    if video is not None:
         if VIDEO not in files.paths:
-            raise MachineError(f"there is no video for '{film}'; the rest of the run is in '{folder}'")
-        write_bytes(film, files.paths[VIDEO].read_bytes())
+            raise MachineError(f"there is no video for '{video}'; the rest of the run is in '{folder}'")
+        write_bytes(video, files.paths[VIDEO].read_bytes())
     return result

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import subprocess
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any
@@ -12,7 +13,42 @@ from typing import IO, Any
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.files import whole_file
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.cameras import check_size
 from bt_tasksim.execution.runner import Step
+from bt_tasksim.scene.configuration import ActorConfiguration
+
+LEAST_FPS, MOST_FPS = 0.1, 1000.0
+
+
+@dataclass(frozen=True)
+class Film:
+    """How a run is filmed.
+
+    Attributes:
+        camera: Name of the camera.
+        size: Width and height in pixels; None for the camera's own.
+        fps: Frames a second; at most one a tick is drawn, 20 a second.
+
+    Raises:
+        InputError: A number makes no sense.
+    """
+
+    camera: str = "overview"
+    size: tuple[int, int] | None = None
+    fps: float = 10.0
+
+    def __post_init__(self) -> None:
+        if self.size is not None:
+            check_size(self.size, "a video")
+        if not LEAST_FPS <= self.fps <= MOST_FPS:
+            raise InputError(
+                f"a video of {self.fps:g} frames a second; from {LEAST_FPS:g} to {MOST_FPS:g} are possible"
+            )
+
+    @property
+    def every(self) -> int:
+        """Draw every so many ticks."""
+        return max(1, round(ActorConfiguration.control_frequency / self.fps))
 
 
 class VideoRecorder:
@@ -23,6 +59,7 @@ class VideoRecorder:
     Args:
         path: The file to write, ``.mp4``.
         camera: Name of the camera.
+        size: Width and height of the pictures in pixels; None for the camera's own.
         every: Draw every so many ticks; 2 takes half the time.
         fps: Frames a second, if not in real time.
         quality: Constant rate factor of H.264: 0 is without loss, 51 the coarsest.
@@ -37,6 +74,7 @@ class VideoRecorder:
         path: str | Path,
         camera: str = "overview",
         *,
+        size: tuple[int, int] | None = None,
         every: int = 1,
         fps: float | None = None,
         quality: int = 23,
@@ -48,7 +86,7 @@ class VideoRecorder:
             raise InputError(
                 f"a video of every {every} ticks, {fps} frames a second and quality {quality} cannot be made"
             )
-        self.camera, self.every, self.fps, self.quality = camera, every, fps, quality
+        self.camera, self.size, self.every, self.fps, self.quality = camera, size, every, fps, quality
         self.frames = 0
         self._executable = _encoder()
         self._files = contextlib.ExitStack()
@@ -76,7 +114,7 @@ class VideoRecorder:
         self._ticks += 1
         if (self._ticks - 1) % self.every:
             return
-        frame = step.pipeline.render(self.camera).colour
+        frame = step.pipeline.render(self.camera, size=self.size).colour
         time = float(step.observation.time)
         if self._process is None:
             if self._first is None:  # the second frame tells how long the first one is shown

@@ -20,7 +20,7 @@ from bt_tasksim.execution.run_log import RunRecorder, about
 from bt_tasksim.execution.runner import Runner, Step
 from bt_tasksim.report.report import NO_VIDEO, write_report
 from bt_tasksim.report.tree_picture import tree_svg
-from bt_tasksim.report.video import VideoRecorder
+from bt_tasksim.report.video import Film, VideoRecorder
 from bt_tasksim.scene.scene import Scene
 
 RESULT, LOG, TREE, VIDEO, REPORT = "result.json", "run.h5", "tree.svg", "run.mp4", "report.html"
@@ -52,7 +52,7 @@ def write_run(
     *,
     scenario: str = "",
     stream: str = "evaluation",
-    every: int = 2,
+    film: Film | None = None,
     no_video: str = NO_VIDEO,
     watch: Callable[[Step], None] | None = None,
 ) -> tuple[Result, RunFiles]:
@@ -64,7 +64,7 @@ def write_run(
         seed: Seed of the draw.
         scenario: What is run: a scenario's name or the tree's file.
         stream: Stream of draws.
-        every: Draw every so many ticks.
+        film: How it is filmed, where the runner's options say rendering; None as by default.
         no_video: One sentence for the report where the run is not filmed: why.
         watch: Called after every tick, to show progress.
 
@@ -77,13 +77,14 @@ def write_run(
         KeyboardInterrupt: The run was interrupted; the folder holds what was run until then.
     """
     with whole_folder(folder, FILES) as inside:
-        recorder, film = RunRecorder(runner, scenario), None
+        recorder, camera = RunRecorder(runner, scenario), None
         if runner.options.rendering:
+            how = film or Film()
             try:
-                film = VideoRecorder(inside / VIDEO, every=every)
+                camera = VideoRecorder(inside / VIDEO, how.camera, size=how.size, every=how.every)
             except MachineError as error:
                 no_video = f"No video: {error}."
-        callbacks = [c for c in (recorder, film, watch) if c is not None]
+        callbacks = [c for c in (recorder, camera, watch) if c is not None]
 
         def record(step: Step) -> None:
             for callback in callbacks:
@@ -91,14 +92,14 @@ def write_run(
 
         interrupt: KeyboardInterrupt | None = None
         try:
-            with contextlib.nullcontext() if film is None else film:
+            with contextlib.nullcontext() if camera is None else camera:
                 result = runner.run(seed, stream, record)
         except KeyboardInterrupt as stop:
             if len(recorder) < LEAST:
                 raise
-            interrupt, film, no_video = stop, None, "No video: the run was interrupted."
+            interrupt, camera, no_video = stop, None, "No video: the run was interrupted."
             result = runner.interrupted(len(recorder) - 1)
-        remarks = _fill(inside, result, recorder, film, no_video)
+        remarks = _fill(inside, result, recorder, camera, no_video)
     if interrupt is not None:
         said = f"{interrupt}; " if str(interrupt) else ""
         raise type(interrupt)(f"{said}what was run is in {folder}") from interrupt

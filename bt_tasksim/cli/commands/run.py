@@ -9,6 +9,7 @@ import typer
 
 from bt_tasksim.cli.arguments import Seed
 from bt_tasksim.cli.options.engines import EngineFlags, policies
+from bt_tasksim.cli.options.film import FilmFlags
 from bt_tasksim.cli.options.tree import TreeOptions
 from bt_tasksim.core.registry import register
 
@@ -17,14 +18,12 @@ from bt_tasksim.core.registry import register
 def run(
     tree: TreeOptions,
     engines: EngineFlags,
+    film: FilmFlags,
     seed: Seed = 0,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write result, log, pictures and report to this folder."),
     ] = None,
-    video: Annotated[
-        bool, typer.Option("--video", help="Record a video: run.mp4, and in the report.")
-    ] = False,
     real_time: Annotated[
         bool, typer.Option("--real-time", help="Keep the control rate in simulation, too.")
     ] = False,
@@ -33,12 +32,12 @@ def run(
     from bt_tasksim.cli.running import run_into
 
     source = tree.load(policies(engines.policy))
-    options = engines.options(rendering=video, real_time=real_time)
+    options = engines.options(rendering=film.video, real_time=real_time)
     parts = [source.name, Path(source.scene.robot).stem, str(seed)]
     if options.perception != "state":
         parts.insert(2, options.perception.partition(":")[0])
     folder = out or Path("runs") / "-".join(parts)
-    result = run_into(folder, source.build(), source.scene, seed, options, source.name)
+    result = run_into(folder, source.build(), source.scene, seed, options, source.name, film.film())
     if result.timing is not None:
         print(result.timing)
     return 0 if result.success else 1

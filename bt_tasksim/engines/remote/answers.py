@@ -12,6 +12,7 @@ from bt_tasksim.engines.base import (
     PostProcessEngine,
     RenderingEngine,
 )
+from bt_tasksim.engines.cameras import check_size
 from bt_tasksim.engines.remote.bundles import arrays_of, bundle_of
 from bt_tasksim.engines.remote.messages import Message
 from bt_tasksim.robot.description import RobotDescription
@@ -76,8 +77,11 @@ def _physics(engine: PhysicsEngine) -> Answers:
 
 def _rendering(engine: RenderingEngine) -> Answers:
     def render(request: Message) -> Message:
-        state, camera = bundle_of(WorldState, request.arrays), request.fields["camera"]
-        image = engine.render(state, camera, depth=request.fields["depth"])
+        state, fields = bundle_of(WorldState, request.arrays), request.fields
+        size = (fields["width"], fields["height"]) if fields["width"] or fields["height"] else None
+        if size is not None:
+            check_size(size, "the picture that is asked for")
+        image = engine.render(state, fields["camera"], depth=fields["depth"], size=size)
         return Message(0, "image", images=(image,))
 
     return {"render": render}

@@ -157,7 +157,9 @@ class RemoteRendering(RemoteEngine, RenderingEngine):
         """See `RenderingEngine.reset`."""
         self._begin(configuration, "done")
 
-    def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
+    def render(
+        self, state: WorldState, camera: str, *, depth: bool = False, size: tuple[int, int] | None = None
+    ) -> Image:
         """See `RenderingEngine.render`.
 
         Raises:
@@ -165,7 +167,8 @@ class RemoteRendering(RemoteEngine, RenderingEngine):
             MachineError: The engine raised it.
             LostEngine: The server has gone, is too slow or answers nonsense.
         """
-        fields = {"camera": camera, "depth": depth}
+        width, height = size or (0, 0)
+        fields = {"camera": camera, "depth": depth, "width": width, "height": height}
         reply = self._ask("render", "image", slow=True, fields=fields, arrays=arrays_of(state))
         image: Image = reply.images[0]
         return image

@@ -112,7 +112,7 @@ REQUESTS: Mapping[str, MessageSpec] = {
     "hidden": MessageSpec(),
     "solve": MessageSpec(arrays={**_STATE, **_COMMAND}),
     "hand_start": MessageSpec(arrays={"start": ArraySpec((4,))}),
-    "render": MessageSpec({"camera": str, "depth": bool}, _STATE),
+    "render": MessageSpec({"camera": str, "depth": bool, "width": int, "height": int}, _STATE),
     "cameras": MessageSpec({"first": bool}),
     "observe": MessageSpec(arrays=_STATE, images=True),
 }

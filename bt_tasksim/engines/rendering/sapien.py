@@ -7,6 +7,7 @@ stand before it.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Mapping
 from typing import Any, Self
 
@@ -28,6 +29,8 @@ from bt_tasksim.scene import meshes
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 
 ALIASES = {"perception": "scene"}
+Size = tuple[int, int] | None
+"""Width and height in pixels; None for the camera's own."""
 _FLOOR = -0.75
 _MAT = 0.0005
 _NEAR, _FAR = 0.02, 20.0
@@ -67,7 +70,7 @@ class SapienRendering(RenderingEngine):
         self._sapien, self._render = sapien, render
         self._own = dict(cameras or {})
         self._specs: dict[str, CameraSpec] = {}
-        self._cameras: dict[str, tuple[CameraSpec, CameraModel, Any, Any]] = {}
+        self._cameras: dict[tuple[str, Size], tuple[CameraSpec, CameraModel, Any, Any]] = {}
         self._robot: RobotDescription | None = None
         self._kinematics: PinocchioKinematics | None = None
         self._links: dict[str, Any] = {}
@@ -115,13 +118,16 @@ class SapienRendering(RenderingEngine):
         """
         return self._camera(name)[1]
 
-    def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
+    def render(
+        self, state: WorldState, camera: str, *, depth: bool = False, size: tuple[int, int] | None = None
+    ) -> Image:
         """What the named camera sees now.
 
         Args:
             state: Unbatched; without object poses (a real robot) objects stay where they were drawn.
             camera: Its name.
             depth: Fetch the depth image, too.
+            size: Width and height in pixels; None for the camera's own.
 
         Raises:
             InputError: There is no such camera.
@@ -129,7 +135,7 @@ class SapienRendering(RenderingEngine):
         """
         if self._kinematics is None:
             raise RuntimeError("nothing can be drawn: the rendering engine was not reset")
-        _, model, component, _ = self._camera(camera)
+        _, model, component, _ = self._camera(camera, size)
         for name, pose in self._kinematics.link_poses(state.joint_position, list(self._links)).items():
             self._links[name].set_pose(self._pose(pose))
         if state.objects is not None:
@@ -160,13 +166,14 @@ class SapienRendering(RenderingEngine):
         self._remove(list(self._links.values()))
         self._links, self._cameras, self._robot, self._kinematics, self._drawn = {}, {}, None, None, ()
 
-    def _camera(self, name: str) -> tuple[CameraSpec, CameraModel, Any, Any]:
+    def _camera(self, name: str, size: Size) -> tuple[CameraSpec, CameraModel, Any, Any]:
         name = ALIASES.get(name, name)
         specs = self._specs or {**CAMERAS, **self._own}
         spec = specs.get(name)
         if spec is None:
             raise InputError(f"unknown camera '{name}'{nearest(name, [*specs, *ALIASES])}")
-        known = self._cameras.get(name)
+        spec = spec if size is None else dataclasses.replace(spec, size=size)
+        known = self._cameras.get((name, size))
         if known is not None and known[0] == spec:
             return known
         if known is not None:
@@ -185,8 +192,8 @@ class SapienRendering(RenderingEngine):
         pose = self._pose(model.pose) * self._pose(np.array([0, 0, 0, *to_optical]))
         entity.set_pose(pose)
         self._scene.add_entity(entity)
-        self._cameras[name] = (spec, model, component, entity)
-        return self._cameras[name]
+        self._cameras[name, size] = (spec, model, component, entity)
+        return self._cameras[name, size]
 
     def _build_robot(self, robot: RobotDescription) -> None:
         specs = {

@@ -136,11 +136,13 @@ class RosCameras(RenderingEngine):
         depth = keep(pictures.depth, "depth image", messages.MILLIMETRES)
         link.subscribe(topics.depth, kind, depth, EVERY)
 
-    def render(self, state: WorldState, camera: str, *, depth: bool = False) -> Image:
+    def render(
+        self, state: WorldState, camera: str, *, depth: bool = False, size: tuple[int, int] | None = None
+    ) -> Image:
         """See `RenderingEngine.render`: the newest pair of pictures, and when it was taken.
 
         Raises:
-            InputError: There is no such camera.
+            InputError: There is no such camera, or its pictures have another size.
             MachineError: What has come is too old or cannot be read.
         """
         pictures = self._cameras.get(camera)
@@ -150,6 +152,8 @@ class RosCameras(RenderingEngine):
             )
         assert pictures.calibration is not None
         known, now = pictures.calibration, time.monotonic()
+        if size not in (None, (known.width, known.height)):
+            raise InputError(f"the pictures of camera '{camera}' have {known.width}x{known.height} pixels")
         model = CameraModel(camera, known.width, known.height, known.matrix, pictures.topics.pose)
         why = f"no colour and depth within {TOGETHER} s of each other have come"
         for (taken, colour), (other, metres) in pictures.pairs():

@@ -12,9 +12,11 @@ import typer
 
 from bt_tasksim.cli.app import NAME, application, command, summary
 from bt_tasksim.cli.options.engines import EngineFlags
+from bt_tasksim.cli.options.film import FilmFlags
 from bt_tasksim.cli.options.groups import flattened
 from bt_tasksim.cli.options.tree import TreeOptions
 from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.report.video import Film
 
 LINES = json.loads(Path(__file__).with_name("command_lines.json").read_text())
 """Command lines of README, docs and tests, and what the command line of version 0.1 made of them."""
@@ -39,6 +41,8 @@ def test_old_command_lines_mean_what_they_meant(line):
     was = LINES[line]
     if shlex.split(line)[0] == "evaluate":  # never an option of it
         was = {k: v for k, v in was.items() if k != "real_time"}
+    if line.startswith("run "):
+        was = {"video_camera": "overview", "video_size": "", "video_fps": 10.0, **was}
     if line.startswith("new "):
         was = {"like": None, **was}
     if line.startswith("decompose"):
@@ -51,6 +55,10 @@ def test_old_command_lines_mean_what_they_meant(line):
 
 def test_defaults_are_those_of_the_options_in_python():
     assert EngineFlags().options() == EngineOptions()
+
+
+def test_defaults_of_a_film_are_those_in_python():
+    assert FilmFlags().film() == Film()
 
 
 def test_a_group_of_options_is_one_argument_of_the_command():

@@ -39,7 +39,7 @@ class Engines(KinematicsEngine, PhysicsEngine, RenderingEngine, PostProcessEngin
     def hidden(self):
         return "hidden"
 
-    def render(self, state, camera, *, depth=False):
+    def render(self, state, camera, *, depth=False, size=None):
         self.calls.append(f"rendering {camera} of {state}{' with depth' if depth else ''}")
         return Image(CAMERA, np.zeros((3, 4, 3), np.uint8), None)
 

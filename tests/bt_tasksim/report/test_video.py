@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bt_tasksim.core.errors import InputError, MachineError
-from bt_tasksim.report.video import VideoRecorder
+from bt_tasksim.report.video import Film, VideoRecorder
 
 
 class Painter:
@@ -19,9 +19,9 @@ class Painter:
         self.size, self.noise, self.drawn = size, noise, 0
         self.random = np.random.default_rng(0)
 
-    def render(self, camera):
+    def render(self, camera, *, size=None):
         assert camera == "overview"
-        width, height = self.size
+        width, height = size or self.size
         colour = np.full((height, width, 3), 40, np.uint8)
         colour[:, : self.drawn + 1] = (220, 60, 30)
         if self.noise:
@@ -80,6 +80,24 @@ def test_one_frame_is_a_video(tmp_path):
 def test_fps_of_ones_own(tmp_path):
     film(tmp_path / "a.mp4", 4, fps=5)
     assert frames(tmp_path / "a.mp4")[1] == pytest.approx(5)
+
+
+def test_size_of_ones_own(tmp_path):
+    film(tmp_path / "a.mp4", 3, size=(96, 32))
+    assert frames(tmp_path / "a.mp4")[0][0].shape == (32, 96, 3)
+
+
+@pytest.mark.parametrize(("fps", "every"), [(20, 1), (100, 1), (10, 2), (5, 4), (0.1, 200)])
+def test_frames_a_second_are_those_of_ticks(fps, every):
+    assert Film(fps=fps).every == every
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"fps": 0.0}, {"fps": float("nan")}, {"size": (0, 5)}, {"size": (9000, 5)}]
+)
+def test_a_film_that_cannot_be_made(wrong):
+    with pytest.raises(InputError, match="possible"):
+        Film(**wrong)
 
 
 def test_nothing_is_left_of_an_interrupted_video(tmp_path):

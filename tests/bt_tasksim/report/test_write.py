@@ -4,6 +4,7 @@ import json
 import resource
 import signal
 
+import cv2
 import pytest
 from draws import good_seed
 
@@ -15,6 +16,7 @@ from bt_tasksim.execution.replay import replay
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report import write
 from bt_tasksim.report.report import NO_VIDEO
+from bt_tasksim.report.video import Film
 from bt_tasksim.report.write import FILES, filming_runner, write_run
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.trees import retry
@@ -151,9 +153,12 @@ def test_filmed(tmp_path):
         if why:
             pytest.skip(why)
         runner.longest = 0.5
-        _, files = write_run(tmp_path / "one", runner, 3, every=5)
+        _, files = write_run(tmp_path / "one", runner, 3, film=Film("scene", (320, 180), fps=4))
     except MachineError as error:
         pytest.skip(f"no pictures on this machine: {error}")
     assert names(files.folder) == sorted(write.FILES) and files.remarks == ()
     assert files.paths["run.mp4"].stat().st_size > 5000
+    film = cv2.VideoCapture(str(files.paths["run.mp4"]))
+    assert (film.get(cv2.CAP_PROP_FRAME_WIDTH), film.get(cv2.CAP_PROP_FRAME_HEIGHT)) == (320, 180)
+    assert film.get(cv2.CAP_PROP_FPS) == pytest.approx(4)
     assert files.paths["report.html"].stat().st_size > files.paths["run.mp4"].stat().st_size

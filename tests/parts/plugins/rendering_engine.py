@@ -17,7 +17,7 @@ class MapRendering(RenderingEngine):
     def reset(self, configuration):
         self.actors = configuration.objects
 
-    def render(self, state, camera, *, depth=False):
+    def render(self, state, camera, *, depth=False, size=None):
         colour = np.full((self.rows, self.columns, 3), 255, np.uint8)
         for actor, pose in zip(self.actors, state.objects, strict=True):
             self.paint(colour, pose[:2], max(actor.size[:2]) / 2, actor.colour)
