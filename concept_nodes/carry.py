@@ -34,7 +34,7 @@ class MoveMemory(NamedTuple):
     path: Path
 
 
-class Carry(ConceptModel):
+class Carry(ConceptModel[MoveMemory]):
     """A task in which the held ``target`` is moved along a path that `begin` plans, and must stay held."""
 
     target: str

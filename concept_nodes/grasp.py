@@ -90,7 +90,7 @@ class GraspMotion(NamedTuple):
 
 
 @register("concept")
-class Grasp(ConceptModel):
+class Grasp(ConceptModel[GraspMemory]):
     """Grasp an object (makes the hand's contacts; the object's own contact with its support is kept).
 
     The tool comes to a pose above the object (against ``approach``), straight on to the grasp pose, and the

@@ -51,7 +51,7 @@ class PlaceMemory(NamedTuple):
 
 
 @register("concept")
-class Place(ConceptModel):
+class Place(ConceptModel[PlaceMemory]):
     """Put a held object down on a place or on another object (makes contact: NC to PC).
 
     The object goes over the place's origin and down along ``direction``, slowly, and stops when the wrist

@@ -44,7 +44,7 @@ class ReleaseMemory(NamedTuple):
 
 
 @register("concept")
-class Release(ConceptModel):
+class Release(ConceptModel[ReleaseMemory]):
     """Let an object go (breaks the hand's contacts): the hand opens, then the tool draws back.
 
     Args:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Seconds
@@ -17,7 +15,7 @@ WAITED = Form("waited {waited:.2f} of {duration:g}", {"waited": SECONDS, "durati
 
 
 @register("concept")
-class Wait(ConceptModel):
+class Wait(ConceptModel[None]):
     """Hold still for a while, such as until what has fallen has come to rest.
 
     Args:
@@ -28,18 +26,18 @@ class Wait(ConceptModel):
 
     default_timeout = 3600.0
 
-    def command(self, action: Array, seen: Seen, memory: Any) -> Command:
+    def command(self, action: Array, seen: Seen, memory: None) -> Command:
         """Nothing: both parts keep their last targets."""
         return Command()
 
-    def done(self, seen: Seen, memory: Any) -> Array:
+    def done(self, seen: Seen, memory: None) -> Array:
         """The time is over."""
         return seen.elapsed >= self.duration
 
-    def necessary_cost(self, seen: Seen, memory: Any) -> Array:
+    def necessary_cost(self, seen: Seen, memory: None) -> Array:
         """Seconds that remain."""
         return self.duration - seen.elapsed
 
-    def explain(self, seen: Seen, memory: Any) -> Statement:
+    def explain(self, seen: Seen, memory: None) -> Statement:
         """How long it has waited."""
         return WAITED(waited=seen.elapsed, duration=self.duration)

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from bt_tasksim.checking.bundles import numbers
 from bt_tasksim.checking.declaration import check_declaration
 from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case, Finding
 from bt_tasksim.checking.purity import check_batches, check_beginning, check_purity
 from bt_tasksim.checking.recording import Recording, record
-from bt_tasksim.checking.situations import RecordedDecision, Situations, alike, numbers
+from bt_tasksim.checking.situations import RecordedDecision, Situations, alike
 from bt_tasksim.checking.values import check_values
 from bt_tasksim.checking.watching import check_observables, check_watching
 from bt_tasksim.concept.model import ConceptModel

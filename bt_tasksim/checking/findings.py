@@ -9,18 +9,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from bt_tasksim.checking.questions import QUESTIONS
 from bt_tasksim.checking.situations import RecordedDecision, Situation, Situations
-from bt_tasksim.concept.context import Known, Seen
+from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.model import ConceptModel
 
 ERROR, WARNING = "ERROR", "WARNING"
 FAILED: Any = object()
 """What a call gives that raised."""
-PURE = (
-    "decides", "features", "command", "programmed_motion", "done", "necessary_cost", "violated", "maintained",
-    "advance", "sufficient_cost",
-)  # fmt: skip
-"""The pure functions of a concept."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,7 +95,7 @@ class Case:
     @property
     def functions(self) -> list[str]:
         """The pure functions that the concept writes itself."""
-        written = [f for f in PURE if self.overrides(self._named(f))]
+        written = [f for f in QUESTIONS if self.overrides(self._named(f))]
         return [f for f in written if f != "maintained" or self.concept.maintains]
 
     def _named(self, function: str) -> str:
@@ -133,23 +129,7 @@ class Case:
 
     def ask(self, name: str, situation: Situation, like: Situations, seen: Seen | None = None) -> Any:
         """What a function answers; `FAILED`, and a finding, where it raises."""
-        leaf = self.leaf
-        assert leaf is not None
-        if seen is None:
-            seen = Seen(situation.observation, like.world, like.robot, situation.elapsed)
-        memory = situation.memory
-
-        def answer() -> Any:
-            if name == "sufficient_cost":
-                known = Known(situation.hidden, like.world, situation.began)
-                return leaf.sufficient_cost(known, memory)
-            if name in ("command", "advance"):
-                return getattr(leaf, name)(leaf.programmed_motion(seen, memory), seen, memory)
-            if name == "maintained":
-                return leaf.maintained(leaf.maintains[0], seen, memory)
-            return getattr(leaf, name)(seen, memory)
-
-        return self.call(name, answer)
+        return self.call(name, lambda: like.ask(name, situation, self.leaf, seen))
 
     def call(self, name: str, answer: Callable[[], Any], where: str = "") -> Any:
         """What a call gives; `FAILED`, and a finding, where it raises.

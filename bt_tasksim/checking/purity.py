@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from bt_tasksim.checking.bundles import different, frozen, mapped, numbers, parts
 from bt_tasksim.checking.findings import ERROR, FAILED, Case
-from bt_tasksim.checking.situations import Situation, Situations, different, frozen, mapped, numbers, parts
+from bt_tasksim.checking.questions import QUESTIONS
+from bt_tasksim.checking.situations import Situation, Situations
 from bt_tasksim.concept.context import Seen
 
 DATA = (bool, int, float, str, list, dict, set, np.ndarray)
@@ -136,7 +138,7 @@ def _batch(case: Case, name: str, situations: Situations) -> Any:
 
 
 def _single_is_fine(name: str, many: Any) -> bool:
-    return name in ("violated", "maintained", "decides") and parts(many) is None and numbers(many).ndim == 0
+    return QUESTIONS[name].one_for_all and parts(many) is None and numbers(many).ndim == 0
 
 
 def _part(text: str) -> str:

@@ -6,9 +6,10 @@ import abc
 import operator
 from collections.abc import Mapping, Sequence
 from functools import reduce
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, cast
 
 import numpy as np
+from typing_extensions import TypeVar
 
 from bt_tasksim.concept.contact import ContactChange
 from bt_tasksim.concept.context import Known, Seen
@@ -22,12 +23,15 @@ from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.world import Command
 from bt_tasksim.robot.description import RobotDescription
 
+MemoryT = TypeVar("MemoryT", default=Any)
 
-class ConceptFunctions(abc.ABC):
+
+class ConceptFunctions(abc.ABC, Generic[MemoryT]):
     """What a concept declares and computes; `bt_tasksim.concept.model.ConceptModel` adds its parameters.
 
     In all functions ``seen`` is a `Seen`, ``memory`` whatever `begin` and `advance` returned, and every array
-    has leading batch dimensions ``(...)``; none of them may change anything.
+    has leading batch dimensions ``(...)``; none of them may change anything. A concept says the memory's type
+    in its head, ``class Push(ConceptModel[PushMemory])``; without one it may be anything.
     """
 
     actions: ClassVar[int] = 0
@@ -87,11 +91,11 @@ class ConceptFunctions(abc.ABC):
         """Why the concept cannot start now: a registered reason, or words; None when it can."""
         return None
 
-    def begin(self, seen: Seen) -> Any:
+    def begin(self, seen: Seen) -> MemoryT:
         """The memory at the first tick: start poses, planned paths. What cannot be batched happens here."""
-        return None
+        return cast("MemoryT", None)
 
-    def advance(self, action: Array, seen: Seen, memory: Any) -> Any:
+    def advance(self, action: Array, seen: Seen, memory: MemoryT) -> MemoryT:
         """The memory for the next tick, after the action ``(..., actions)``."""
         return memory
 
@@ -100,55 +104,55 @@ class ConceptFunctions(abc.ABC):
         """Names and sizes of what `features` holds, in its order; none: the concept cannot be learned."""
         return {}
 
-    def features(self, seen: Seen, memory: Any) -> Array:
+    def features(self, seen: Seen, memory: MemoryT) -> Array:
         """What a learned policy sees: ``(..., n)``, from the declared observables only, as in `layout`."""
         raise NotImplementedError(f"{type(self).__name__} declares no features: it cannot be learned")
 
-    def decides(self, seen: Seen, memory: Any) -> Array:
+    def decides(self, seen: Seen, memory: MemoryT) -> Array:
         """Boolean ``(...)``: a learned policy is asked at this tick; else the reference motion goes on."""
         return np.True_
 
     @abc.abstractmethod
-    def command(self, action: Array, seen: Seen, memory: Any) -> Command:
+    def command(self, action: Array, seen: Seen, memory: MemoryT) -> Command:
         """The command for an action ``(..., actions)`` of offsets on the reference motion."""
 
-    def carry_out(self, action: Array, seen: Seen, memory: Any) -> tuple[Command, Any]:
+    def carry_out(self, action: Array, seen: Seen, memory: MemoryT) -> tuple[Command, MemoryT]:
         """What `command` and `advance` say, of one action; to override where both need the same numbers."""
         return self.command(action, seen, memory), self.advance(action, seen, memory)
 
-    def programmed_motion(self, seen: Seen, memory: Any) -> Array:
+    def programmed_motion(self, seen: Seen, memory: MemoryT) -> Array:
         """The programmed policy's action ``(..., actions)``; by default none: the reference motion itself."""
         return zeros(seen.tool, self.actions)
 
     @abc.abstractmethod
-    def done(self, seen: Seen, memory: Any) -> Array:
+    def done(self, seen: Seen, memory: MemoryT) -> Array:
         """The programmed policy's completion signal: boolean ``(...)``."""
 
-    def necessary_cost(self, seen: Seen, memory: Any) -> Array:
+    def necessary_cost(self, seen: Seen, memory: MemoryT) -> Array:
         """How far the observed state is from the necessary goal: ``(...)``, 0 when reached."""
         return zeros(seen.tool)
 
-    def limits(self, seen: Seen, memory: Any) -> Sequence[Limit]:
+    def limits(self, seen: Seen, memory: MemoryT) -> Sequence[Limit]:
         """What must not be exceeded (stress, crushing), each with its reason; the first exceeded is said."""
         return ()
 
-    def violated(self, seen: Seen, memory: Any) -> Array:
+    def violated(self, seen: Seen, memory: MemoryT) -> Array:
         """A limit is exceeded: boolean ``(...)``; to override where it is more than `limits` can say."""
         limits = self.limits(seen, memory)
         return reduce(operator.or_, (limit.exceeded for limit in limits)) if limits else np.False_
 
-    def maintained(self, goal: str, seen: Seen, memory: Any) -> Array:
+    def maintained(self, goal: str, seen: Seen, memory: MemoryT) -> Array:
         """A goal of `maintains` still holds: boolean ``(...)``."""
         return np.True_
 
-    def sufficient_cost(self, known: Known, memory: Any) -> Array:
+    def sufficient_cost(self, known: Known, memory: MemoryT) -> Array:
         """How far the hidden state is from the sufficient goal at the completion signal: ``(...)``.
 
         In units of what is tolerable: below 1 the goal is reached.
         """
         return zeros(known.hidden.tool_pose)
 
-    def explain(self, seen: Seen, memory: Any) -> Statement | str | None:
+    def explain(self, seen: Seen, memory: MemoryT) -> Statement | str | None:
         """Where things stand: a `Form` with its numbers, or words."""
         return None
 

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.concept.functions import ConceptFunctions
+from bt_tasksim.concept.functions import ConceptFunctions, MemoryT
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.parameters import Parameter, bind_arguments
 from bt_tasksim.core.errors import InputError, nearest
 
 
-class ConceptModel(ConceptFunctions, ConceptNode):
+class ConceptModel(ConceptFunctions[MemoryT], ConceptNode):
     """A task described well enough to learn it, or programmed where nothing is unknown.
 
     A subclass declares parameters as annotated attributes (`bt_tasksim.concept.parameters`) and overrides the

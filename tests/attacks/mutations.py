@@ -189,7 +189,7 @@ def _values(file: h5py.File, name: str, rng: Rng, bait: Bait) -> None:
     if (
         not isinstance(item, h5py.Dataset)
         or item.dtype.kind != "f"
-        or not 0 < item.size < 10**6
+        or not 0 < (item.size or 0) < 10**6  # none: a data set of no space
         or item.external
         or item.is_virtual
     ):

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from bt_tasksim.checking.situations import Situations, frozen
+from bt_tasksim.checking.bundles import frozen
+from bt_tasksim.checking.situations import Situations
 from bt_tasksim.concept.model import ConceptModel
 
 TOLERANCE = 1e-9

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bt_tasksim.checking.situations import stacked
+from bt_tasksim.checking.bundles import stacked
 from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept_nodes import Grasp, grasp_features
 from bt_tasksim.concept_nodes.grasp_features import (
@@ -46,7 +46,7 @@ def test_one_by_one_and_in_batches_are_the_same(near, name):
 def test_an_action_in_batches_is_the_same_one_by_one(near):
     """With exploring actions, too: command and advance."""
     torch = pytest.importorskip("torch")
-    from bt_tasksim.checking.situations import different
+    from bt_tasksim.checking.bundles import different
 
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1.5, 1.5, (len(near), len(ACTIONS)))
