@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, Literal, Protocol, Self, TypeVar
 
+from bt_tasksim.core import child
 from bt_tasksim.core.culprit import users_place
 from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
 from bt_tasksim.core.interrupts import held_back
@@ -49,7 +50,7 @@ class Workers(Generic[StateT]):
         spawning = method == "spawn"
         self._pipes: list[Connection] = []
         self._processes: list[BaseProcess] = []
-        with one_thread_each() if spawning else contextlib.nullcontext(), held_back(spawning):
+        with begun_anew() if spawning else contextlib.nullcontext(), held_back(spawning):
             for _ in range(count):
                 mine, theirs = context.Pipe()
                 others = [] if spawning else [*self._pipes, mine]
@@ -153,11 +154,15 @@ def _sendable(error: Exception) -> Exception:
 
 
 @contextlib.contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Processes that begin in this block take one thread for linear algebra: they are the parallelism."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
+def begun_anew() -> Iterator[None]:
+    """Python processes that begin in this block find modules where this one does, and nowhere else.
+
+    They take one thread for linear algebra: they are the parallelism.
+    """
+    variables = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    variables |= child.VARIABLES
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
     try:
         yield
     finally:
