@@ -13,7 +13,8 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.core.errors import InputError, MachineError, nearest
+from bt_tasksim.core.bounded_text import read_bytes
+from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.trees.check import DEEPEST, find_problem
 from bt_tasksim.trees.leaf_ports import Leaf, Nodes, is_concept, is_reference, port_from_text
 from bt_tasksim.trees.nodes.base import NodeKind
@@ -39,8 +40,7 @@ def load_tree(path: str | Path, nodes: Nodes | None = None) -> Behaviour:
         The root; its tree has passed `check_tree`.
 
     Raises:
-        InputError: The file is missing, or holds something that is not read; the sentence says where.
-        MachineError: The file cannot be read.
+        InputError: The file cannot be read, or holds something that is not read; the sentence says where.
     """
     return load_tree_with_lines(path, nodes)[0]
 
@@ -55,15 +55,8 @@ def load_tree_with_lines(
 
     Raises:
         InputError: See `load_tree`.
-        MachineError: See `load_tree`.
     """
-    try:
-        with open(path, "rb") as file:
-            content = file.read(LARGEST + 1)
-    except (FileNotFoundError, IsADirectoryError):
-        raise InputError(f"there is no tree file '{path}'") from None
-    except OSError as error:
-        raise MachineError(f"cannot read '{path}': {error.strerror or error}") from error
+    content = _content(path)
     reader = _reader(content, nodes, str(path))
     root = reader.tree()
     return root, lambda node: f"{path}, line {reader.lines[id(node)]}: "
@@ -95,12 +88,12 @@ def scene_of_tree(path: str | Path) -> str | None:
     Raises:
         InputError: The file is missing or malformed.
     """
-    try:
-        with open(path, "rb") as file:
-            content = file.read(LARGEST + 1)
-    except OSError as error:
-        raise InputError(f"cannot read the tree file '{path}': {error.strerror or error}") from error
+    content = _content(path)
     return parse(content, str(path)).attributes.get("scene")
+
+
+def _content(path: str | Path) -> bytes:
+    return read_bytes(path, f"tree file '{path}'", LARGEST, f"there is no tree file '{path}'")
 
 
 def _reader(text: str | bytes, nodes: Nodes | None, source: str) -> _Reader:
