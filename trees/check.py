@@ -14,7 +14,7 @@ from py_trees.composites import Parallel as PyTreesParallel
 from py_trees.decorators import Decorator
 
 from bt_tasksim.concept.leaf import ConceptNode
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.errors import BtTasksimWarning, InputError
 from bt_tasksim.trees.vocabulary import kind_of
 
 DEEPEST = 200
@@ -54,6 +54,7 @@ def check_tree(root: Behaviour) -> None:
                     f"'{node.name}' is py_trees' own {clock.__name__}, which counts wall-clock time: in a "
                     f"simulation it ends late, and another time in each run; use {instead}, which counts "
                     f"episode time",
+                    BtTasksimWarning,
                     stacklevel=2,
                 )
 

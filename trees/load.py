@@ -84,7 +84,13 @@ def load_source(
         source = _from_xml(path, robot, scene)
     else:
         source = TreeSource(tree, _scenario(tree).build, _scene(scene or tree, robot))
-    check_names(_checked(source.build(), tree), source.scene)
+    if path.suffix == ".xml":
+        from bt_tasksim.trees.xml_reader import load_tree_with_lines
+
+        root, where = load_tree_with_lines(path)
+        check_names(root, source.scene, where)
+    else:
+        check_names(_checked(source.build(), tree), source.scene)
     source = replace(source, build=with_policies(source.build, policies))
     source.build()
     return source
@@ -149,8 +155,13 @@ def _built_with(build: Callable[[], Behaviour], wanted: Mapping[str, str]) -> Be
     return root
 
 
-def check_names(root: Behaviour, scene: Scene) -> None:
+def check_names(root: Behaviour, scene: Scene, where: Callable[[Behaviour], str] = lambda leaf: "") -> None:
     """Check that every object and place that the tree names is in the scene.
+
+    Args:
+        root: The tree's root.
+        scene: The scene.
+        where: Where a leaf stands, for the error's sentence.
 
     Raises:
         InputError: One is not; says which leaf names it and what there is.
@@ -168,12 +179,12 @@ def check_names(root: Behaviour, scene: Scene) -> None:
                 continue
             if parameter.quantity.kind == "object" and value not in objects:
                 raise InputError(
-                    f"leaf '{leaf.name}': no object '{value}' in the scene '{scene.name}'"
+                    f"{where(leaf)}leaf '{leaf.name}': no object '{value}' in the scene '{scene.name}'"
                     f"{nearest(value, objects)}"
                 )
             if parameter.quantity.kind == "place" and value not in places | objects:
                 raise InputError(
-                    f"leaf '{leaf.name}': no place '{value}' in the scene '{scene.name}'"
+                    f"{where(leaf)}leaf '{leaf.name}': no place '{value}' in the scene '{scene.name}'"
                     f"{nearest(value, places | objects)}"
                 )
 

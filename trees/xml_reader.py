@@ -6,14 +6,15 @@ element that uses it, and is put in place while the tree is read.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.core.errors import InputError, MachineError, nearest
+from bt_tasksim.core.bounded_text import read_bytes
+from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.trees.check import DEEPEST, find_problem
 from bt_tasksim.trees.leaf_ports import Leaf, Nodes, is_concept, is_reference, port_from_text
 from bt_tasksim.trees.nodes.base import NodeKind
@@ -39,17 +40,26 @@ def load_tree(path: str | Path, nodes: Nodes | None = None) -> Behaviour:
         The root; its tree has passed `check_tree`.
 
     Raises:
-        InputError: The file is missing, or holds something that is not read; the sentence says where.
-        MachineError: The file cannot be read.
+        InputError: The file cannot be read, or holds something that is not read; the sentence says where.
     """
-    try:
-        with open(path, "rb") as file:
-            content = file.read(LARGEST + 1)
-    except (FileNotFoundError, IsADirectoryError):
-        raise InputError(f"there is no tree file '{path}'") from None
-    except OSError as error:
-        raise MachineError(f"cannot read '{path}': {error.strerror or error}") from error
-    return tree_from_xml(content, nodes, source=str(path))
+    return load_tree_with_lines(path, nodes)[0]
+
+
+def load_tree_with_lines(
+    path: str | Path, nodes: Nodes | None = None
+) -> tuple[Behaviour, Callable[[Behaviour], str]]:
+    """Read a tree from a file, see `load_tree`.
+
+    Returns:
+        The root, and what tells where one of the tree's nodes stands: ``tree.xml, line 7: ``.
+
+    Raises:
+        InputError: See `load_tree`.
+    """
+    content = _content(path)
+    reader = _reader(content, nodes, str(path))
+    root = reader.tree()
+    return root, lambda node: f"{path}, line {reader.lines[id(node)]}: "
 
 
 def tree_from_xml(text: str | bytes, nodes: Nodes | None = None, *, source: str = "tree") -> Behaviour:
@@ -66,9 +76,7 @@ def tree_from_xml(text: str | bytes, nodes: Nodes | None = None, *, source: str 
     Raises:
         InputError: Something in it is not read; the sentence says what and on which line.
     """
-    from bt_tasksim.concept_nodes import catalogue
-
-    return _Reader(parse(text, source), {**catalogue(), **(nodes or {})}, source).tree()
+    return _reader(text, nodes, source).tree()
 
 
 def scene_of_tree(path: str | Path) -> str | None:
@@ -80,12 +88,18 @@ def scene_of_tree(path: str | Path) -> str | None:
     Raises:
         InputError: The file is missing or malformed.
     """
-    try:
-        with open(path, "rb") as file:
-            content = file.read(LARGEST + 1)
-    except OSError as error:
-        raise InputError(f"cannot read the tree file '{path}': {error.strerror or error}") from error
+    content = _content(path)
     return parse(content, str(path)).attributes.get("scene")
+
+
+def _content(path: str | Path) -> bytes:
+    return read_bytes(path, f"tree file '{path}'", LARGEST, f"there is no tree file '{path}'")
+
+
+def _reader(text: str | bytes, nodes: Nodes | None, source: str) -> _Reader:
+    from bt_tasksim.concept_nodes import catalogue
+
+    return _Reader(parse(text, source), {**catalogue(), **(nodes or {})}, source)
 
 
 @dataclass(frozen=True)
@@ -240,11 +254,20 @@ class _Reader:
                 raise self._wrong(element, f"<{name}> of BehaviorTree.CPP is outside the subset that is read")
             known = (*self.kinds, *self.nodes, "SubTree")
             hint = f'; to use the tree, write <SubTree ID="{name}"/>' if name in self.trees else None
+            hint = hint or self._in_python(name)
             own = "; a node of your own comes with --plugin FILE.py"
             raise self._wrong(element, f"unknown node '{name}'{hint or nearest(name, known) + own}")
         if explicit and tag != category:
             raise self._wrong(element, f"'{name}' is no {tag}; write <{category} ID=\"{name}\"> or <{name}>")
         return name, category
+
+    def _in_python(self, name: str) -> str | None:
+        """What a node is called here that is called so in Python, such as ``retry`` or ``Selector``."""
+        for tag, kind in self.kinds.items():
+            helper = "" if kind.helper is None else kind.helper.__name__.replace("_", "")
+            if name.replace("_", "").casefold() in (helper.casefold(), kind.behaviour.__name__.casefold()):
+                return f"; did you mean '{tag}'?"
+        return None
 
     def _category(self, name: str) -> str | None:
         if name in self.kinds:

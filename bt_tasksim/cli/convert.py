@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from bt_tasksim.core.bounded_text import read_bytes
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
 from bt_tasksim.core.former import convert
@@ -39,11 +40,6 @@ def convert_files(files: Sequence[Path], check: bool = False) -> tuple[list[str]
 
 def _text(file: Path) -> str:
     try:
-        content = file.read_bytes()
-        if len(content) > LARGEST:
-            raise InputError(f"'{file}' has {len(content)} bytes: that is no file of concepts or trees")
-        return content.decode()
-    except OSError as error:
-        raise InputError(f"'{file}' cannot be read: {error.strerror or error}") from error
+        return read_bytes(file, f"'{file}'", LARGEST).decode()
     except UnicodeDecodeError as error:
         raise InputError(f"'{file}' is not UTF-8") from error

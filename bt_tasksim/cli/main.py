@@ -1,7 +1,8 @@
 """The command ``bt-tasksim``.
 
-Bad input ends with one sentence and exit code 2, a failing machine with 1, an interrupt with 130, SIGTERM
-with 143. Everything heavy is imported by the command that needs it.
+Bad input ends with one sentence and exit code 2, and so does an exception in a plugin's code; a failing
+machine with 1, an interrupt with 130, SIGTERM with 143. Everything
+heavy is imported by the command that needs it.
 """
 
 from __future__ import annotations
@@ -9,14 +10,18 @@ from __future__ import annotations
 import logging
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 import typer
 
 from bt_tasksim.cli.app import NAME, application
 from bt_tasksim.cli.options.plugins import taken
 from bt_tasksim.cli.streams import flush_or_discard, open_missing
-from bt_tasksim.core.errors import BtTasksimError, InputError, Terminated
+from bt_tasksim.core.culprit import users_place
+from bt_tasksim.core.errors import BtTasksimError, BtTasksimWarning, InputError, Terminated
 
 COMPLETE = f"_{NAME.replace('-', '_').upper()}_COMPLETE"
 """Environment variable by which a shell asks how a word may go on."""
@@ -34,7 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     open_missing()
     logging.basicConfig(format=f"{NAME}: %(message)s", level=logging.WARNING)
     try:
-        code = _run(list(sys.argv[1:] if arguments is None else arguments))
+        with _said_once():
+            code = _run(list(sys.argv[1:] if arguments is None else arguments))
         sys.stdout.flush()
     except KeyboardInterrupt as stop:
         ended = isinstance(stop, Terminated)
@@ -54,6 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         where = f" '{error.filename}'" if error.filename else ""
         _complain(f"{NAME}: {error.strerror or error}{where}")
         return 1
+    except Exception as error:
+        if not (place := users_place(error)):
+            raise
+        _complain(f"{NAME}: {place}: {type(error).__name__}: {error}")
+        return 2
     return code
 
 
@@ -72,6 +83,25 @@ def _run(words: list[str]) -> int:
             return int(group.invoke(context) or 0)
     except typer.Exit as end:
         return end.exit_code
+
+
+@contextmanager
+def _said_once() -> Iterator[None]:
+    """Warnings of ours are sentences, each said once; those of libraries come as ever."""
+    said: set[str] = set()
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+        warnings.simplefilter("always", BtTasksimWarning)
+
+        def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+            if not issubclass(category, BtTasksimWarning):
+                shown(message, category, *where, **more)
+            elif str(message) not in said:
+                said.add(str(message))
+                _complain(f"{NAME}: {message}")
+
+        warnings.showwarning = show
+        yield
 
 
 def _complain(sentence: str) -> None:

@@ -78,6 +78,10 @@ class LeafError(BtTasksimError, RuntimeError):
     """A leaf raised an exception, which is ``__cause__`` then, or commands nonsense; the message names it."""
 
 
+class BtTasksimWarning(UserWarning):
+    """Something that works and is probably not meant so; the command line says it once, as a sentence."""
+
+
 class Terminated(KeyboardInterrupt):
     """SIGTERM or SIGHUP, where it is to end things in order as Ctrl-C does."""
 

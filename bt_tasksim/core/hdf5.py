@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bt_tasksim.core import child
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.hdf5_process import FRAME, MOST_ATTRIBUTE
 
@@ -184,7 +185,7 @@ class Reader:
             return self._process
         self.close()
         self._process = subprocess.Popen(
-            [sys.executable, "-P", str(Path(__file__).with_name("hdf5_process.py"))],
+            [sys.executable, str(Path(__file__).with_name("hdf5_process.py"))],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -192,6 +193,7 @@ class Reader:
             process_group=0,
             env={
                 **os.environ,
+                **child.VARIABLES,
                 "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
                 "OPENBLAS_NUM_THREADS": "1",
                 "HDF5_USE_FILE_LOCKING": "FALSE",

@@ -13,6 +13,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, Literal, Protocol, Self, TypeVar
 
+from bt_tasksim.core import child
+from bt_tasksim.core.culprit import users_place
 from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
 from bt_tasksim.core.interrupts import held_back
 
@@ -48,7 +50,7 @@ class Workers(Generic[StateT]):
         spawning = method == "spawn"
         self._pipes: list[Connection] = []
         self._processes: list[BaseProcess] = []
-        with one_thread_each() if spawning else contextlib.nullcontext(), held_back(spawning):
+        with begun_anew() if spawning else contextlib.nullcontext(), held_back(spawning):
             for _ in range(count):
                 mine, theirs = context.Pipe()
                 others = [] if spawning else [*self._pipes, mine]
@@ -74,6 +76,7 @@ class Workers(Generic[StateT]):
 
         Raises:
             BtTasksimError: A worker found an error; then they are good for nothing any more.
+            InputError: A user's own code raised in a worker; says where.
             MachineError: A worker ended, or something else was raised in it.
         """
         waiting = list(enumerate(tasks))[::-1]
@@ -140,6 +143,8 @@ def _serve(make: Callable[[], StateT], pipe: Connection, others: list[Connection
 
 def _sendable(error: Exception) -> Exception:
     """An error that comes through a pipe: itself where it can, else one with the same sentence."""
+    if not isinstance(error, BtTasksimError) and (place := users_place(error)):
+        return InputError(f"{place}: {type(error).__name__}: {error}")
     if not isinstance(error, BtTasksimError):
         return MachineError(f"{error!r}: {traceback.format_exc(limit=-3)}")
     try:
@@ -149,11 +154,15 @@ def _sendable(error: Exception) -> Exception:
 
 
 @contextlib.contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Processes that begin in this block take one thread for linear algebra: they are the parallelism."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
+def begun_anew() -> Iterator[None]:
+    """Python processes that begin in this block find modules where this one does, and nowhere else.
+
+    They take one thread for linear algebra: they are the parallelism.
+    """
+    variables = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    variables |= child.VARIABLES
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
     try:
         yield
     finally:

@@ -309,7 +309,8 @@ def _robot(name: str, given: Given, where: str) -> str:
         return given.robot
     if name not in parts("robot"):
         raise InputError(
-            f"{where} was run with the robot {name[:200]!r}, which is no bundled one; name it: --robot FILE"
+            f"{where} was run with the robot {name[:200]!r}, which is no bundled one; name it: --robot FILE, "
+            f"or --plugin FILE where a plugin has it"
         )
     return name
 

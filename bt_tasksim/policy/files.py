@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import safetensors.numpy
 
+from bt_tasksim.core.bounded_text import read_bytes
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.files import whole_folder, write_bytes, write_text
 from bt_tasksim.core.json_text import parse_json
@@ -27,6 +28,8 @@ VERSION = 1
 WEIGHTS, CARD = "policy.safetensors", "card.json"
 FILES = (WEIGHTS, CARD)
 """Names of the files in a policy's folder."""
+LARGEST_WEIGHTS = 64 << 20
+"""Bytes of a file of weights; the shipped ones have 30 kB."""
 CHECKPOINT = "checkpoint.safetensors"
 """Name of the file from which a training goes on, in the folder beside the policy's own."""
 
@@ -179,7 +182,8 @@ def load_policy(folder: str | Path) -> tuple[Network, PolicyCard]:
     card = load_card(folder)
     file = Path(folder) / WEIGHTS
     again = "copy the policy's folder again, or train it again"
-    content = _read(file, f"policy '{folder}' has no {WEIGHTS}; {again}")
+    missing = f"policy '{folder}' has no {WEIGHTS}; {again}"
+    content = read_bytes(file, f"weights file '{file}'", LARGEST_WEIGHTS, missing)
     found = _sha256(content)
     if found != card.weights:
         raise InputError(
@@ -209,7 +213,8 @@ def load_card(folder: str | Path) -> PolicyCard:
         what = "is a file; a policy is a folder" if folder.exists() else "does not exist; check the path"
         raise InputError(f"policy folder '{folder}' {what}")
     file = folder / CARD
-    text = _read(file, f"policy '{folder}' has no {CARD}; name a folder that training has written")
+    missing = f"policy '{folder}' has no {CARD}; name a folder that training has written"
+    text = read_bytes(file, f"card '{file}'", missing=missing)
     try:
         content = parse_json(text, f"card '{file}'")
     except InputError as error:
@@ -379,15 +384,6 @@ def _measured(entry: Any, owner: str) -> Mapping[str, Any]:
         )
     checked: Mapping[str, Any] = entry
     return checked
-
-
-def _read(file: Path, missing: str) -> bytes:
-    try:
-        return file.read_bytes()
-    except FileNotFoundError:
-        raise InputError(missing) from None
-    except OSError as error:
-        raise InputError(f"'{file}' cannot be read: {error.strerror or error}") from error
 
 
 def _short(value: Any) -> str:

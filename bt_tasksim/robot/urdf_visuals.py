@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,7 +12,11 @@ import numpy as np
 from defusedxml.ElementTree import parse
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.bounded_text import read_bytes
 from bt_tasksim.core.errors import InputError
+
+LARGEST_URDF = 16 << 20
+"""Bytes of a URDF."""
 
 Colour = tuple[float, float, float]
 
@@ -64,9 +69,12 @@ def read_urdf(urdf: Path) -> ElementTree.Element:
         InputError: The file cannot be read as XML.
     """
     try:
-        root = parse(urdf).getroot()
+        content = read_bytes(urdf, f"URDF '{urdf}'", LARGEST_URDF)
+        root = parse(io.BytesIO(content)).getroot()
         assert root is not None
-    except (ElementTree.ParseError, OSError, ValueError) as error:
+    except (ElementTree.ParseError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"URDF '{urdf}' cannot be read: {error}") from error
     return root
 

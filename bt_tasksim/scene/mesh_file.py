@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.errors import BtTasksimWarning, InputError, MachineError
 from bt_tasksim.core.files import file_version
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.geometry import ConvexPiece, Piece, Shape
@@ -65,7 +65,7 @@ def mesh_shape(path: str, size: tuple[float, float, float]) -> Shape:
         warnings.warn(
             f"mesh '{path}' has hollows, which its convex hull fills ({hulls / mass.volume - 1:.0%} more "
             f"volume): to keep them, save it as several separate closed convex bodies in one file",
-            UserWarning,
+            BtTasksimWarning,
             stacklevel=2,
         )
     return Shape(size, tuple(pieces), lambda: visual, lambda: mass, _box_surface(size))

@@ -289,7 +289,7 @@ def test_deep_files_are_refused_without_recursion():
 def test_large_files_are_refused(tmp_path):
     path = tmp_path / "large.xml"
     path.write_bytes(b" " * (LARGEST + 10))
-    with pytest.raises(InputError, match=r"2.0 MB, at most 2 MB are read"):
+    with pytest.raises(InputError, match="is larger than"):
         trees.load_tree(path)
 
 
@@ -307,7 +307,7 @@ def test_subtrees_that_multiply_are_refused_soon():
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="there is no tree file"):
         trees.load_tree(tmp_path / "nowhere.xml")
-    with pytest.raises(InputError, match="there is no tree file"):
+    with pytest.raises(InputError, match="not an ordinary file"):
         trees.load_tree(tmp_path)
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bt_tasksim.cli.options import completion
 from bt_tasksim.cli.options.engines import Policy, policies
 from bt_tasksim.cli.progress import progress
 from bt_tasksim.core.registry import register
@@ -21,10 +22,16 @@ def replay(
             metavar="TREE",
             help="The run's tree, where the log cannot hold it: a scenario, a .py file with build(), or an "
             ".xml file.",
+            autocompletion=completion.trees,
         ),
     ] = None,
     robot: Annotated[
-        str | None, typer.Option(metavar="R", help="The run's robot, if it is not a bundled one.")
+        str | None,
+        typer.Option(
+            metavar="R",
+            help="The run's robot, if it is not a bundled one.",
+            autocompletion=completion.robots,
+        ),
     ] = None,
     policy: Policy = [],  # noqa: B006  # Typer's way
     objects: Annotated[

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bt_tasksim.cli.options import completion
+
 if TYPE_CHECKING:
     from bt_tasksim.trees.load import TreeSource
 
@@ -17,14 +19,28 @@ class TreeOptions:
     """A tree by name, and what it runs in where that is not its own."""
 
     tree: Annotated[
-        str, typer.Argument(metavar="TREE", help="A scenario, a .py file with build(), or an .xml file.")
+        str,
+        typer.Argument(
+            metavar="TREE",
+            help="A scenario, a .py file with build(), or an .xml file.",
+            autocompletion=completion.trees,
+        ),
     ]
     scene: Annotated[
         str | None,
-        typer.Option(metavar="S", help="A scenario's scene or a .yaml file, if not the tree's own."),
+        typer.Option(
+            metavar="S",
+            help="A scenario's scene or a .yaml file, if not the tree's own.",
+            autocompletion=completion.scenes,
+        ),
     ] = None
     robot: Annotated[
-        str | None, typer.Option(metavar="R", help="panda, xarm7_ability, ... or a .yaml file.")
+        str | None,
+        typer.Option(
+            metavar="R",
+            help="panda, xarm7_ability, ... or a .yaml file.",
+            autocompletion=completion.robots,
+        ),
     ] = None
     nodes: Annotated[str | None, typer.Option(metavar="F.py", hidden=True, help="As --plugin.")] = None
 

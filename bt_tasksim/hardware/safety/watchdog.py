@@ -12,6 +12,7 @@ import sys
 import time
 from dataclasses import asdict
 
+from bt_tasksim.core import child
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.hardware.safety.engine import ChannelSpec
 from bt_tasksim.hardware.safety.watchdog_process import DONE, ECHO, HEARTBEAT, HOLD, RECORD
@@ -40,7 +41,7 @@ class Watchdog:
             stdout=subprocess.PIPE,
             bufsize=0,
             start_new_session=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+            env={**os.environ, **child.VARIABLES, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
         )
         assert self._process.stdin is not None and self._process.stdout is not None
         self._in, self._out = self._process.stdin.fileno(), self._process.stdout.fileno()

@@ -8,6 +8,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
+from bt_tasksim.core import child
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.resources import HOME
 
@@ -65,6 +66,7 @@ def ros_variables(domain: int) -> dict[str, str]:
     kept = {name: os.environ[name] for name in keep if name in os.environ}
     return {
         **kept,
+        **child.VARIABLES,
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_DOMAIN_ID": str(domain),
         "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",

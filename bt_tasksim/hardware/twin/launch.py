@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 from typing import IO, Any
 
+from bt_tasksim.core import child
 from bt_tasksim.core.document import read_document
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.interrupts import ending
@@ -187,7 +188,7 @@ class Twin:
                 *("--port", str(self.port), "--evaluation-port", str(self.evaluation_port)),
                 *("--rate", str(rate)),
             ],
-            env={**os.environ, "PYTHONPATH": str(root()), SECRET: self.secret},
+            env={**os.environ, **child.VARIABLES, "PYTHONPATH": str(root()), SECRET: self.secret},
             stdout=subprocess.PIPE,
             stderr=self._log,
             start_new_session=True,

@@ -155,3 +155,29 @@ def test_places_that_cannot_be_written_to(refused, words, sentence):
     os.mkfifo("pipe")
     assert sentence in refused(*words.split())
     assert Path("there/diary.txt").read_text() == "dear"
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [("Retry", "RetryUntilSuccessful"), ("retry", "RetryUntilSuccessful"), ("force_success", "ForceSuccess")],
+)
+def test_a_node_by_its_name_in_python_is_told_its_name_in_xml(refused, written, meant):
+    Path("a.xml").write_text(XML.format(f'<{written}><Grasp target="cup"/></{written}>', ""))
+    sentence = refused("run", "a.xml")
+    assert "line 3" in sentence and f"did you mean '{meant}'" in sentence
+
+
+@pytest.mark.parametrize("leaf", ['<Grasp target="cap"/>', '<Bring target="target" to="gaol"/>'])
+def test_an_unknown_name_in_xml_is_said_with_file_and_line(refused, leaf):
+    Path("a.xml").write_text(XML.format(f'<Sequence>\n<Grasp target="target"/>\n{leaf}\n</Sequence>', ""))
+    for command in ("run", "evaluate", "show"):
+        sentence = refused(command, "a.xml", "--scene", "pick_and_place")
+        assert sentence.startswith("a.xml, line 5: leaf '"), sentence
+
+
+def test_a_warning_is_one_sentence_said_once(call, tree_file):
+    own = "py_trees.decorators.Timeout('slow', Grasp('cup', timeout=0.5), duration=3.0)"
+    tree_file(own, "\nimport py_trees\n")
+    code, _, err = call("run", "tree.py", "--out", "here")
+    assert code == 1 and err.count("\n") == 1, err
+    assert err.startswith("bt-tasksim: 'slow' is py_trees' own Timeout") and "UserWarning" not in err

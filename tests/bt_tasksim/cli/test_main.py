@@ -47,6 +47,34 @@ def test_the_package_hands_on_its_names_without_anything_heavy():
     assert done.stdout.startswith("[] ") and "'Scene'" in done.stdout and "'run'" in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        ("run pick_and_t", ["pick_and_throw"]),
+        ("replay r --tree pick_and_t", ["pick_and_throw"]),
+        ("show t.xml --scene shelf", ["shelf_to_shelf"]),
+        ("evaluate t --robot xarm", ["xarm7_ability"]),
+    ],
+)
+def test_a_shell_asks_and_nothing_heavy_is_loaded(words, wanted):
+    heavy = set(HEAVY) - {"pydantic"}  # Typer's own, for values of options
+    code = (
+        "import atexit, sys, bt_tasksim.cli.main as c\n"
+        f"atexit.register(lambda: print([n for n in {heavy!r} if n in sys.modules], file=sys.stderr))\n"
+        "c.main([])"
+    )
+    asked = f"bt-tasksim {words}"
+    shell = {
+        "_BT_TASKSIM_COMPLETE": "complete_bash",
+        "COMP_WORDS": asked,
+        "COMP_CWORD": str(len(asked.split()) - 1),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env={**os.environ, **shell}
+    )
+    assert done.stdout.split() == wanted and done.stderr.strip() == "[]", done.stderr
+
+
 def test_without_a_command_the_help_is_shown(call):
     code, out, _ = call()
     assert code == 0

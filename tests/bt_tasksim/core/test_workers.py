@@ -108,10 +108,15 @@ class RaisingFussy:
 
 def test_what_else_is_raised_is_one_error():
     with (
-        pytest.raises(MachineError, match=r"ZeroDivisionError\('no such thing'\)"),
+        pytest.raises(InputError, match=r"^test_workers.py:\d+: ZeroDivisionError: no such thing$"),
         Workers(broken, 2) as pool,
     ):
         list(pool.each([Append(0), Append(1)]))
+    with (
+        pytest.raises(MachineError, match="AttributeError"),
+        Workers(list, 1) as pool,
+    ):  # not in a user's code
+        list(pool.each([None]))
 
 
 @METHODS
@@ -172,3 +177,28 @@ def test_spawned_ones_take_one_thread_each_and_the_parent_what_it_took():
     with Workers(partial(list), 1, "spawn") as pool:
         assert dict(pool.each([Threads()])) == {0: ["1", "1"]}
     assert threads() == before
+
+
+def test_they_find_no_modules_in_the_current_folder(tmp_path):
+    """Neither they nor what begins with the first of them: people have files of such names."""
+    here, script = tmp_path / "here", tmp_path / "script" / "own.py"
+    here.mkdir()
+    script.parent.mkdir()
+    for name in ("multiprocessing", "queue", "signal", "bt_tasksim", "trees"):
+        (here / f"{name}.py").write_text(f"open({str(here / 'ran')!r}, 'a').write({name!r})\n")
+    script.write_text(SPAWNING)
+    path = os.pathsep.join([*filter(None, sys.path), str(Path(__file__).parent)])
+    done = subprocess.run(
+        [sys.executable, str(script)], stdout=subprocess.PIPE, timeout=120.0, cwd=here,
+        env={**os.environ, "PYTHONPATH": path},
+    )  # fmt: skip
+    assert not (here / "ran").exists() and done.stdout == b"[0]\n"
+
+
+SPAWNING = """
+from bt_tasksim.core.workers import Workers
+from test_workers import Append
+if __name__ == "__main__":
+    with Workers(list, 1, "spawn") as pool:
+        print(*[kept for _, (_, kept) in pool.each([Append(0)])])
+"""

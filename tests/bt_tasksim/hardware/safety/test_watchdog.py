@@ -179,6 +179,16 @@ def test_it_loads_nothing_that_could_hang_with_the_runner():
     assert not loaded & {"numpy", "py_trees", "pinocchio", "yaml", "sapien"}
 
 
+def test_it_finds_no_modules_in_the_current_folder(tmp_path, monkeypatch, line):
+    for name in ("json", "select", "bt_tasksim"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('not mine')\n")
+    monkeypatch.chdir(tmp_path)
+    watchdog = Watchdog(line.channel, DEADLINE)
+    watchdog.hold()
+    assert "the runner asked for it" in line.heard()[0]
+    watchdog.close()
+
+
 def test_records_may_arrive_in_pieces():
     watch = Watch(0.1)
     data = RECORD.pack(HEARTBEAT, 5.0) + RECORD.pack(HEARTBEAT, 6.0)
