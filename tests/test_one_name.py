@@ -10,14 +10,10 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("bt_tasksim", "concept_nodes", "trees", "demos_decomp")
 
 ALIKE = {
-    "CameraEntry": "how a file says what the robot's own camera, and one of its topics, is",
     "Command": "what a tick asks of the robot; a command of the command line, as Typer calls it",
     "ContactReader": "the same of two simulators",
-    "JointStates": "the message, and how a file says on which topic it comes",
-    "Place": "a place of furniture; the concept that puts something there",
     "Policy": "what decides in a leaf; what a limit of a robot does, in its file",
     "Task": "what a demonstration shows; what a worker process is given to do",
-    "Tips": "the observable, and the setting of its topic",
     "World": "the same of two simulators",
 }
 """Names that several modules give, and to what."""

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bt_tasksim.core.errors import InputError
+
 if TYPE_CHECKING:
     from bt_tasksim.report.video import Film
 
@@ -40,5 +42,5 @@ def _size(text: str) -> tuple[int, int] | None:
         return None
     width, _, height = text.lower().partition("x")
     if not (width.isascii() and width.isdigit() and height.isascii() and height.isdigit()):
-        raise typer.BadParameter(f"should be like 1280x720, found '{text[:40]}'", param_hint="--video-size")
+        raise InputError(f"--video-size should be like 1280x720, found '{text[:40]}'")
     return int(width[:9]), int(height[:9])

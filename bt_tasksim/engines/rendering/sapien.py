@@ -116,7 +116,7 @@ class SapienRendering(RenderingEngine):
         Raises:
             InputError: There is no such camera.
         """
-        return self._camera(name)[1]
+        return self._camera(name, None)[1]
 
     def render(
         self, state: WorldState, camera: str, *, depth: bool = False, size: tuple[int, int] | None = None

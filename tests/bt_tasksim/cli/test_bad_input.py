@@ -27,6 +27,8 @@ def build():
         ("show pick_and_plac", "no scenario 'pick_and_plac'; did you mean 'pick_and_place'"),
         ("run pick_and_place --robot pandda", "unknown robot 'pandda'; did you mean 'panda'?"),
         ("run pick_and_place --robot gone.yaml", "gone.yaml"),
+        ("run pick_and_place --video --video-size 12", "--video-size should be like 1280x720, found '12'"),
+        ("run pick_and_place --video --video-fps nan", "nan frames a second"),
         ("run pick_and_place --engines sapiem", "unknown physics engine 'sapiem'; did you mean 'sapien'?"),
         (
             "run pick_and_place --perception camara",

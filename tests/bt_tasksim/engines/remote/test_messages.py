@@ -49,6 +49,7 @@ def messages(draw):
     plain = {
         str: st.text("abc é'", max_size=20),
         bool: st.booleans(),
+        int: st.integers(-(1 << 63), (1 << 64) - 1),
         float: NUMBERS["finite"],
         dict[str, str]: st.dictionaries(st.text("ab"), st.text("xy"), max_size=3),
         tuple[str, ...]: st.lists(st.text("ab"), max_size=3).map(tuple),

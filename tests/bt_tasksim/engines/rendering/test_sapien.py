@@ -264,7 +264,7 @@ engine = SapienRendering()
 world = here.red_world("box")
 engine.reset(world)
 find = engine._camera
-engine._camera = lambda name: (*find(name)[:2], Camera(find(name)[2]), None)
+engine._camera = lambda *which: (*find(*which)[:2], Camera(find(*which)[2]), None)
 try:
     engine.render(here.state_of(world), "scene")
 except KeyboardInterrupt:
