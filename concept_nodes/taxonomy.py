@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bt_tasksim.concept.contact import Change as Change
-from bt_tasksim.concept.contact import ContactChange, Motion
+from bt_tasksim.concept.contact import ContactChange, Freedom
 from bt_tasksim.concept.contact import ContactState as ContactState
 from bt_tasksim.core.errors import InputError, nearest
 
@@ -49,7 +49,7 @@ class ContactTask:
     """
 
     name: str
-    motion: Motion
+    motion: Freedom
     before: ContactState
     after: ContactState
 
@@ -202,7 +202,7 @@ def rotation_state(
 
 
 def tasks_between(
-    before: ContactState, after: ContactState, motion: Motion = "translation"
+    before: ContactState, after: ContactState, motion: Freedom = "translation"
 ) -> tuple[ContactTask, ...]:
     """Tasks that lead from one contact state to another.
 

@@ -17,7 +17,7 @@ from bt_tasksim.demos_decomp.log import Demonstration, Floats
 from bt_tasksim.demos_decomp.parameters import bring_parameters, grasp_parameters, straight_parameters
 from bt_tasksim.demos_decomp.remarks import Remark, RemarkKind
 from bt_tasksim.demos_decomp.segmentation import DROP, Flight, Hold, find_flights, find_holds
-from bt_tasksim.demos_decomp.signals import Motion, evenly_sampled
+from bt_tasksim.demos_decomp.signals import SmoothMotion, evenly_sampled
 from bt_tasksim.demos_decomp.support import Support, bin_under, resting_on
 
 SIDEWAYS = 0.015
@@ -65,13 +65,15 @@ def recognise(shown: Demonstration) -> tuple[list[Task], list[Remark]]:
     return tasks, remarks
 
 
-def _grasp(shown: Demonstration, motion: Motion, hold: Hold, since: int) -> Task:
+def _grasp(shown: Demonstration, motion: SmoothMotion, hold: Hold, since: int) -> Task:
     checks = list(hold.checks)
     parameters = grasp_parameters(motion, hold)
     return _task(motion, name_of(GRASPS), since, hold.first, checks, parameters)
 
 
-def _release(shown: Demonstration, motion: Motion, hold: Hold, flights: list[Flight], since: int) -> Task:
+def _release(
+    shown: Demonstration, motion: SmoothMotion, hold: Hold, flights: list[Flight], since: int
+) -> Task:
     assert hold.opening is not None
     name = hold.target
     end = min(hold.opening.last, len(motion.time) - 1)
@@ -95,7 +97,9 @@ def _release(shown: Demonstration, motion: Motion, hold: Hold, flights: list[Fli
     return _task(motion, name_of(RELEASES), since, end, checks, parameters)
 
 
-def _flight_tasks(shown: Demonstration, motion: Motion, hold: Hold, flight: Flight, since: int) -> list[Task]:
+def _flight_tasks(
+    shown: Demonstration, motion: SmoothMotion, hold: Hold, flight: Flight, since: int
+) -> list[Task]:
     """Pick, bring and place of one flight; those that took place."""
     name = hold.target
     path = motion.objects[name][flight.first : flight.last + 1, :3]
@@ -138,7 +142,7 @@ def _flight_tasks(shown: Demonstration, motion: Motion, hold: Hold, flight: Flig
     return tasks
 
 
-def _slides(motion: Motion, hold: Hold, flight: Flight) -> dict[ContactChange, tuple[Check, Remark]]:
+def _slides(motion: SmoothMotion, hold: Hold, flight: Flight) -> dict[ContactChange, tuple[Check, Remark]]:
     """Motion along the support before a pick and after a place, which these do not explain, by what they do.
 
     A short one counts for nothing: hands push what they take, and settle what they set down.
@@ -165,7 +169,7 @@ def _checks_of(slides: dict[ContactChange, tuple[Check, Remark]], does: ContactC
 
 
 def _phases(
-    shown: Demonstration, motion: Motion, hold: Hold, flight: Flight, lands: bool
+    shown: Demonstration, motion: SmoothMotion, hold: Hold, flight: Flight, lands: bool
 ) -> tuple[int, int, Check]:
     """Where pick ends and place begins on the path of a flight, and whether there is a bring between."""
     path = motion.objects[hold.target][flight.first : flight.last + 1, :3]
@@ -222,7 +226,7 @@ def _cleared(path: Floats) -> int:
 
 
 def _destination(
-    shown: Demonstration, motion: Motion, hold: Hold, flight: Flight, lands: bool
+    shown: Demonstration, motion: SmoothMotion, hold: Hold, flight: Flight, lands: bool
 ) -> Support | None:
     if lands:
         pose = _standing(motion, hold.target, flight.last, flight.rest_after)
@@ -232,7 +236,7 @@ def _destination(
     return None
 
 
-def _standing(motion: Motion, name: str, index: int, position: Floats) -> Floats:
+def _standing(motion: SmoothMotion, name: str, index: int, position: Floats) -> Floats:
     return np.concatenate([position, motion.objects[name][index, 3:]])
 
 
@@ -247,7 +251,7 @@ def _length(path: Floats) -> float:
 
 
 def _task(
-    motion: Motion,
+    motion: SmoothMotion,
     concept: str,
     first: int,
     last: int,

@@ -17,7 +17,7 @@ from bt_tasksim.demos_decomp.concepts import GRASPS, LANDS, LIFTS, RELEASES, nam
 from bt_tasksim.demos_decomp.evidence import NAMED, Check, spoken_odds
 from bt_tasksim.demos_decomp.log import Demonstration, Floats
 from bt_tasksim.demos_decomp.remarks import Remark, RemarkKind
-from bt_tasksim.demos_decomp.signals import RATE, Motion, Swing, speed, swings
+from bt_tasksim.demos_decomp.signals import RATE, SmoothMotion, Swing, speed, swings
 from bt_tasksim.demos_decomp.support import bin_under, half_height, resting_on
 
 LEAST_SWING = 0.006
@@ -83,7 +83,7 @@ class Flight:
     rest_after: Floats
 
 
-def find_holds(shown: Demonstration, motion: Motion) -> tuple[list[Hold], list[Remark]]:
+def find_holds(shown: Demonstration, motion: SmoothMotion) -> tuple[list[Hold], list[Remark]]:
     """Finds what the hand holds, and when.
 
     Args:
@@ -119,7 +119,7 @@ def find_holds(shown: Demonstration, motion: Motion) -> tuple[list[Hold], list[R
     return [replace(hold, until=limit) for hold, limit in zip(holds, limits, strict=False)], remarks
 
 
-def find_flights(shown: Demonstration, motion: Motion, hold: Hold) -> tuple[list[Flight], list[Remark]]:
+def find_flights(shown: Demonstration, motion: SmoothMotion, hold: Hold) -> tuple[list[Flight], list[Remark]]:
     """Finds when a held object is in the air.
 
     Args:
@@ -175,7 +175,7 @@ def find_flights(shown: Demonstration, motion: Motion, hold: Hold) -> tuple[list
 
 def _held(
     shown: Demonstration,
-    motion: Motion,
+    motion: SmoothMotion,
     first: int,
     last: int,
     closing: Swing | None,
@@ -221,7 +221,7 @@ def _held(
     return best, str(max(against, key=lambda check: check.probability))
 
 
-def _until_parting(motion: Motion, hold: Hold) -> Hold:
+def _until_parting(motion: SmoothMotion, hold: Hold) -> Hold:
     """The hold up to where the opening hand parts from the object, not just begins to open."""
     if hold.opening is None:
         return hold
@@ -232,7 +232,7 @@ def _until_parting(motion: Motion, hold: Hold) -> Hold:
     return replace(hold, last=hold.last + parted)
 
 
-def _without_regrips(motion: Motion, holds: Sequence[Hold]) -> list[Hold]:
+def _without_regrips(motion: SmoothMotion, holds: Sequence[Hold]) -> list[Hold]:
     """Joins holds of one object between which the hand only shifted its grip."""
     joined: list[Hold] = []
     for hold in holds:
@@ -257,13 +257,13 @@ def _without_regrips(motion: Motion, holds: Sequence[Hold]) -> list[Hold]:
     return joined
 
 
-def _rest_before(motion: Motion, hold: Hold) -> Floats:
+def _rest_before(motion: SmoothMotion, hold: Hold) -> Floats:
     end = hold.first if hold.closing else min(hold.first + 5, hold.last)
     begin = max(0, (hold.closing.first if hold.closing else hold.first) - int(0.3 * RATE))
     return np.asarray(np.median(motion.objects[hold.target][begin : end + 1, :3], axis=0))
 
 
-def _rest_after(motion: Motion, hold: Hold) -> Floats:
+def _rest_after(motion: SmoothMotion, hold: Hold) -> Floats:
     """Where the object has come to rest after the hold, or where the hold ends."""
     if hold.opening is None:
         return motion.objects[hold.target][hold.last, :3]
@@ -272,12 +272,12 @@ def _rest_after(motion: Motion, hold: Hold) -> Floats:
     return np.asarray(np.median(motion.objects[hold.target][begin : end + 1, :3], axis=0))
 
 
-def _stands_at_start(shown: Demonstration, motion: Motion, hold: Hold) -> bool:
+def _stands_at_start(shown: Demonstration, motion: SmoothMotion, hold: Hold) -> bool:
     resting = resting_on(shown, motion, hold.target, hold.first)
     return resting is not None and abs(resting.gap) < 0.012
 
 
-def _landing(shown: Demonstration, motion: Motion, hold: Hold, after: Floats) -> Check | None:
+def _landing(shown: Demonstration, motion: SmoothMotion, hold: Hold, after: Floats) -> Check | None:
     """The claim that the object was placed and not let go in the air; None while it is held."""
     if hold.opening is None:
         return None
@@ -304,7 +304,7 @@ def _landing(shown: Demonstration, motion: Motion, hold: Hold, after: Floats) ->
     return Check(f"{hold.target} falls after release, m", drop, DROP, spread, below=True, odds=odds)
 
 
-def _pauses(shown: Demonstration, motion: Motion, hold: Hold) -> list[tuple[int, int]]:
+def _pauses(shown: Demonstration, motion: SmoothMotion, hold: Hold) -> list[tuple[int, int]]:
     """Spans within a hold in which the object was put down, not let go, and lifted again."""
     track = motion.objects[hold.target]
     slow = speed(track[:, :3]) < STILL

@@ -19,7 +19,7 @@ SMOOTHING = 0.06
 
 
 @dataclass(frozen=True)
-class Motion:
+class SmoothMotion:
     """A demonstration on an even time grid, smoothed.
 
     Attributes:
@@ -51,7 +51,7 @@ class Motion:
         return int(np.clip(round((seconds - self.time[0]) * RATE), 0, len(self.time) - 1))
 
 
-def evenly_sampled(demonstration: Demonstration) -> Motion:
+def evenly_sampled(demonstration: Demonstration) -> SmoothMotion:
     """Brings a demonstration to `RATE`, fills dropped samples in and takes off tremor and noise.
 
     Args:
@@ -65,7 +65,7 @@ def evenly_sampled(demonstration: Demonstration) -> Motion:
     tracks = {name: track.pose for name, track in demonstration.objects.items()}
     rate = 1.0 / float(np.median(np.diff(time)))
     opening = np.interp(grid, time, demonstration.hand_opening)
-    return Motion(
+    return SmoothMotion(
         time=grid,
         hand=_smooth_poses(_resample(time, demonstration.hand_pose, grid)),
         opening=smooth(opening),

@@ -8,7 +8,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.demos_decomp.log import Demonstration, Floats, Surface
-from bt_tasksim.demos_decomp.signals import Motion
+from bt_tasksim.demos_decomp.signals import SmoothMotion
 
 REACH = 0.03
 """Metres by which tracking and calibration may misjudge the height of a surface under a resting object."""
@@ -47,7 +47,7 @@ def over(surface: Surface, point: Floats, margin: float = MARGIN) -> bool:
 
 
 def supports_under(
-    shown: Demonstration, motion: Motion, target: str, index: int, pose: Floats | None = None
+    shown: Demonstration, motion: SmoothMotion, target: str, index: int, pose: Floats | None = None
 ) -> list[Support]:
     """Everything known that is over or under an object's centre, smallest gap first.
 
@@ -78,7 +78,7 @@ def supports_under(
 
 
 def resting_on(
-    shown: Demonstration, motion: Motion, target: str, index: int, pose: Floats | None = None
+    shown: Demonstration, motion: SmoothMotion, target: str, index: int, pose: Floats | None = None
 ) -> Support | None:
     """The surface that carries a resting object, None where no known one is within `REACH`.
 
@@ -88,7 +88,7 @@ def resting_on(
     return near[0] if near else None
 
 
-def bin_under(shown: Demonstration, motion: Motion, target: str, index: int) -> Support | None:
+def bin_under(shown: Demonstration, motion: SmoothMotion, target: str, index: int) -> Support | None:
     """The bin over or in which an object is at a sample, None where there is none."""
     under = supports_under(shown, motion, target, index)
     return next((s for s in under if s.is_bin and s.gap > -REACH), None)

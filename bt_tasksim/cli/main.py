@@ -1,7 +1,8 @@
 """The command ``bt-tasksim``.
 
-Bad input ends with one sentence and exit code 2, a failing machine with 1, an interrupt with 130, SIGTERM
-with 143. Everything heavy is imported by the command that needs it.
+Bad input ends with one sentence and exit code 2, and so does an exception in a plugin's code; a failing
+machine with 1, an interrupt with 130, SIGTERM with 143. Everything
+heavy is imported by the command that needs it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import typer
 from bt_tasksim.cli.app import NAME, application
 from bt_tasksim.cli.options.plugins import taken
 from bt_tasksim.cli.streams import complain, flush_or_discard, open_missing, spell_out
+from bt_tasksim.core.culprit import users_place
 from bt_tasksim.core.errors import BtTasksimError, BtTasksimWarning, InputError, Terminated, is_bad_path
 
 COMPLETE = f"_{NAME.replace('-', '_').upper()}_COMPLETE"
@@ -59,6 +61,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         where = f" '{error.filename}'" if error.filename else ""
         complain(f"{NAME}: {error.strerror or error}{where}")
         return 2 if is_bad_path(error) else 1
+    except Exception as error:
+        if not (place := users_place(error)):
+            raise
+        complain(f"{NAME}: {place}: {type(error).__name__}: {error}")
+        return 2
     return code
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Literal
 
-Motion = Literal["translation", "rotation"]
+Freedom = Literal["translation", "rotation"]
 
 
 class ContactState(Enum):
@@ -45,7 +45,7 @@ class ContactChange:
 
     before: ContactState
     after: ContactState
-    motion: Motion = "translation"
+    motion: Freedom = "translation"
     to: Literal["environment", "hand"] = "environment"
 
     @property

@@ -13,9 +13,11 @@ from math import isfinite
 import numpy as np
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.core.culprit import place_of
 from bt_tasksim.core.errors import CommandConflictError, LeafError
 from bt_tasksim.core.observables import observable
 from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.core.plain import shown
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Command, Hidden, ObjectModel, Observation, PlaceModel, WorldModel
 from bt_tasksim.robot.description import RobotDescription
@@ -204,15 +206,16 @@ class Context:
 
         Raises:
             CommandConflictError: Another leaf has written the same part in this tick.
+            LeafError: A part is not a row of numbers of its length; says where the leaf's class makes it.
         """
         if command.tool is not None:
             if self._tool is not None:
                 raise _conflict("tool", self._tool[1], leaf)
-            self._tool = (command.tool, leaf)
+            self._tool = (_checked("tool", command.tool, leaf), leaf)
         if command.hand is not None:
             if self._hand is not None:
                 raise _conflict("hand", self._hand[1], leaf)
-            self._hand = (command.hand, leaf)
+            self._hand = (_checked("hand", command.hand, leaf), leaf)
 
     @property
     def tool_writer(self) -> Behaviour | None:
@@ -258,6 +261,27 @@ class Context:
         if self._world is None or self._observation is None:
             raise RuntimeError(NO_EPISODE)
         return Seen(self._observation, self._world, self.robot, np.float64(elapsed))
+
+
+WANTED = {
+    "tool": "a tool target is 7 numbers: position, then quaternion w x y z",
+    "hand": "a hand target is a row of numbers, the closure first: hand=np.array([closure])",
+}
+
+
+def _checked(part: str, value: Array, leaf: Behaviour) -> Array:
+    """A part of a command as an array ``(n,)``."""
+    if type(value) is np.ndarray and value.ndim == 1 and (part == "hand" or value.size == 7):
+        return value
+    try:
+        found = np.asarray(value, float)
+    except (TypeError, ValueError):
+        found = np.zeros(())
+    if found.ndim != 1 or (part == "tool" and found.size != 7) or not found.size:
+        place = place_of(getattr(type(leaf), "command", type(leaf)))
+        where = f" ({place})" if place else ""
+        raise LeafError(f"leaf '{leaf.name}'{where} commands {part}={shown(repr(value))}: {WANTED[part]}")
+    return found
 
 
 def _conflict(part: str, first: Behaviour, second: Behaviour) -> CommandConflictError:

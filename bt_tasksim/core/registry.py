@@ -59,6 +59,8 @@ HOMES: dict[str, tuple[str, ...]] = {
 }
 """Packages or modules of the built-in parts, by kind; reasons also stand beside the parts that give them."""
 
+OWN = "; one of your own comes with --plugin FILE"
+"""What to say besides of a part that there is not."""
 T = TypeVar("T")
 
 
@@ -117,7 +119,7 @@ def part(kind: str, name: str) -> Any:
         return table[name].value
     if name in _missing[kind]:
         raise MachineError(f"{_said(kind)} '{name}' needs what is not installed: {_missing[kind][name]}")
-    raise InputError(f"unknown {_said(kind)} '{shown(name)}'{nearest(name, table)}")
+    raise InputError(f"unknown {_said(kind)} '{shown(name)}'{nearest(name, table)}{OWN}")
 
 
 def parts(kind: str) -> dict[str, Any]:
@@ -183,6 +185,8 @@ def _add(new: Part) -> None:
     table = _table(new.kind)
     if not new.name:
         raise InputError(f"a {_said(new.kind)} from '{new.module}' has no name: register it under one")
+    if new.name not in table and not _ours(new.module):
+        _meet(new)
     old = table.get(new.name)
     if old is None or old.value is new.value or _redefined(old, new):
         table[new.name] = new
@@ -191,6 +195,18 @@ def _add(new: Part) -> None:
             f"{_said(new.kind)} '{new.name}' is there twice: in '{old.module}' and in '{new.module}'; "
             f"rename one of them"
         )
+
+
+def _ours(module: str) -> bool:
+    return module.partition(".")[0] == "bt_tasksim"
+
+
+def _meet(new: Part) -> None:
+    """Import what of ours may have the name of a part from outside, which then is the one refused."""
+    if new.kind.startswith("engine/"):  # heavy, and all of them in files that are named after them
+        _import_named(new.kind, new.name)
+    else:
+        discover(new.kind)
 
 
 def _redefined(old: Part, new: Part) -> bool:

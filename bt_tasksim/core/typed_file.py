@@ -325,12 +325,12 @@ _SAID: dict[str, Callable[[dict[str, Any]], str]] = {
 """Sentences for what pydantic says otherwise, by its types of errors."""
 
 
-def known_values(known: Callable[[], list[str]], what: str) -> AfterValidator:
-    """A check that a word is one of those known, with the nearest one where it is not."""
+def known_values(known: Callable[[], list[str]], what: str, remedy: str = "") -> AfterValidator:
+    """A check that a word is one of those known, with the nearest one, and a remedy, where it is not."""
 
     def check(value: str) -> str:
         if value not in known():
-            raise ValueError(f"unknown {what} '{shown(value)}'{nearest(value, known())}")
+            raise ValueError(f"unknown {what} '{shown(value)}'{nearest(value, known())}{remedy}")
         return value
 
     return AfterValidator(check)

@@ -14,6 +14,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, Generic, Literal, Protocol, Self, TypeVar
 
 from bt_tasksim.core import child
+from bt_tasksim.core.culprit import users_place
 from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
 from bt_tasksim.core.interrupts import held_back
 
@@ -75,6 +76,7 @@ class Workers(Generic[StateT]):
 
         Raises:
             BtTasksimError: A worker found an error; then they are good for nothing any more.
+            InputError: A user's own code raised in a worker; says where.
             MachineError: A worker ended, or something else was raised in it.
         """
         waiting = list(enumerate(tasks))[::-1]
@@ -141,6 +143,8 @@ def _serve(make: Callable[[], StateT], pipe: Connection, others: list[Connection
 
 def _sendable(error: Exception) -> Exception:
     """An error that comes through a pipe: itself where it can, else one with the same sentence."""
+    if not isinstance(error, BtTasksimError) and (place := users_place(error)):
+        return InputError(f"{place}: {type(error).__name__}: {error}")
     if not isinstance(error, BtTasksimError):
         return MachineError(f"{error!r}: {traceback.format_exc(limit=-3)}")
     try:

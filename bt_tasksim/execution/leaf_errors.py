@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sysconfig
 from collections.abc import Generator
-from pathlib import Path
-from types import FrameType, TracebackType
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import Decision
+from bt_tasksim.core.culprit import users_place
 from bt_tasksim.core.errors import BtTasksimError, LeafError
-
-_INSTALLED = tuple({sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")})
 
 
 def ticking(tree: Behaviour) -> Generator[Behaviour | Decision, None, None]:
@@ -52,7 +48,8 @@ def end_all(tree: Behaviour, culprit: Behaviour | None = None) -> None:
 def _leaf_error(error: Exception, tree: Behaviour, culprit: Behaviour | None) -> LeafError:
     """The error that names the leaf that raised and, where it is the user's own, file and line."""
     name = culprit.name if culprit is not None else tree.name
-    return LeafError(f"leaf '{name}' raised {type(error).__name__}{_place(error.__traceback__)}: {error}")
+    place = users_place(error)
+    return LeafError(f"leaf '{name}' raised {type(error).__name__}{f' in {place}' if place else ''}: {error}")
 
 
 def _raising_leaf(error: BaseException, tree: Behaviour) -> Behaviour | None:
@@ -66,20 +63,3 @@ def _raising_leaf(error: BaseException, tree: Behaviour) -> Behaviour | None:
             found = owner
         trace = trace.tb_next
     return found
-
-
-def _place(trace: TracebackType | None) -> str:
-    """`` in my_concept.py:12``, the innermost line of a file that is neither ours nor installed; or empty."""
-    found = ""
-    while trace is not None:
-        if _is_the_users(trace.tb_frame):
-            found = f" in {Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}"
-        trace = trace.tb_next
-    return found
-
-
-def _is_the_users(frame: FrameType) -> bool:
-    module, file = str(frame.f_globals.get("__name__", "")), frame.f_code.co_filename
-    if module.partition(".")[0] == "bt_tasksim" or file.startswith("<frozen"):
-        return False
-    return not file.startswith(_INSTALLED)

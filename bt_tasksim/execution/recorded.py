@@ -34,7 +34,7 @@ from bt_tasksim.policy.library import PROGRAMMED, is_bundled
 from bt_tasksim.policy.policy import concept_name
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration, Disturbance, ObjectActor
-from bt_tasksim.scene.fixtures import Box, Fixture, Place
+from bt_tasksim.scene.fixtures import Box, Fixture, FixturePlace
 from bt_tasksim.scene.specs import Goal
 from bt_tasksim.trees.load import Leaves
 from bt_tasksim.trees.walk import nodes_of
@@ -258,7 +258,7 @@ _PARTS: Mapping[type, Mapping[str, type]] = {
         "goal": Goal,
         "disturbance": Disturbance,
     },
-    Fixture: {"boxes": Box, "places": Place},
+    Fixture: {"boxes": Box, "places": FixturePlace},
 }
 """Dataclasses in fields of dataclasses, one or several."""
 
@@ -309,7 +309,8 @@ def _robot(name: str, given: Given, where: str) -> str:
         return given.robot
     if name not in parts("robot"):
         raise InputError(
-            f"{where} was run with the robot {name[:200]!r}, which is no bundled one; name it: --robot FILE"
+            f"{where} was run with the robot {name[:200]!r}, which is no bundled one; name it: --robot FILE, "
+            f"or --plugin FILE where a plugin has it"
         )
     return name
 

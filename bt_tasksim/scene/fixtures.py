@@ -47,7 +47,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Place:
+class FixturePlace:
     """A place of a fixture, in the fixture's frame; see `bt_tasksim.core.world.PlaceModel`."""
 
     name: str
@@ -75,7 +75,7 @@ class Fixture:
     name: str
     pose: tuple[float, ...]
     boxes: tuple[Box, ...]
-    places: tuple[Place, ...]
+    places: tuple[FixturePlace, ...]
 
     def __post_init__(self) -> None:
         check_name(self.name, "the name of a fixture")
@@ -136,7 +136,7 @@ class Fixture:
             for box in file.boxes
         )
         places = tuple(
-            Place(
+            FixturePlace(
                 p.name,
                 p.kind,
                 p.position,
@@ -192,3 +192,10 @@ def _load(path: Path, version: tuple[int, ...]) -> Fixture:
     from bt_tasksim.scene.fixture_schema import FixtureFile
 
     return Fixture.from_file(load_typed(FixtureFile, path, "fixture file")[0])
+
+
+def __getattr__(name: str) -> type[FixturePlace]:
+    """`FixturePlace` by its former name, which is a concept's too."""
+    if name == "Place":
+        return FixturePlace
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
-from bt_tasksim.core.registry import parts
+from bt_tasksim.core.registry import OWN, parts
 from bt_tasksim.core.typed_file import (
     Extent2,
     Model,
@@ -77,7 +77,7 @@ def _relations() -> list[str]:
     return [*parts("goal relation"), OLD_RELATION]
 
 
-Kind = Annotated[Text, known_values(lambda: list(KINDS), "kind of object")]
+Kind = Annotated[Text, known_values(lambda: list(KINDS), "kind of object", OWN)]
 
 
 class ObjectEntry(Model):
@@ -150,7 +150,7 @@ class GoalEntry(Model):
     """Name of the object."""
     place: Text
     """Name of the place."""
-    relation: Annotated[Text, known_values(_relations, "relation")] = "on"
+    relation: Annotated[Text, known_values(_relations, "relation", OWN)] = "on"
     """`on` the place's origin, `inside` it, `lifted` in the hand above where it stood, or one of yours."""
     position_tolerance: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.03
     """How far from the place's origin the object may be, m."""

@@ -38,7 +38,8 @@ class ObjectSpec:
             where the two have ranges of their own.
         mesh: Path of a mesh file, for kind ``mesh``.
         split: Which of the ten equal strips of each range of size and exponents are drawn from: ``all``,
-            ``even`` or ``odd`` ones. What is trained on even strips has never seen a value of an odd one.
+            ``even`` or ``odd`` ones. This keeps draws apart where both have the same ranges; where these
+            differ, strips overlap.
         size_error: Half width of the relative error with which the size is known beforehand.
     """
 

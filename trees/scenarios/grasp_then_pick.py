@@ -1,8 +1,9 @@
 """Grasp an object of unknown shape, size, mass and friction, and lift it: the tree a grasp is trained in.
 
-The scene itself draws what is never trained on: other kinds of objects, and of superellipsoids other sizes
-and exponents (the odd strips of their ranges). Its stages draw superellipsoids from the even strips alone,
-on the table, and on a stand to which the hand comes slanted, as to a shelf.
+The scene itself draws objects of every name, with sizes and exponents from the odd strips of their ranges.
+Its stages draw superellipsoids from the even strips alone, on the table, and on a stand to which the hand
+comes slanted, as to a shelf. Some superellipsoids are nearly boxes, cylinders and ovals, and the strips are
+those of each kind's own ranges: 42 to 45 % of the scene's draws lie inside its stages' on each axis.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import binascii
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeGuard
 
 import numpy as np
 
@@ -47,7 +47,7 @@ class JointStates:
     stamp: float
 
 
-def joint_states(message: Any) -> JointStates:
+def joint_states(message: object) -> JointStates:
     """A sensor_msgs/JointState."""
     data = _mapping(message, "joint states")
     raw = _get(data, "name", "joint states")
@@ -68,7 +68,7 @@ def joint_states(message: Any) -> JointStates:
     return JointStates(names, position, optional("velocity"), optional("effort"), stamp(data, "joint states"))
 
 
-def wrench(message: Any, frame: str) -> tuple[Array, float]:
+def wrench(message: object, frame: str) -> tuple[Array, float]:
     """A geometry_msgs/WrenchStamped: force and torque ``(6,)``, and its stamp."""
     data = _mapping(message, "wrench")
     _check_frame(data, frame, "wrench")
@@ -77,7 +77,7 @@ def wrench(message: Any, frame: str) -> tuple[Array, float]:
     return np.array(values), stamp(data, "wrench")
 
 
-def pose(message: Any, frame: str) -> tuple[Array, float]:
+def pose(message: object, frame: str) -> tuple[Array, float]:
     """A geometry_msgs/PoseStamped: a pose ``(7,)``, quaternion w x y z, and its stamp."""
     data = _mapping(message, "pose")
     _check_frame(data, frame, "pose")
@@ -91,7 +91,7 @@ def pose(message: Any, frame: str) -> tuple[Array, float]:
     return np.concatenate([place, q / length]), stamp(data, "pose")
 
 
-def flag(message: Any) -> bool:
+def flag(message: object) -> bool:
     """A std_msgs/Bool."""
     value = _get(_mapping(message, "flag"), "data", "flag")
     if not isinstance(value, bool):
@@ -99,7 +99,7 @@ def flag(message: Any) -> bool:
     return value
 
 
-def text(message: Any, longest: int = 500) -> str:
+def text(message: object, longest: int = 500) -> str:
     """A std_msgs/String of a sane length."""
     value = _get(_mapping(message, "text"), "data", "text")
     if not isinstance(value, str) or len(value) > longest:
@@ -116,27 +116,30 @@ class Calibration:
     matrix: Array
 
 
-def camera_info(message: Any) -> Calibration:
+def camera_info(message: object) -> Calibration:
     """A sensor_msgs/CameraInfo of a camera without distortion."""
     data = _mapping(message, "camera info")
-    size = [_get(data, key, "camera info") for key in ("width", "height")]
-    for value in size:
-        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_PIXELS:
-            raise UnusableMessageError(f"camera info: a size of {_shown(value)} pixels")
+    width, height = (_side(_get(data, key, "camera info")) for key in ("width", "height"))
     matrix = _finite(_get(data, "k", "camera info"), 9, "camera info: 'k'").reshape(3, 3)
     if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0 or matrix[2].tolist() != [0.0, 0.0, 1.0]:
         raise UnusableMessageError("camera info: 'k' is no intrinsic matrix")
     distortion = data.get("d") or []
     if not isinstance(distortion, list) or any(v not in (0, 0.0) for v in distortion):
         raise UnusableMessageError("camera info: the images are distorted ('d'); publish rectified ones")
-    return Calibration(size[0], size[1], matrix)
+    return Calibration(width, height, matrix)
+
+
+def _side(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_PIXELS:
+        raise UnusableMessageError(f"camera info: a size of {_shown(value)} pixels")
+    return value
 
 
 _PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff"
 
 
 def image_content(
-    message: Any, what: str, size: tuple[int, int], encodings: Sequence[str] = ()
+    message: object, what: str, size: tuple[int, int], encodings: Sequence[str] = ()
 ) -> tuple[bytes, float]:
     """A sensor_msgs/CompressedImage: the file in it, and its stamp; not yet unpacked.
 
@@ -238,7 +241,7 @@ class Point:
     time: float
 
 
-def trajectory(joints: Sequence[str], points: Sequence[Point], run: str = "") -> dict[str, Any]:
+def trajectory(joints: Sequence[str], points: Sequence[Point], run: str = "") -> dict[str, object]:
     """A trajectory_msgs/JointTrajectory that begins when it arrives; the run's name stands in its frame."""
     return {
         "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": run},
@@ -307,47 +310,51 @@ def standing(position: Array, velocity: Array, acceleration: Array, lower: Array
 # ---- reading plain data -----------------------------------------------------------------------------------
 
 
-def stamp(data: Mapping[str, Any], what: str) -> float:
+def stamp(data: Mapping[str, object], what: str) -> float:
     """Seconds of the message's header."""
     header = _mapping(_get(data, "header", what), f"{what}: 'header'")
     time = _mapping(_get(header, "stamp", what), f"{what}: 'stamp'")
     sec, nanosec = _get(time, "sec", what), _get(time, "nanosec", what)
-    for value in (sec, nanosec):
-        if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**40:
-            raise UnusableMessageError(f"{what}: a stamp of {_shown(sec)} s and {_shown(nanosec)} ns")
+    if not _is_whole(sec) or not _is_whole(nanosec):
+        raise UnusableMessageError(f"{what}: a stamp of {_shown(sec)} s and {_shown(nanosec)} ns")
     return float(sec) + 1e-9 * float(nanosec)
 
 
-def _check_frame(data: Mapping[str, Any], frame: str, what: str) -> None:
+def _is_whole(value: object) -> TypeGuard[int]:
+    """It is a whole number of a sane size."""
+    return not isinstance(value, bool) and isinstance(value, int) and abs(value) <= 2**40
+
+
+def _check_frame(data: Mapping[str, object], frame: str, what: str) -> None:
     header = _mapping(_get(data, "header", what), f"{what}: 'header'")
     if header.get("frame_id") != frame:
         raise UnusableMessageError(f"{what}: in frame {_shown(header.get('frame_id'))}, expected '{frame}'")
 
 
-def _mapping(value: Any, what: str) -> Mapping[str, Any]:
+def _mapping(value: object, what: str) -> Mapping[str, object]:
     if not isinstance(value, Mapping):
         raise UnusableMessageError(f"{what}: no message, but {_shown(value)}")
     return value
 
 
-def _get(data: Mapping[str, Any], key: str, what: str) -> Any:
+def _get(data: Mapping[str, object], key: str, what: str) -> object:
     if key not in data:
         raise UnusableMessageError(f"{what}: '{key}' is missing")
     return data[key]
 
 
-def _xyz(data: Mapping[str, Any], key: str, what: str) -> Array:
+def _xyz(data: Mapping[str, object], key: str, what: str) -> Array:
     inner = _mapping(_get(data, key, what), f"{what}: '{key}'")
     return np.array([_number(_get(inner, k, what), f"{what}: {key} {k}") for k in "xyz"])
 
 
-def _number(value: Any, what: str) -> float:
+def _number(value: object, what: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < _LARGEST:
         raise UnusableMessageError(f"{what} should be a number, found {_shown(value)}")
     return float(value)
 
 
-def _numbers(values: Any, n: int, what: str) -> Array:
+def _numbers(values: object, n: int, what: str) -> Array:
     """``(n,)``, NaN for null."""
     if not isinstance(values, list) or len(values) != n:
         found = f"{len(values)}" if isinstance(values, list) else _shown(values)
@@ -361,14 +368,14 @@ def _numbers(values: Any, n: int, what: str) -> Array:
     return out
 
 
-def _finite(values: Any, n: int, what: str) -> Array:
+def _finite(values: object, n: int, what: str) -> Array:
     array = _numbers(values, n, what)
     if not np.all(np.isfinite(array)):
         raise UnusableMessageError(f"{what} is not finite")
     return array
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     """A value in few characters."""
     if isinstance(value, str):
         return repr(value[:40])

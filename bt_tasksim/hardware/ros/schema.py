@@ -41,7 +41,7 @@ Joints = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, max_lengt
 Frame = Annotated[str, Field(min_length=1, max_length=200)]
 
 
-class JointStates(Model):
+class JointStatesEntry(Model):
     """Joint states, sensor_msgs/JointState."""
 
     topic: Topic
@@ -104,7 +104,7 @@ class StopEntry(Model):
     """Longest silence, s, after which the arm holds."""
 
 
-class CameraEntry(Model):
+class CameraTopicsEntry(Model):
     """A camera."""
 
     colour: Topic
@@ -122,7 +122,7 @@ class CellFile(Model):
 
     robot: Text
     """Name of the robot."""
-    joint_states: JointStates
+    joint_states: JointStatesEntry
     """Where its joint states come from."""
     arm: GroupEntry
     """The arm's controller."""
@@ -146,5 +146,5 @@ class CellFile(Model):
     """Topic that says hold, std_msgs/String."""
     approach: Annotated[Number, Field(gt=0.0, le=1.0)] = 0.3
     """Share of the robot's speeds with which it goes to where a run starts."""
-    cameras: Annotated[dict[Name, CameraEntry], Field(max_length=16)] | None = None
+    cameras: Annotated[dict[Name, CameraTopicsEntry], Field(max_length=16)] | None = None
     """Cameras by name."""

@@ -18,7 +18,7 @@ from bt_tasksim.core.typed_file import load_typed
 from bt_tasksim.hardware.ros.schema import (
     NAME,
     TOPIC,
-    CameraEntry,
+    CameraTopicsEntry,
     CellFile,
     GroupEntry,
     TipEffort,
@@ -56,7 +56,7 @@ class Sensor(Stamped):
 
 
 @dataclass(frozen=True)
-class Tips:
+class TipSignals:
     """What is felt at the fingertips.
 
     Attributes:
@@ -111,7 +111,7 @@ class RosSetting:
     arm: Group
     hand: Group
     wrench: Sensor
-    tips: Tips
+    tips: TipSignals
     objects: Stamped | None
     emergency_stop: str
     emergency_every: float
@@ -223,9 +223,9 @@ def _group(data: GroupEntry, what: str, own: tuple[str, ...], wire: tuple[str, .
     return Group(data.command, joints)
 
 
-def _tips(data: TipTopics | TipEffort, robot: RobotDescription) -> Tips:
+def _tips(data: TipTopics | TipEffort, robot: RobotDescription) -> TipSignals:
     if isinstance(data, TipEffort):
-        return Tips((), "", data.effort)
+        return TipSignals((), "", data.effort)
     known = [tip.name for tip in robot.tips]
     for name in data.topics:
         if name not in known:
@@ -234,10 +234,10 @@ def _tips(data: TipTopics | TipEffort, robot: RobotDescription) -> Tips:
     for name in known:
         if name not in data.topics:
             raise FieldError(f"'tips.topics.{name}' is missing", "tips", "topics")
-    return Tips(tuple(data.topics[name] for name in known), data.frame, 0.0)
+    return TipSignals(tuple(data.topics[name] for name in known), data.frame, 0.0)
 
 
-def _camera(data: CameraEntry) -> CameraTopics:
+def _camera(data: CameraTopicsEntry) -> CameraTopics:
     return CameraTopics(data.colour, data.depth, data.info, poses.unit_pose(data.pose))
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import h5py
 import pytest
 
+from bt_tasksim.cli.main import main
 from bt_tasksim.cli.options.plugins import taken
 from bt_tasksim.core import plugins
 from bt_tasksim.core.errors import InputError
@@ -111,3 +112,74 @@ def test_no_file_that_people_exchange_names_a_plugin(own, refused, call, key, po
         run["about"] = json.dumps({**about, key: "evil.py"})
     assert f"'{key}'" in refused("replay", "here")
     assert not Path("ran").exists()
+
+
+SHAPE = """
+from bt_tasksim.core.registry import register
+from bt_tasksim.scene.shape_kind import ShapeKind
+
+
+@register("shape", "%s")
+class Tube(ShapeKind):
+    def shape(self, size):
+        return nothing_of_this_name
+"""
+RANGE = "    size_range = ((0.05, 0.05, 0.05), (0.05, 0.05, 0.05))\n"
+READER = """
+from demos_decomp.readers import LogReader
+from bt_tasksim.core.registry import register
+
+
+@register("log reader", "notes")
+class Notes(LogReader):
+    title = "notes"
+
+    def recognises(self, path):
+        return path.suffix == ".notes"
+
+    def read(self, path):
+        raise ValueError("no number in line 3")
+"""
+
+
+@pytest.fixture
+def said(tmp_path, monkeypatch, capsys):
+    """What the command line says of a plugin: exit code 2, one sentence."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "room.yaml").write_text("objects: {tube: on table}\n")
+    (tmp_path / "a.notes").write_text("a")
+
+    def call(plugin: str, words: str) -> str:
+        (tmp_path / "mine.py").write_text(plugin)
+        assert main([*words.split(), "--plugin", "mine.py"]) == 2
+        sentence = capsys.readouterr().err
+        assert sentence.count("\n") == 1 and "Traceback" not in sentence
+        return sentence
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("plugin", "words", "place", "what"),
+    [
+        (SHAPE % "tube" + RANGE, "run pick_and_place --scene room.yaml", "mine.py:9", "NameError"),
+        (SHAPE % "tube", "run pick_and_place --scene room.yaml", "mine.py:", "size_range"),
+        (READER, "decompose a.notes", "mine.py:14", "ValueError: no number in line 3"),
+    ],
+    ids=["raises", "lacks an attribute", "raises as another part"],
+)
+def test_an_error_in_a_plugins_code_is_one_sentence_with_its_line(said, plugin, words, place, what):
+    sentence = said(plugin, words)
+    assert place in sentence and what in sentence
+
+
+def test_a_plugin_that_takes_a_name_of_ours_is_to_blame_and_not_the_scene(said):
+    sentence = said(SHAPE % "box" + RANGE, "run pick_and_place --scene room.yaml")
+    assert "mine.py'" in sentence and "'box' is there twice" in sentence and "room.yaml" not in sentence
+
+
+@pytest.mark.parametrize(
+    "words", ["run pick_and_place --robot robbie", "run pick_and_place --scene room.yaml"]
+)
+def test_whatever_is_unknown_may_be_in_a_plugin(said, words):
+    assert "--plugin" in said("", words)

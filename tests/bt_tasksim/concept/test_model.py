@@ -12,7 +12,7 @@ from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Metres, ObjectName
 from bt_tasksim.concept_nodes import Grasp, TimePassed, catalogue
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.errors import InputError, LeafError
 from bt_tasksim.core.outcomes import (
     CANNOT_START,
     DONE,
@@ -298,3 +298,20 @@ def test_defaults_of_the_pure_functions_have_the_batchs_shape():
         assert tuple(leaf.programmed_motion(View(tool), None).shape) == (*tool.shape[:-1], 2)
         assert tuple(leaf.necessary_cost(View(tool), None).shape) == tuple(tool.shape[:-1])
         assert type(leaf.programmed_motion(View(tool), None)) is type(tool)
+
+
+class Closing(Careful):
+    """Commands the hand."""
+
+    hand = 1.0
+
+    def command(self, action, seen, memory):
+        return Command(hand=type(self).hand)
+
+
+def test_a_hand_target_that_is_no_row_of_numbers_is_said_with_its_line(toy, monkeypatch):
+    monkeypatch.setattr(Closing, "violated", ConceptModel.violated)
+    with pytest.raises(LeafError, match=r"'closing cup' \(test_model.py:\d+\) commands hand=1.0: "):
+        toy(Closing("cup")).tick()
+    monkeypatch.setattr(Closing, "hand", [0.5])
+    assert toy(Closing("cup")).runner.tick().hand.tolist() == [0.5], "a list will do"

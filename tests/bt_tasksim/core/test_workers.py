@@ -108,10 +108,15 @@ class RaisingFussy:
 
 def test_what_else_is_raised_is_one_error():
     with (
-        pytest.raises(MachineError, match=r"ZeroDivisionError\('no such thing'\)"),
+        pytest.raises(InputError, match=r"^test_workers.py:\d+: ZeroDivisionError: no such thing$"),
         Workers(broken, 2) as pool,
     ):
         list(pool.each([Append(0), Append(1)]))
+    with (
+        pytest.raises(MachineError, match="AttributeError"),
+        Workers(list, 1) as pool,
+    ):  # not in a user's code
+        list(pool.each([None]))
 
 
 @METHODS

@@ -130,3 +130,11 @@ def test_unknown_fixtures():
         load_fixture("trashbin")
     with pytest.raises(InputError, match="no fixture file"):
         load_fixture("nowhere.yaml")
+
+
+def test_the_former_name_of_a_place_is_the_same_class():
+    from bt_tasksim.scene import fixtures
+
+    assert fixtures.Place is fixtures.FixturePlace
+    with pytest.raises(AttributeError):
+        _ = fixtures.Places

@@ -1,7 +1,7 @@
 """A fixture from outside: a pedestal of the table's height and half."""
 
 from bt_tasksim.core.registry import register
-from bt_tasksim.scene.fixtures import Box, Fixture, Place
+from bt_tasksim.scene.fixtures import Box, Fixture, FixturePlace
 
 HEIGHT = 0.12
 
@@ -11,7 +11,7 @@ register("fixture", "pedestal")(
         pose=(0.5, 0.25, 0.0, 1.0, 0.0, 0.0, 0.0),
         boxes=(Box(pose=(0, 0, HEIGHT / 2, 1, 0, 0, 0), size=(0.2, 0.2, HEIGHT)),),
         places=(
-            Place(
+            FixturePlace(
                 name="pedestal_top",
                 kind="spot",
                 position=(0, 0, HEIGHT),

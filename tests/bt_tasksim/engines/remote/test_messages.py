@@ -27,7 +27,7 @@ from bt_tasksim.engines.remote.schema import (
     layout_digest,
 )
 from bt_tasksim.scene.configuration import ActorConfiguration, Disturbance, ObjectActor
-from bt_tasksim.scene.fixtures import Box, Fixture, Place
+from bt_tasksim.scene.fixtures import Box, Fixture, FixturePlace
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import Goal
 
@@ -136,7 +136,8 @@ def test_bundles_are_what_they_were(state):
 
 
 @pytest.mark.parametrize(
-    "kind", [ActorConfiguration, ObjectActor, Disturbance, Goal, Fixture, Box, Place, PlaceModel, CameraModel]
+    "kind",
+    [ActorConfiguration, ObjectActor, Disturbance, Goal, Fixture, Box, FixturePlace, PlaceModel, CameraModel],
 )
 @pytest.mark.parametrize("change", [{"more": int}, {"name": tuple[str, ...], "pose": str, "object": int}])
 def test_a_changed_field_is_another_layout(monkeypatch, kind, change):

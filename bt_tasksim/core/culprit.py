@@ -1,0 +1,56 @@
+"""Where in a user's own code an exception comes from."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+import sysconfig
+from pathlib import Path
+from types import FrameType
+
+from bt_tasksim.core.plugins import loaded
+
+_INSTALLED = tuple({sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")})
+
+
+def users_place(error: BaseException) -> str:
+    """The line of a user's file that an exception comes from.
+
+    A file is a user's that is neither ours nor installed, or that was loaded as a plugin. Where something of
+    ours has asked a part for an attribute that it lacks, it is the line of the part's class.
+
+    Returns:
+        ``my_concept.py:12``, the innermost such line; empty where there is none.
+    """
+    found, trace = "", error.__traceback__
+    while trace is not None:
+        if _is_the_users(trace.tb_frame):
+            found = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}"
+        trace = trace.tb_next
+    return found or (_class_without(error) if isinstance(error, AttributeError) else "")
+
+
+def place_of(definition: object) -> str:
+    """``my_concept.py:12``, where a class or a function is defined; empty where that is not known."""
+    try:
+        file, line = inspect.getsourcefile(definition), inspect.getsourcelines(definition)[1]  # type: ignore[arg-type]
+    except (OSError, TypeError):
+        return ""
+    return f"{Path(file).name}:{line}" if file is not None else ""
+
+
+def _class_without(error: AttributeError) -> str:
+    owner = error.obj if inspect.isclass(error.obj) else type(error.obj)
+    module = sys.modules.get(owner.__module__)
+    file = getattr(module, "__file__", None) or ""
+    return place_of(owner) if file and _is_a_users(owner.__module__, file) else ""
+
+
+def _is_the_users(frame: FrameType) -> bool:
+    return _is_a_users(str(frame.f_globals.get("__name__", "")), frame.f_code.co_filename)
+
+
+def _is_a_users(module: str, file: str) -> bool:
+    if module.partition(".")[0] == "bt_tasksim" or file.startswith("<frozen"):
+        return False
+    return not file.startswith(_INSTALLED) or bool({module, str(Path(file).resolve())} & set(loaded()))

@@ -1,0 +1,41 @@
+"""One name for one thing: no two public classes or types of the same name in different modules."""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("bt_tasksim", "concept_nodes", "trees", "demos_decomp")
+
+ALIKE = {
+    "CameraEntry": "how a file says what the robot's own camera, and one of its topics, is",
+    "Command": "what a tick asks of the robot; a command of the command line, as Typer calls it",
+    "ContactReader": "the same of two simulators",
+    "JointStates": "the message, and how a file says on which topic it comes",
+    "Place": "a place of furniture; the concept that puts something there",
+    "Policy": "what decides in a leaf; what a limit of a robot does, in its file",
+    "Task": "what a demonstration shows; what a worker process is given to do",
+    "Tips": "the observable, and the setting of its topic",
+    "World": "the same of two simulators",
+}
+"""Names that several modules give, and to what."""
+
+
+def test_one_name_is_given_to_one_thing():
+    given: defaultdict[str, set[str]] = defaultdict(set)
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.parse(path.read_text(encoding="utf-8")).body:
+                if isinstance(node, ast.ClassDef):
+                    given[node.name].add(str(path.resolve()))
+                elif isinstance(node, ast.Assign) and _is_literal(node.value):
+                    given[ast.unparse(node.targets[0])].add(str(path.resolve()))
+    twice = {name: sorted(paths) for name, paths in given.items() if len(paths) > 1 and name[0] != "_"}
+    assert {name: paths for name, paths in twice.items() if name not in ALIKE} == {}
+    assert ALIKE.keys() <= twice.keys(), "a row too many"
+
+
+def _is_literal(value: ast.expr) -> bool:
+    return isinstance(value, ast.Subscript) and ast.unparse(value.value) == "Literal"
