@@ -70,8 +70,8 @@ def evenly_sampled(demonstration: Demonstration) -> SmoothMotion:
     count = max(2, int(np.floor((time[-1] - time[0]) * RATE + 1e-6)) + 1)
     if count * (1 + len(demonstration.objects)) > MOST_POSES:
         raise InputError(
-            f"demonstration '{demonstration.name}' lasts {time[-1] - time[0]:.0f} s, too long to look at in one "
-            f"piece with the tracks of its objects ({len(demonstration.objects)}); split the log"
+            f"demonstration '{demonstration.name}' lasts {time[-1] - time[0]:.0f} s, too long to look at in "
+            f"one piece with the tracks of its objects ({len(demonstration.objects)}); split the log"
         )
     grid = time[0] + np.arange(count) / RATE
     tracks = {name: track.pose for name, track in demonstration.objects.items()}
