@@ -11,11 +11,13 @@ import numpy as np
 
 from bt_tasksim.concept.task import Task
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.markup import html_table
 from bt_tasksim.demos_decomp.graph import build_graph, graph_to_json, in_order
 from bt_tasksim.demos_decomp.log import Demonstration, Log
+from bt_tasksim.demos_decomp.picture import picture
 from bt_tasksim.demos_decomp.recognition import recognise
 from bt_tasksim.demos_decomp.remarks import Remark, RemarkKind
-from bt_tasksim.demos_decomp.table import text_table
+from bt_tasksim.demos_decomp.table import HEADS, task_rows, text_table
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,30 @@ class Decomposition:
 
     def table(self) -> str:
         """One line per task, see `text_table`; of merged ones, with the share of demonstrations."""
+        return text_table(self.tasks, self._shares())
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the tasks as a table, what was remarked, and below them the graph's picture."""
+        rows: list[tuple[str, ...]] = [*task_rows(self.tasks)]
+        heads: tuple[str, ...] = HEADS
+        if shares := self._shares():
+            heads = (*heads, "seen in")
+            rows = [(*row, share) for row, share in zip(rows, shares, strict=True)]
+        said = [
+            (name, str(remark.kind), remark.text) for name, many in self.remarks.items() for remark in many
+        ]
+        return "\n".join(
+            [
+                html_table(heads, rows) if rows else "<p>No task was recognised.</p>",
+                *([html_table(("demonstration", "remark", "what was seen"), said)] if said else []),
+                picture(self.graph),
+            ]
+        )
+
+    def _shares(self) -> list[str] | None:
+        """In how many demonstrations each task was seen, in words; None where there is one."""
         count = len(self.demonstrations)
-        return text_table(self.tasks, [f"{n} of {count}" for n in self.seen] if count > 1 else None)
+        return [f"{n} of {count}" for n in self.seen] if count > 1 else None
 
     def not_understood(self) -> list[str]:
         """Sentences about motion that no task explains; where nothing was found, about all that was seen."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from bt_tasksim.concept.presentation import GREY
 from bt_tasksim.concept.task import plain
 from bt_tasksim.core.files import write_text
+from bt_tasksim.core.markup import escaped, wrapped
 from bt_tasksim.demos_decomp.concepts import concept_of, quantity_of
 from bt_tasksim.demos_decomp.graph import in_order
 
@@ -41,8 +41,9 @@ def picture(graph: nx.DiGraph[str], title: str = "") -> str:
     parts: list[str] = []
     heading = title or "Decomposition graph"
     size = 18 if len(heading) * _LETTER[18] < width - 2 * MARGIN else 11
-    parts.append(_text(MARGIN, 36, _cut(heading, width - 2 * MARGIN, size), size, INK, bold=True))
-    top = _lanes(graph, parts, 54, width)
+    lines = _lines(heading, width - 2 * MARGIN, size)
+    parts += [_text(MARGIN, 36 + ROW * i, line, size, INK, bold=True) for i, line in enumerate(lines)]
+    top = _lanes(graph, parts, 54 + ROW * (len(lines) - 1), width)
     y = top + 30
     boxes: dict[str, tuple[float, float, float]] = {}
     for layer in layers:
@@ -124,18 +125,19 @@ def _lanes(graph: nx.DiGraph[str], parts: list[str], y: float, width: float) -> 
         parts.append(_text(x, bottom + 18, f"{second:g} s", 11, FAINT, anchor="middle"))
     for row, name in enumerate(shown):
         at = y + row * LANE
-        label = _lane_label(name)
-        parts.append(_text(MARGIN, at + 15, label, 12, FAINT))
+        parts.append(_titled(name, _text(MARGIN, at + 15, _lane_label(name), 12, FAINT)))
         for start, end, concept in sorted(lanes[name]):
             span = max((end - start) * scale, 1.5)
             x = left + start * scale
             colour = _colour(concept)
-            parts.append(_box(x, at + 3, span - 1, LANE - 6, colour, radius=2, stroke=None))
+            bar = _box(x, at + 3, span - 1, LANE - 6, colour, radius=2, stroke=None)
+            parts.append(_titled(f"{concept}, {start:.1f} - {end:.1f} s", bar))
             if span > len(concept) * _LETTER[11] + 6:
                 parts.append(_text(x + span / 2, at + 15, concept, 11, "#ffffff", anchor="middle"))
     bottom += 22
     if len(lanes) > len(shown):
-        parts.append(_text(MARGIN, bottom + 12, f"and {len(lanes) - len(shown)} more", 11, FAINT))
+        more = _text(MARGIN, bottom + 12, f"and {len(lanes) - len(shown)} more", 11, FAINT)
+        parts.append(_titled(", ".join(list(lanes)[MOST_LANES:]), more))
         bottom += 16
     return bottom
 
@@ -151,11 +153,17 @@ def _card(graph: nx.DiGraph[str], name: str, parts: list[str], x: float, y: floa
     """Draws one task; returns the card's height."""
     node = graph.nodes[name]
     colour = _colour(node["concept"])
-    lines = _parameter_lines(node["concept"], node["parameters"], node["uncertainty"])
-    height = 62 + ROW * len(lines)
+    lines = [
+        (18 if i == 0 and line.strip() == line else 36, part)
+        for line in _parameter_lines(node["concept"], node["parameters"], node["uncertainty"])
+        for i, part in enumerate(_lines(line.strip(), CARD - 48, 12))
+    ]
+    named = _lines(name, CARD - 18 - 94, 15)
+    under = y + ROW * (len(named) - 1)
+    height = 62 + ROW * (len(lines) + len(named) - 1)
     parts.append(_box(x, y, CARD, height, "#fbfcfd"))
     parts.append(_box(x, y, 6, height, colour, radius=2, stroke=None))
-    parts.append(_text(x + 18, y + 23, _cut(name, CARD - 100, 15), 15, INK, bold=True))
+    parts += [_text(x + 18, y + 23 + ROW * i, line, 15, INK, bold=True) for i, line in enumerate(named)]
     confidence = float(node["confidence"])
     parts.append(_text(x + CARD - 12, y + 22, f"{confidence:.2f}", 13, INK, anchor="end"))
     parts.append(_box(x + CARD - 82, y + 14, 40, 7, "#e4e9ee", radius=3, stroke=None))
@@ -165,10 +173,9 @@ def _card(graph: nx.DiGraph[str], name: str, parts: list[str], x: float, y: floa
     seen, whole = len(evidence), len(graph.graph.get("demonstrations", [])) or len(evidence)
     often = f"seen in {seen} of {whole}" if whole > 1 else ""
     when = f"{start:.1f} - {end:.1f} s" + (f" on average, {often}" if often else "")
-    parts.append(_text(x + 18, y + 43, when, 12, FAINT))
-    for row, line in enumerate(lines):
-        indent = 18 if line.strip() == line else 36
-        parts.append(_text(x + indent, y + 62 + ROW * row, _cut(line.strip(), CARD - 48, 12), 12, INK))
+    parts.append(_text(x + 18, under + 43, when, 12, FAINT))
+    for row, (indent, line) in enumerate(lines):
+        parts.append(_text(x + indent, under + 62 + ROW * row, line, 12, INK))
     return height
 
 
@@ -227,9 +234,14 @@ def _arrows(graph: nx.DiGraph[str], boxes: Mapping[str, tuple[float, float, floa
     return arrows
 
 
-def _cut(text: str, width: float, size: int) -> str:
-    most = int(width / _LETTER[size])
-    return text if len(text) <= most else text[: most - 1] + "…"
+def _lines(text: str, width: float, size: int) -> list[str]:
+    """A text over as many lines as it needs at this width in pixels: nothing is cut."""
+    return wrapped(text, int(width / _LETTER[size]))
+
+
+def _titled(whole: str, shape: str) -> str:
+    """A shape that says its whole text when pointed at."""
+    return f"<g><title>{escaped(whole)}</title>{shape}</g>"
 
 
 def _text(
@@ -238,7 +250,7 @@ def _text(
     weight = ' font-weight="600"' if bold else ""
     return (
         f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" fill="{colour}" text-anchor="{anchor}"{weight}>'
-        f"{escape(text)}</text>"
+        f"{escaped(text)}</text>"
     )
 
 

@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.demos_decomp.log import Demonstration, Floats
 
 RATE = 50.0
 """Samples per second to which every demonstration is brought."""
+MOST_POSES = 4_000_000
+"""Poses of hand and objects after sampling: eleven hours with one object, one hour with twenty."""
 
 SMOOTHING = 0.06
 """Standard deviation in seconds of the Gaussian that takes off tremor (8 to 12 Hz) and sensor noise."""
@@ -59,9 +62,18 @@ def evenly_sampled(demonstration: Demonstration) -> SmoothMotion:
 
     Returns:
         The motion. Positions and the opening are interpolated linearly, rotations along the shortest arc.
+
+    Raises:
+        InputError: It lasts so long, with so many objects, that there would be more than `MOST_POSES`.
     """
     time = demonstration.time
-    grid = time[0] + np.arange(max(2, int(np.floor((time[-1] - time[0]) * RATE + 1e-6)) + 1)) / RATE
+    count = max(2, int(np.floor((time[-1] - time[0]) * RATE + 1e-6)) + 1)
+    if count * (1 + len(demonstration.objects)) > MOST_POSES:
+        raise InputError(
+            f"demonstration '{demonstration.name}' lasts {time[-1] - time[0]:.0f} s, too long to look at in "
+            f"one piece with the tracks of its objects ({len(demonstration.objects)}); split the log"
+        )
+    grid = time[0] + np.arange(count) / RATE
     tracks = {name: track.pose for name, track in demonstration.objects.items()}
     rate = 1.0 / float(np.median(np.diff(time)))
     opening = np.interp(grid, time, demonstration.hand_opening)

@@ -1,4 +1,4 @@
-"""Recognised tasks as lines of text."""
+"""Recognised tasks as a table."""
 
 from __future__ import annotations
 
@@ -8,6 +8,23 @@ from typing import Any
 from bt_tasksim.concept.demonstrated import plain_words
 from bt_tasksim.concept.task import Task
 from bt_tasksim.demos_decomp.concepts import concept_of
+
+HEADS = ("time", "concept", "object", "what", "confidence")
+"""What stands in the columns of `task_rows`."""
+
+
+def task_rows(tasks: Iterable[Task]) -> list[tuple[str, str, str, str, str]]:
+    """A row per task: seconds, concept, target, what it does, confidence; the table everywhere."""
+    return [
+        (
+            f"{task.start:.1f} - {task.end:.1f} s",
+            task.concept,
+            str(task.parameters.get("target", "")),
+            described(task.concept, task.parameters),
+            f"{min(task.confidence, 1.0):.2f}",
+        )
+        for task in tasks
+    ]
 
 
 def text_table(tasks: Iterable[Task], seen: Sequence[str] | None = None) -> str:
@@ -20,16 +37,7 @@ def text_table(tasks: Iterable[Task], seen: Sequence[str] | None = None) -> str:
     Returns:
         Lines without a final line break; empty where there are no tasks.
     """
-    rows = [
-        (
-            f"{task.start:.1f} - {task.end:.1f} s",
-            task.concept,
-            str(task.parameters.get("target", "")),
-            described(task.concept, task.parameters),
-            f"{min(task.confidence, 1.0):.2f}",
-        )
-        for task in tasks
-    ]
+    rows = task_rows(tasks)
     more = [f"  {text:>{max(map(len, seen))}}" for text in seen] if seen else [""] * len(rows)
     if not rows:
         return ""

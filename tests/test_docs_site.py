@@ -40,6 +40,8 @@ def test_the_site_is_built_and_refers_to_nothing_outside(folder):
     page = (folder / "site" / "index.html").read_text(encoding="utf-8")
     loaded = re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=\"(https?://[^\"]+)", page)
     assert not loaded
+    assert "javascripts/iframe-worker.js" in page
+    assert (folder / "site" / "search" / "search_index.js").is_file(), "files are read without a server"
 
 
 @pytest.mark.parametrize("link", ["there_is_none.md", "glossary.md#there-is-none"])

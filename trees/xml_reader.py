@@ -15,6 +15,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.core.bounded_text import read_bytes
 from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.plain import shown
 from bt_tasksim.trees.check import DEEPEST, find_problem
 from bt_tasksim.trees.leaf_ports import Leaf, Nodes, is_concept, is_reference, port_from_text
 from bt_tasksim.trees.nodes.base import NodeKind
@@ -22,6 +23,8 @@ from bt_tasksim.trees.nodes.subtree import subtree
 from bt_tasksim.trees.vocabulary import CATEGORIES, OUTSIDE, node_kinds
 from bt_tasksim.trees.xml_source import LARGEST, Element, parse
 
+LEAST, MOST = -(2**31), 2**32 - 1
+"""Whole numbers that BehaviorTree.CPP's ports can hold, which have or have not a sign."""
 MOST_NODES = 10_000
 """Nodes that a tree may have once its subtrees are put in place."""
 HARMLESS = frozenset(("_autoremap", "_collapsed", "_fullpath", "_uid", "_description", "_name"))
@@ -320,10 +323,12 @@ class _Reader:
                 raise self._wrong(element, f"<{kind.tag}> has no parameter '{key}'{hint}")
             text = self._value(element, key, text, scope)
             try:
-                values[key] = int(text)
+                values[key] = _whole(text)
             except ValueError:
                 raise self._wrong(
-                    element, f"<{kind.tag}>: parameter '{key}' should be a whole number, found '{text}'"
+                    element,
+                    f"<{kind.tag}>: parameter '{key}' should be a whole number from {LEAST} to {MOST}, found "
+                    f"'{shown(text, 40)}'",
                 ) from None
         out = {}
         for key, value in values.items():
@@ -377,3 +382,10 @@ class _Reader:
 
     def _wrong(self, element: Element, sentence: str) -> InputError:
         return InputError(f"{self.source}, line {element.line}: {sentence}")
+
+
+def _whole(text: str) -> int:
+    value = int(text)
+    if not LEAST <= value <= MOST:
+        raise ValueError
+    return value

@@ -19,9 +19,9 @@ import typer
 
 from bt_tasksim.cli.app import NAME, application
 from bt_tasksim.cli.options.plugins import taken
-from bt_tasksim.cli.streams import flush_or_discard, open_missing
+from bt_tasksim.cli.streams import complain, flush_or_discard, open_missing, spell_out
 from bt_tasksim.core.culprit import users_place
-from bt_tasksim.core.errors import BtTasksimError, BtTasksimWarning, InputError, Terminated
+from bt_tasksim.core.errors import BtTasksimError, BtTasksimWarning, InputError, Terminated, is_bad_path
 
 COMPLETE = f"_{NAME.replace('-', '_').upper()}_COMPLETE"
 """Environment variable by which a shell asks how a word may go on."""
@@ -37,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code.
     """
     open_missing()
+    spell_out()
     logging.basicConfig(format=f"{NAME}: %(message)s", level=logging.WARNING)
     try:
         with _said_once():
@@ -44,13 +45,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except KeyboardInterrupt as stop:
         ended = isinstance(stop, Terminated)
-        _complain(f"{'terminated' if ended else 'interrupted'}{f'; {stop}' if str(stop) else ''}")
+        complain(f"{'terminated' if ended else 'interrupted'}{f'; {stop}' if str(stop) else ''}")
         return 143 if ended else 130
     except InputError as error:
-        _complain(f"{NAME}: {error}")
+        complain(f"{NAME}: {error}")
         return 2
     except BtTasksimError as error:
-        _complain(f"{NAME}: {error}")
+        complain(f"{NAME}: {error}")
         return 1
     except BrokenPipeError:
         flush_or_discard()
@@ -58,12 +59,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         flush_or_discard()
         where = f" '{error.filename}'" if error.filename else ""
-        _complain(f"{NAME}: {error.strerror or error}{where}")
-        return 1
+        complain(f"{NAME}: {error.strerror or error}{where}")
+        return 2 if is_bad_path(error) else 1
     except Exception as error:
         if not (place := users_place(error)):
             raise
-        _complain(f"{NAME}: {place}: {type(error).__name__}: {error}")
+        complain(f"{NAME}: {place}: {type(error).__name__}: {error}")
         return 2
     return code
 
@@ -98,11 +99,7 @@ def _said_once() -> Iterator[None]:
                 shown(message, category, *where, **more)
             elif str(message) not in said:
                 said.add(str(message))
-                _complain(f"{NAME}: {message}")
+                complain(f"{NAME}: {message}")
 
         warnings.showwarning = show
         yield
-
-
-def _complain(sentence: str) -> None:
-    print(sentence, file=sys.stderr)

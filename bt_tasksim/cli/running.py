@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_tasksim.cli.progress import progress
+from bt_tasksim.cli.streams import say
+from bt_tasksim.core.plain import printable
 
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
@@ -60,6 +62,6 @@ def run_into(
     finally:
         runner.pipeline.close()
     for remark in files.remarks:
-        print(remark)
-    print(f"{result}; results: {files.folder / 'report.html'}")
+        say(remark)
+    say(printable(f"{result}; results: {files.folder / 'report.html'}"))
     return result

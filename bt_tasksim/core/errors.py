@@ -7,6 +7,7 @@ The command line turns :class:`InputError` into exit code 2 (the user can put it
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
@@ -49,6 +50,11 @@ class MachineError(BtTasksimError, RuntimeError):
 
 class LostEngine(MachineError):  # noqa: N818  # it says what happened
     """An engine in another process is not there any more, or another client has it."""
+
+
+def is_bad_path(error: OSError) -> bool:
+    """Whether there can be nothing at a path, whatever the machine: it is too long, or leads in a circle."""
+    return error.errno in (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR)
 
 
 class UnreachableError(InputError):

@@ -18,7 +18,7 @@ import zlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
-from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.errors import InputError, MachineError, is_bad_path
 from bt_tasksim.core.interrupts import terminable
 
 _NEW, _OLD = "new", "old"
@@ -115,7 +115,7 @@ def whole_folder(path: str | Path, names: Collection[str] = ()) -> Iterator[Path
     clear_away(path)
     check_folder(path, names)
     unfinished, before = _beside(path, _NEW), _beside(path, _OLD)
-    made = [folder for folder in path.parents if not folder.exists()]
+    made = [folder for folder in path.parents if not os.path.exists(folder)]
     try:
         with terminable():
             unfinished.mkdir(parents=True)
@@ -124,7 +124,7 @@ def whole_folder(path: str | Path, names: Collection[str] = ()) -> Iterator[Path
             for file in unfinished.rglob("*"):
                 if file.is_file():
                     _flush(file)
-            if path.exists():
+            if os.path.exists(path):
                 os.rename(path, before)
             os.rename(unfinished, path)
     except (ConnectionError, TimeoutError):
@@ -136,7 +136,7 @@ def whole_folder(path: str | Path, names: Collection[str] = ()) -> Iterator[Path
     except OSError as error:
         raise _cannot_write(path, error) from error
     finally:
-        if before.exists() and not path.exists():
+        if os.path.exists(before) and not os.path.exists(path):
             os.rename(before, path)
         for rest in (unfinished, before):
             shutil.rmtree(rest, ignore_errors=True)
@@ -161,12 +161,12 @@ def check_folder(path: str | Path, names: Collection[str] = ()) -> None:
         InputError: The path or a folder above it is a file, or it holds more than ``names``.
     """
     path = Path(os.path.abspath(path))
-    above = next(folder for folder in path.parents if folder.exists())
-    if not above.is_dir():
+    above = next((folder for folder in path.parents if os.path.exists(folder)), path)
+    if not os.path.isdir(above):
         raise InputError(f"cannot write a folder '{path}': '{above}' is a file; choose another name")
-    if path.is_symlink() or (path.exists() and not path.is_dir()):
+    if os.path.islink(path) or (os.path.exists(path) and not os.path.isdir(path)):
         raise InputError(f"cannot write a folder '{path}': there is a file of this name; choose another name")
-    within = sorted(path.iterdir()) if path.is_dir() else []
+    within = sorted(path.iterdir()) if os.path.isdir(path) else []
     others = [p.name for p in within if p.name not in names]
     others += [f"a folder named {p.name}" for p in within if p.name in names and not p.is_file()]
     if others:
@@ -231,11 +231,11 @@ def clear_away(path: Path) -> None:
 
 
 def _check_file(path: Path) -> None:
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         raise InputError(f"cannot write '{path}': the folder '{path.parent}' does not exist; make it first")
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError(f"cannot write '{path}': it is a folder; name a file in it")
-    if path.exists() and not path.is_file():
+    if os.path.exists(path) and not os.path.isfile(path):
         raise InputError(f"cannot write '{path}': it is a device or a pipe; name a file")
 
 
@@ -265,5 +265,6 @@ def _flush(path: Path) -> None:
         os.fsync(file.fileno())
 
 
-def _cannot_write(path: Path, error: OSError) -> MachineError:
-    return MachineError(f"cannot write '{path}': {error.strerror or error}; nothing was written")
+def _cannot_write(path: Path, error: OSError) -> InputError | MachineError:
+    kind = InputError if is_bad_path(error) else MachineError
+    return kind(f"cannot write '{path}': {error.strerror or error}; nothing was written")

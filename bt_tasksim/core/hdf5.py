@@ -6,12 +6,14 @@ memory and open files; it is kept for the next file, and replaced when a file ha
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 import math
 import os
 import re
 import select
+import signal
 import subprocess
 import sys
 import threading
@@ -31,9 +33,11 @@ from bt_tasksim.core.hdf5_process import FRAME, MOST_ATTRIBUTE
 MOST_BYTES = 512 << 20
 """What the data sets of one file may take together."""
 SECONDS = 6.0
-"""How long reading a file may take, besides `RATE`."""
+"""Processor time in seconds that reading a file may take, besides `RATE`."""
 RATE = 50e6
 """Bytes of a file for which it may take a second more."""
+PATIENCE = 10.0
+"""How much longer it may take by the clock: other processes may leave it little of the machine."""
 STARTING = 60.0
 """Seconds within which the process has to be there."""
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -111,7 +115,7 @@ def read(path: Path, wanted: Sequence[str] = ("**",), seconds: float = SECONDS) 
         path: The file.
         wanted: Patterns of the data sets to read, such as ``traj_*/env_states/**``; names and attributes of
             groups on the way are read in any case.
-        seconds: How long it may take.
+        seconds: Processor time that it may take.
 
     Returns:
         The file's root.
@@ -124,7 +128,8 @@ def read(path: Path, wanted: Sequence[str] = ("**",), seconds: float = SECONDS) 
     check_file(path)
     if not is_hdf5(path):
         raise InputError(f"'{path}' is not an HDF5 file; see docs/demonstrations.md for the log format")
-    return _reader(os.getpid()).read(path, wanted, seconds + path.stat().st_size / RATE)
+    size = min(path.stat().st_size, MOST_BYTES)  # a file may have holes
+    return _reader(os.getpid()).read(path, wanted, seconds + size / RATE)
 
 
 def check_file(path: Path) -> None:
@@ -217,10 +222,11 @@ class Reader:
             "wanted": list(wanted),
             "most_bytes": self.most_bytes,
             "seconds": seconds,
+            "patience": PATIENCE,
         }
         assert process.stdin is not None
         root = Node()
-        pipe = _Pipe(process, time.monotonic() + seconds)
+        pipe = _Pipe(process, time.monotonic() + PATIENCE * seconds)
         try:
             process.stdin.write(json.dumps(request).encode() + b"\n")
             left = self.most_bytes
@@ -234,11 +240,14 @@ class Reader:
                 _add(root, header, content)
         except TimeoutError:
             self.close()
-            raise InputError(
-                f"'{path}' is damaged: reading it takes more than {seconds:.0f} s; record or copy it again"
-            ) from None
+            raise _too_long(path, seconds) from None
         except (EOFError, OSError):
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(1.0)
+            late = process.returncode == -signal.SIGPROF
             self.close()
+            if late:
+                raise _too_long(path, seconds) from None
             raise InputError(
                 f"'{path}' is damaged: the HDF5 library breaks down over it; record or copy it again"
             ) from None
@@ -351,6 +360,13 @@ _REFUSALS = {
 def _refusal(path: Path, header: Mapping[str, Any]) -> InputError:
     said = {name: _printable(str(header.get(name, ""))) for name in ("path", "about")}
     return InputError(_REFUSALS[header["code"]].format(file=path, **said))
+
+
+def _too_long(path: Path, seconds: float) -> InputError:
+    return InputError(
+        f"'{path}' is damaged or holds too much: reading it takes more than {seconds:.0f} s; record or "
+        "copy it again, or split it"
+    )
 
 
 def _printable(text: str) -> str:

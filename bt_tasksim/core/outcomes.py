@@ -30,6 +30,7 @@ from bt_tasksim.core.errors import (
     NoWayError,
     UnreachableError,
 )
+from bt_tasksim.core.markup import html_pairs
 from bt_tasksim.core.registry import part, register
 from bt_tasksim.core.units import METRES, RADIANS, SECONDS, Unit
 
@@ -96,6 +97,12 @@ class Statement:
         """The sentence for people, with what stands behind it."""
         behind = self.detail.sentence if self.detail is not None else ""
         return ": ".join(part for part in (self.own_sentence, behind) if part)
+
+    @property
+    def values(self) -> dict[str, str]:
+        """What fills the gaps, as people read it: known numbers with their units, and names."""
+        known = {n: self.form.units[n].text(v) for n, v in self.numbers.items() if isfinite(v)}
+        return {**known, **self.names}
 
     def __str__(self) -> str:
         return self.sentence
@@ -167,6 +174,15 @@ class Outcome(Statement):
         if self.form in reasons:
             return True
         return isinstance(self.detail, Outcome) and self.detail.is_a(*reasons)
+
+    def _repr_html_(self) -> str:
+        """A small table, for notebooks: the sentence, the reason and what it was filled with."""
+        return html_pairs({"why": self.sentence, **self.cause.table_rows()})
+
+    def table_rows(self) -> dict[str, str]:
+        """Its reason, numbers and names, as rows of a table for people."""
+        said = ", ".join(f"{name.replace('_', ' ')} {text}" for name, text in self.values.items())
+        return {"reason": self.reason.name, "measured": said}
 
     def to_data(self) -> dict[str, Any]:
         """As plain data, with the reason's name."""

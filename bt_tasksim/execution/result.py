@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
-from typing import Any
 
 from py_trees.common import Status
 
+from bt_tasksim.core.markup import html_pairs
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.engines.clock import Timing
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -67,16 +66,17 @@ class Result:
 
     def _repr_html_(self) -> str:
         """A small table, for notebooks."""
-        rows: dict[str, Any] = {
-            "success": "yes" if self.success else "no",
-            "why": self.why,
-            "reason": self.reason or "none",
-            "tree": self.status.name,
-            "seed": self.seed,
-            "robot": self.configuration.robot,
-            "time": f"{self.sim_time:.1f} s simulated in {self.control_steps} control periods, "
-            f"{self.wall_time:.1f} s on the clock",
-            "policies": ", ".join(f"{leaf}: {policy}" for leaf, policy in self.policies.items()),
-        }
-        cells = (f"<tr><th>{name}</th><td>{escape(str(value))}</td></tr>" for name, value in rows.items())
-        return f"<table>{''.join(cells)}</table>"
+        tree = "" if self.success else f" (the tree ended {self.status.name})"
+        return html_pairs(
+            {
+                "status": f"{'SUCCESS' if self.success else 'FAILURE'}{tree}",
+                "why": self.outcome.sentence,
+                **({} if self.success else self.outcome.cause.table_rows()),
+                "leaf": self.leaf,
+                "seed": str(self.seed),
+                "time": f"{self.sim_time:.1f} s simulated in {self.control_steps} control periods, "
+                f"{self.wall_time:.1f} s on the clock",
+                "robot": self.configuration.robot,
+                "policies": ", ".join(f"{leaf}: {policy}" for leaf, policy in self.policies.items()),
+            }
+        )

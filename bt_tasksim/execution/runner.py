@@ -18,9 +18,16 @@ from py_trees.common import Status
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.reporting import as_statement, speaker, whole_outcome
-from bt_tasksim.core.errors import LeafError, UnreachableError
+from bt_tasksim.core.errors import BtTasksimError, LeafError, UnreachableError
 from bt_tasksim.core.interrupts import ending, terminable
-from bt_tasksim.core.outcomes import FAILED, OUT_OF_REACH, TIME_OVER, Outcome, register_reason
+from bt_tasksim.core.outcomes import (
+    FAILED,
+    OUT_OF_REACH,
+    TIME_OVER,
+    Outcome,
+    outcome_of_error,
+    register_reason,
+)
 from bt_tasksim.core.units import SECONDS
 from bt_tasksim.core.world import Command, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
@@ -168,17 +175,18 @@ class Runner:
             timing=timing,
         )
 
-    def interrupted(self, steps: int) -> Result:
-        """What a run comes to that was interrupted.
+    def broken_off(self, steps: int, error: BtTasksimError | None = None) -> Result:
+        """What a run comes to that was interrupted, or that an error ended.
 
         Args:
             steps: Control periods that were run.
+            error: The error; None for an interrupt.
         """
         assert self.configuration is not None
         return Result(
             status=Status.INVALID,
             success=False,
-            outcome=RUN_INTERRUPTED(time=self.context.now),
+            outcome=RUN_INTERRUPTED(time=self.context.now) if error is None else outcome_of_error(error),
             leaf="",
             verdict=None,
             seed=self.configuration.seed,

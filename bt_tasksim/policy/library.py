@@ -16,6 +16,7 @@ from bt_tasksim.core.bounded_text import read_text
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.files import write_text
 from bt_tasksim.core.json_text import parse_json
+from bt_tasksim.core.plain import printable
 from bt_tasksim.core.registry import parts
 from bt_tasksim.core.resources import asset
 from bt_tasksim.policy.files import (
@@ -236,11 +237,11 @@ def describe(entry: PolicyEntry) -> str:
     card = entry.card
     mark = "  pinned" if entry.pinned else ""
     if card is None or entry.problem:
-        return f"{entry.name}{mark}\n  cannot be used: {entry.problem}"
+        return f"{printable(entry.name)}{mark}\n  cannot be used: {printable(entry.problem)}"
     first = f"{entry.name}@{card.hash}  {card.concept} on {card.robot}{mark}"
     lines = [first, f"  trained in {card.tree}, {card.steps:,} steps {card.algorithm}".rstrip()]
     lines += [f"  {measured_text(entry)}" for entry in card.measured] or [f"  {NEVER}"]
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def measured_text(measured: Mapping[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """Trees and decomposition graphs as pictures in Jupyter.
 
-``from bt_tasksim import Scene``, or any other name, in a notebook is enough; `Result` shows itself.
+``from bt_tasksim import Scene``, or any other name, in a notebook is enough; `Result`, `Outcome` and
+`Decomposition` show themselves.
 """
 
 from __future__ import annotations

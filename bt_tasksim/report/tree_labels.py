@@ -12,6 +12,7 @@ from py_trees.decorators import Decorator
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Parameter
+from bt_tasksim.core.plain import printable
 from bt_tasksim.trees.nodes.base import NodeKind
 from bt_tasksim.trees.nodes.subtree import SubTree
 from bt_tasksim.trees.vocabulary import kind_of
@@ -73,7 +74,7 @@ def tree_text(root: Behaviour) -> str:
 def _line(node: Behaviour) -> str:
     label = label_of(node)
     head = " ".join(part for part in (label.symbol, label.title) if part)
-    return f"{head}  ({', '.join(label.details)})" if label.details else head
+    return printable(f"{head}  ({', '.join(label.details)})" if label.details else head)
 
 
 def _kind_label(node: Behaviour, kind: NodeKind[Any]) -> Label:

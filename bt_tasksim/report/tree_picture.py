@@ -6,16 +6,15 @@ report's script recolours a node by changing that attribute.
 
 from __future__ import annotations
 
-import textwrap
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from html import escape
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.markup import escaped, wrapped
 from bt_tasksim.report.tree_labels import Label, label_of, tree_text
 from bt_tasksim.trees.walk import preorder
 
@@ -92,7 +91,7 @@ def tree_svg(root: Behaviour, statuses: Mapping[str, Status | str] | None = None
     height = max(box.y + box.height for box in boxes) + MARGIN
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" class="bt-tree" viewBox="0 0 {width:.0f} {height:.0f}" '
-        f'width="{width:.0f}" height="{height:.0f}" role="img" aria-label="{_text(root.name)}">',
+        f'width="{width:.0f}" height="{height:.0f}" role="img" aria-label="{escaped(root.name)}">',
         f"<style>{STYLE}</style>",
         f'<rect width="{width:.0f}" height="{height:.0f}" fill="#fff"/>',
         *(_edge(box, child) for box in boxes for child in box.children),
@@ -138,8 +137,8 @@ def _boxes(root: Behaviour) -> tuple[_Box, int]:
 
 def _box(name: str, node: Behaviour, depth: int) -> _Box:
     label = label_of(node)
-    title = _wrapped(label.title)
-    details = [line for detail in label.details for line in _wrapped(detail)]
+    title = wrapped(label.title, WRAP)
+    details = [line for detail in label.details for line in wrapped(detail, WRAP)]
     text = max(
         max(_width(line, TITLE_SIZE) for line in title),
         max((_width(line, DETAIL_SIZE) for line in details), default=0.0),
@@ -210,7 +209,10 @@ def _edge(box: _Box, child: _Box) -> str:
 
 def _group(box: _Box, status: str) -> str:
     left, shape = box.x - box.width / 2, box.label.shape
-    parts = [f'<g id="{box.id}" class="{shape}" data-status="{status}">', f"<title>{_text(box.hint)}</title>"]
+    parts = [
+        f'<g id="{box.id}" class="{shape}" data-status="{status}">',
+        f"<title>{escaped(box.hint)}</title>",
+    ]
     parts.append(_outline(box, left))
     middle = box.x
     if box.label.symbol:
@@ -228,7 +230,7 @@ def _group(box: _Box, status: str) -> str:
     lines = [("title", line) for line in box.title] + [("detail", line) for line in box.details]
     y = box.y + box.height / 2 - (len(lines) - 1) * LINE / 2 + 4.5
     for kind, line in lines:
-        parts.append(f'<text class="{kind}" x="{middle:.1f}" y="{y:.1f}">{_text(line)}</text>')
+        parts.append(f'<text class="{kind}" x="{middle:.1f}" y="{y:.1f}">{escaped(line)}</text>')
         y += LINE
     return "".join([*parts, "</g>"])
 
@@ -250,11 +252,6 @@ def _outline(box: _Box, left: float) -> str:
     )
 
 
-def _wrapped(text: str) -> list[str]:
-    clean = "".join(c if c.isprintable() else " " for c in text)
-    return textwrap.wrap(clean, WRAP, break_long_words=True) or [" "]
-
-
 def _width(text: str, size: float) -> float:
     """Width of a line in the widest usual font."""
     total = 0
@@ -265,10 +262,6 @@ def _width(text: str, size: float) -> float:
         elif not unicodedata.combining(character):
             total += 110 if unicodedata.east_asian_width(character) in "WF" else 85
     return total * size / 100
-
-
-def _text(text: str) -> str:
-    return escape("".join(c if c.isprintable() else " " for c in text))
 
 
 def _status_name(status: Status | str) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
 from bt_tasksim.core.files import whole_folder, write_text
 from bt_tasksim.demos_decomp.log import Video
 from bt_tasksim.execution.pipelines import EngineOptions
@@ -73,7 +73,9 @@ def write_run(
 
     Raises:
         InputError: The folder is no good, or the scene.
-        MachineError: An engine failed, or the disk is full or not writable.
+        LeafError: A leaf raised an exception; the folder holds what was run until then.
+        MachineError: An engine failed, and the folder holds what was run until then; or the disk is full or
+            not writable.
         KeyboardInterrupt: The run was interrupted; the folder holds what was run until then.
     """
     with whole_folder(folder, FILES) as inside:
@@ -90,19 +92,21 @@ def write_run(
             for callback in callbacks:
                 callback(step)
 
-        interrupt: KeyboardInterrupt | None = None
+        end: KeyboardInterrupt | BtTasksimError | None = None
         try:
             with contextlib.nullcontext() if camera is None else camera:
                 result = runner.run(seed, stream, record)
-        except KeyboardInterrupt as stop:
+        except (KeyboardInterrupt, BtTasksimError) as stop:
             if len(recorder) < LEAST:
                 raise
-            interrupt, camera, no_video = stop, None, "No video: the run was interrupted."
-            result = runner.interrupted(len(recorder) - 1)
+            failure = stop if isinstance(stop, BtTasksimError) else None
+            end, camera = stop, None
+            no_video = f"No video: the run {'was interrupted' if failure is None else 'broke off'}."
+            result = runner.broken_off(len(recorder) - 1, failure)
         remarks = _fill(inside, result, recorder, camera, no_video)
-    if interrupt is not None:
-        said = f"{interrupt}; " if str(interrupt) else ""
-        raise type(interrupt)(f"{said}what was run is in {folder}") from interrupt
+    if end is not None:
+        end.args = ("; ".join(filter(None, (str(end), f"what was run is in {folder}"))),)
+        raise end
     paths = {name: Path(folder) / name for name in FILES if (Path(folder) / name).exists()}
     return result, RunFiles(Path(folder), paths, remarks)
 

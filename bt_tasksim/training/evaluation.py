@@ -6,6 +6,7 @@ or on the order of the episodes.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import time
@@ -82,8 +83,10 @@ class EvaluationFile:
         """
         now = time.monotonic()
         if last or now - self._written >= self.EVERY:
-            write_text(self.path, json.dumps(evaluation.to_json(), indent=2, allow_nan=False) + "\n")
             self._written = now
+            # A disk that is full now may not be so at the end, when it counts.
+            with contextlib.nullcontext() if last else contextlib.suppress(MachineError):
+                write_text(self.path, json.dumps(evaluation.to_json(), indent=2, allow_nan=False) + "\n")
 
 
 class EvaluationInterrupted(KeyboardInterrupt):  # as KeyboardInterrupt, which it is
@@ -109,6 +112,7 @@ def evaluate(
     progress: Callable[[EpisodeOutcome], None] | None = None,
     stream: str = "evaluation",
     keep: Callable[[Evaluation, bool], None] | None = None,
+    stopped: Callable[[Evaluation], None] | None = None,
 ) -> Evaluation:
     """Run one episode for each seed.
 
@@ -119,6 +123,7 @@ def evaluate(
         progress: Called after every episode, in the order in which they end.
         stream: Stream of draws.
         keep: Called after every episode with what there is, and at the end with true, however it comes.
+        stopped: Called with what there is where an error ends it after an episode.
 
     Returns:
         The outcomes in the order of the seeds.
@@ -166,6 +171,8 @@ def evaluate(
         try:
             with terminable():
                 _run_all(runner, job, seeds, workers, ended, stream)
+            if keep is not None:
+                keep(evaluation(), True)
         except KeyboardInterrupt as stop:
             with ending():
                 if keep is not None and found:
@@ -173,11 +180,12 @@ def evaluate(
             kind = EvaluationTerminated if isinstance(stop, Terminated) else EvaluationInterrupted
             raise kind(evaluation()) from stop
         except BtTasksimError:
-            if keep is not None and found:
-                keep(evaluation(), True)
+            if found and keep is not None:
+                with contextlib.suppress(BtTasksimError):  # the first error is the one to tell
+                    keep(evaluation(), True)
+            if found and stopped is not None:
+                stopped(evaluation())
             raise
-    if keep is not None:
-        keep(evaluation(), True)
     return evaluation()
 
 

@@ -6,9 +6,12 @@ import dataclasses
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.demos_decomp.log import Demonstration, Track
 from bt_tasksim.demos_decomp.signals import (
     RATE,
     evenly_sampled,
@@ -20,6 +23,14 @@ from bt_tasksim.demos_decomp.signals import (
 )
 
 walks = st.lists(st.floats(-0.01, 0.01), min_size=3, max_size=120).map(np.cumsum)
+
+
+def test_a_gap_of_a_day_is_refused_before_it_is_filled():
+    time = np.append(np.arange(1000) * 1e-9, 86_000.0)
+    still = np.tile([0.4, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0], (len(time), 1))
+    shown = Demonstration("000", time, still, np.zeros(len(time)), {"cup": Track(still, "cup", np.ones(3))})
+    with pytest.raises(InputError, match="'000' lasts 86000 s, too long"):
+        evenly_sampled(shown)
 
 
 def test_swings_are_the_large_changes():

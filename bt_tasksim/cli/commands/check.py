@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from bt_tasksim.cli.progress import progress
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 
@@ -26,5 +27,5 @@ def check(
 
     with progress("checking", None):
         report = concept_file.check(file, tree)
-    print("\n".join(report.lines()))
+    say(*report.lines())
     return 2 if report.errors else 0

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 
@@ -25,5 +26,5 @@ def convert(
     from bt_tasksim.cli.convert import convert_files
 
     lines, changes = convert_files(files, check)
-    print("\n".join(lines))
+    say(*lines)
     return 1 if check and changes else 0

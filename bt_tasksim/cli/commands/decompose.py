@@ -11,6 +11,7 @@ import typer
 
 from bt_tasksim.cli.arguments import picture as svg
 from bt_tasksim.cli.progress import progress
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 if TYPE_CHECKING:
@@ -55,9 +56,9 @@ def decompose(
     with progress("decomposing", None):
         found = decompose_log(opened[0] if len(opened) == 1 else opened, episode)
     named = ", ".join(f"'{log}'" for log in logs)
-    print(found.table() or f"no task was recognised in {named}")
+    say(found.table() or f"no task was recognised in {named}")
     for sentence in found.not_understood():
-        print(f"not understood: {sentence}")
+        say(f"not understood: {sentence}")
     scene, contents = _scene(opened), dict[str | Path, str]()
     if json_ is not None:
         contents[json_] = json.dumps(found.to_json(), indent=2) + "\n"
@@ -68,7 +69,7 @@ def decompose(
         contents[picture] = picture_of(found.graph)
     write_texts(contents)
     if contents:
-        print("wrote " + ", ".join(map(str, contents)))
+        say("wrote " + ", ".join(map(str, contents)))
 
 
 def _opened(log: str) -> Log:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 LOG = ("demonstrations", "shelf_to_shelf", "00.h5")
@@ -31,13 +32,13 @@ def demo(
     from bt_tasksim.trees.from_graph import tree_from_graph
     from bt_tasksim.trees.load import load_source
 
-    print(f"1. a demonstration (synthetic): {'/'.join(LOG)}")
+    say(f"1. a demonstration (synthetic): {'/'.join(LOG)}")
     found = decompose_log(open_log(asset(*LOG)), None)
-    print(text_table(found.tasks))
+    say(text_table(found.tasks))
     tree = tree_from_graph(found.graph, "shelf to shelf")
-    print("\n2. the tree it became")
-    print(tree_text(tree))
-    print("\n3. the tree runs on the Panda in SAPIEN")
+    say("\n2. the tree it became")
+    say(tree_text(tree))
+    say("\n3. the tree runs on the Panda in SAPIEN")
     scene = load_source("shelf_to_shelf").scene
     result = run_into(out, tree, scene, SEED, EngineOptions(rendering=True), scene.name)
     return 0 if result.success else 1

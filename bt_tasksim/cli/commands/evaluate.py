@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,8 +12,13 @@ from bt_tasksim.cli.arguments import Seed
 from bt_tasksim.cli.options.engines import EngineFlags, policies
 from bt_tasksim.cli.options.tree import TreeOptions
 from bt_tasksim.cli.progress import progress
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.plain import printable
 from bt_tasksim.core.registry import register
+
+if TYPE_CHECKING:
+    from bt_tasksim.training.evaluation_outcomes import Evaluation
 
 
 @register("command", "evaluate")
@@ -40,6 +45,10 @@ def evaluate(
     chosen = policies(engines.policy)
     job = evaluation.Job(tree.tree, tree.scene, tree.robot, engines.options(), chosen)
     keep = None if json_ is None else evaluation.EvaluationFile(json_)
+
+    def tell(found: Evaluation) -> None:
+        say(*map(printable, found.lines()))
+
     try:
         with progress("episodes", episodes) as advance:
             found = evaluation.evaluate(
@@ -48,10 +57,11 @@ def evaluate(
                 workers,
                 lambda outcome: advance(outcome.success),
                 keep=keep,
+                stopped=tell,
             )
     except evaluation.EvaluationInterrupted as stop:
-        print("\n".join(stop.evaluation.lines()))
+        tell(stop.evaluation)
         raise
-    print("\n".join(found.lines()))
+    tell(found)
     if json_ is not None:
-        print(f"wrote {json_}")
+        say(f"wrote {json_}")

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 
@@ -28,4 +29,4 @@ def new(
     """
     from bt_tasksim.checking.new_concept import write_concept
 
-    print(write_concept(name, out, like))
+    say(write_concept(name, out, like))

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 
@@ -21,4 +22,4 @@ def new_key(
     from bt_tasksim.engines.remote.keys import make_keys
 
     server, client = make_keys(file)
-    print(f"wrote {server} for the server, and {client} for its clients; copy that to them, keep both secret")
+    say(f"wrote {server} for the server, and {client} for its clients; copy that to them, keep both secret")

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.registry import register
 
@@ -37,14 +38,14 @@ def policies(
     concepts = {concept_name(c): c for c in catalogue().values() if issubclass(c, ConceptModel)}
     if pin is not None:
         card = library.pin(pin, concepts)
-        print(f"pinned {pin}@{card.hash} for '{card.concept}' on '{card.robot}'")
+        say(f"pinned {pin}@{card.hash} for '{card.concept}' on '{card.robot}'")
     if unpin is not None:
         concept, robot = unpin
-        print(f"'{library.unpin(concept, robot)}' is no longer pinned for '{concept}' on '{robot}'")
+        say(f"'{library.unpin(concept, robot)}' is no longer pinned for '{concept}' on '{robot}'")
     found = library.list_policies(None, concepts)
     if folder is not None:
         found += library.list_policies(folder, concepts)
-    print("\n".join(library.describe(entry) for entry in found) or "there is no learned policy")
+    say("\n".join(library.describe(entry) for entry in found) or "there is no learned policy")
     if json_ is not None:
         write_text(json_, json.dumps([entry.to_json() for entry in found], indent=2) + "\n")
-        print(f"wrote {json_}")
+        say(f"wrote {json_}")

@@ -10,6 +10,7 @@ import typer
 from bt_tasksim.cli.options import completion
 from bt_tasksim.cli.options.engines import Policy, policies
 from bt_tasksim.cli.progress import progress
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 
@@ -48,5 +49,5 @@ def replay(
     root = None if tree is None else load_root(tree)
     with progress("replaying", None):
         found = replay.replay(run, root, robot=robot, policies=policies(policy), objects=objects)
-    print(found.why)
+    say(found.why)
     return 0 if found.identical else 1

@@ -11,6 +11,7 @@ from bt_tasksim.cli.arguments import Seed
 from bt_tasksim.cli.options.engines import EngineFlags, policies
 from bt_tasksim.cli.options.film import FilmFlags
 from bt_tasksim.cli.options.tree import TreeOptions
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 
@@ -39,5 +40,5 @@ def run(
     folder = out or Path("runs") / "-".join(parts)
     result = run_into(folder, source.build(), source.scene, seed, options, source.name, film.film())
     if result.timing is not None:
-        print(result.timing)
+        say(result.timing)
     return 0 if result.success else 1

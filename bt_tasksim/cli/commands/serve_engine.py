@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from bt_tasksim.cli.arguments import port as port_number
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 from bt_tasksim.engines.remote.address import DEFAULT_PORT, LOOPBACK
 
@@ -48,6 +49,6 @@ def serve_engine(
         port,
         key=key,
         objects=objects,
-        say=lambda line: print(line, flush=True),
+        say=lambda line: say(line, flush=True),
         complain=lambda line: print(f"bt-tasksim: {line}", file=sys.stderr, flush=True),
     )

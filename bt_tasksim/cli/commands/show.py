@@ -9,6 +9,7 @@ import typer
 
 from bt_tasksim.cli.arguments import picture as svg
 from bt_tasksim.cli.options.tree import TreeOptions
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 
@@ -32,7 +33,7 @@ def show(
         root, scene = source.build(), source.scene.name
     except NoSceneError:  # a tree can be looked at without one
         root, scene = load_root(tree.tree), ""
-    print(tree_text(root))
+    say(tree_text(root))
     contents: dict[str | Path, str] = {}
     if picture is not None:
         contents[picture] = tree_svg(root)
@@ -41,4 +42,4 @@ def show(
         contents[xml] = tree_to_xml(root, scene=named)
     write_texts(contents)
     for path in contents:
-        print(f"wrote {path}")
+        say(f"wrote {path}")

@@ -10,6 +10,7 @@ import typer
 from bt_tasksim.cli import arguments
 from bt_tasksim.cli.options.tree import TreeOptions
 from bt_tasksim.cli.progress import training_progress
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.registry import register
 
 
@@ -60,4 +61,4 @@ def train(
     )
     with training_progress() as report:
         said = session.run(request, report)
-    print(said)
+    say(said)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bt_tasksim.cli import arguments
+from bt_tasksim.cli.streams import say
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.registry import register
 from bt_tasksim.hardware.ros.address import DEFAULT_PORT
@@ -76,11 +77,9 @@ def twin(
         }
         words = "".join(f" {option} {value}" for option, value in chosen.items() if value)
         try:
-            print(f"twin of {world.robot}, seed {seed}, in real time; Ctrl-C ends it")
-            print(f"  bt-tasksim run {tree}{words} --seed {seed} --engines ros:127.0.0.1:{cell.port}")
-            print(
-                f"  evaluation channel at port {cell.evaluation_port}, first line {cell.secret}", flush=True
-            )
+            say(f"twin of {world.robot}, seed {seed}, in real time; Ctrl-C ends it")
+            say(f"  bt-tasksim run {tree}{words} --seed {seed} --engines ros:127.0.0.1:{cell.port}")
+            say(f"  evaluation channel at port {cell.evaluation_port}, first line {cell.secret}", flush=True)
             raise MachineError(cell.wait())
         except KeyboardInterrupt:  # SIGTERM and SIGHUP, too
             return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
 
@@ -121,7 +122,7 @@ def test_declared_sizes_count_before_anything_is_read(tmp_path):
         started = time.monotonic()
         with pytest.raises(InputError, match="too many to read"):
             hdf5.read(file_of(tmp_path / "a.h5", fault))
-        assert time.monotonic() - started < 10.0
+        assert time.monotonic() - started < hdf5.PATIENCE * hdf5.SECONDS
 
 
 def test_groups_within_themselves_end(tmp_path):
@@ -160,9 +161,9 @@ def endless(tmp_path):
 
 def test_a_file_over_which_the_library_hangs_is_refused_in_time(endless, tmp_path):
     started = time.monotonic()
-    with pytest.raises(InputError, match="is damaged: reading it takes more than"):
+    with pytest.raises(InputError, match="is damaged or holds too much: reading it takes more than"):
         hdf5.read(endless)
-    assert time.monotonic() - started < 10.0
+    assert time.monotonic() - started < hdf5.PATIENCE * hdf5.SECONDS
     assert hdf5.read(file_of(tmp_path / "a.h5", fill)).names() == ["a", "b"]
 
 
@@ -197,6 +198,17 @@ def test_a_process_that_dies_over_a_file_is_a_sentence(tmp_path, endless):
         killer.join()
     finally:
         reader.close()
+
+
+def test_a_file_is_not_damaged_where_others_keep_the_machine_busy(tmp_path):
+    reader, path = hdf5.Reader(), file_of(tmp_path / "a.h5", fill)
+    reader.read(path, ["**"], 5.0)
+    os.kill(reader._process.pid, signal.SIGSTOP)
+    goes_on = threading.Timer(1.5, os.kill, (reader._process.pid, signal.SIGCONT))
+    goes_on.start()
+    assert reader.read(path, ["**"], 1.0).names() == ["a", "b"]
+    goes_on.join()
+    reader.close()
 
 
 def test_no_process_is_left_without_its_parent(tmp_path):

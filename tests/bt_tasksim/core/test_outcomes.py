@@ -5,6 +5,7 @@ import math
 import pickle
 
 import pytest
+from defusedxml import ElementTree
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import (
@@ -116,3 +117,12 @@ def test_an_outcome_comes_back_where_its_reason_is_not_known_or_has_changed():
 def test_older_files_hold_a_reason_in_words():
     old = recorded_outcome("not in place", "cup does not stand on goal: 31 mm")
     assert old.reason.name == "not_in_place" and old.sentence == "cup does not stand on goal: 31 mm"
+
+
+def test_an_outcome_shows_its_numbers_with_units_and_escapes_its_names(slipped):
+    outcome = CANNOT_START(slipped(object="<b>", way=0.031, turn=math.nan))
+    rows = {row[0].text: row[1].text for row in ElementTree.fromstring(outcome._repr_html_()).iter("tr")}
+    assert rows["why"] == outcome.sentence
+    assert rows["reason"] == "test_slipped"
+    assert "way 31 mm" in rows["measured"] and "object <b>" in rows["measured"]
+    assert "nan" not in rows["measured"]

@@ -3,6 +3,7 @@
 import numpy as np
 import py_trees
 import pytest
+from defusedxml import ElementTree
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Failure, Running
 from py_trees.common import Status
@@ -112,6 +113,22 @@ def test_a_result_shows_itself_in_a_line_and_in_a_table(toy, act):
     assert str(bad).startswith(f"FAILURE: {bad.why} (") and str(bad).count("<b>") == 1
     assert str(good).startswith("SUCCESS: ") and good.outcome.is_a(NOT_JUDGED)
     assert "&lt;b&gt;" in bad._repr_html_() and "<b>" not in bad._repr_html_()
+
+
+def test_a_table_holds_what_became_of_the_episode(toy, act):
+    rows = table(finished(unreachable(toy(act("move", ticks=10)))))
+    assert (rows["reason"], rows["leaf"], rows["status"].split()[0]) == ("out_of_reach", "move", "FAILURE")
+    assert "distance 120 mm" in rows["measured"]
+    assert {"why", "seed", "time", "policies"} <= rows.keys()
+    good = table(finished(toy(act("a", ticks=2))))
+    assert good["status"] == "SUCCESS" and not {"reason", "leaf"} & good.keys()
+
+
+def table(shown):
+    """Text by head, of a table that parses as XML too and sets no colour."""
+    html = shown._repr_html_()
+    assert "color" not in html and "background" not in html
+    return {row[0].text: row[1].text for row in ElementTree.fromstring(html).iter("tr")}
 
 
 def test_a_leaf_that_was_not_set_up_says_how_to():

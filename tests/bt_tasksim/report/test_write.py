@@ -9,7 +9,7 @@ import pytest
 from draws import good_seed
 
 from bt_tasksim.concept_nodes import TimePassed
-from bt_tasksim.core.errors import InputError, MachineError, Terminated
+from bt_tasksim.core.errors import InputError, LeafError, LostEngine, MachineError, Terminated
 from bt_tasksim.demos_decomp.log_file import read_log
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.replay import replay
@@ -85,6 +85,31 @@ def test_an_interrupted_run_leaves_its_log(runner, tmp_path, kind):
     assert log.source == "simulation" and log.demonstrations[0].time[-1] > 1
     found = replay(tmp_path / "runs/one")
     assert found.differences == {} and "the repeated run goes on" in found.why
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (LeafError("leaf 'x' raised KeyError: 'y'"), "leaf_raised"),
+        (LostEngine("the bridge has gone"), "machine_failed"),
+    ],
+)
+def test_a_run_that_an_error_ends_leaves_its_log(runner, tmp_path, error, reason):
+    """On a robot, what led to it happens once."""
+
+    def watch(step):
+        if step.observation.time > 1:
+            raise error
+
+    said = f"^{error}; what was run is in .*one$"
+    with pytest.raises(type(error), match=said) as caught:
+        write_run(tmp_path / "runs" / "one", runner, 3, watch=watch)
+    assert caught.value is error
+    assert names(tmp_path / "runs" / "one") == ["report.html", "result.json", "run.h5", "tree.svg"]
+    told = json.loads((tmp_path / "runs/one/result.json").read_text())
+    assert (told["status"], told["reason"], told["success"]) == ("INVALID", reason, False)
+    assert told["why"] in str(error)
+    assert replay(tmp_path / "runs/one").differences == {}
 
 
 def test_a_run_that_is_interrupted_before_it_begins_leaves_nothing(runner, tmp_path):

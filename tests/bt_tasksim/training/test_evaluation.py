@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import os
 
 import pytest
 
@@ -228,6 +229,28 @@ def test_an_interrupted_evaluation_keeps_and_tells_its_counts(tmp_path, kind, ra
     content = json.loads(path.read_text())
     assert content["episodes"] == 2 and not content["complete"]
     assert [outcome["seed"] for outcome in content["outcomes"]] == [1, 2]
+
+
+@pytest.mark.parametrize("full", [1, 9])
+def test_a_full_disk_loses_no_episode(tmp_path, monkeypatch, full):
+    """Where there is room again at the end nothing is lost; where there is none, the counts are told."""
+    monkeypatch.setattr(EvaluationFile, "EVERY", 0.0)
+    keep, told, fsync, times = EvaluationFile(tmp_path / "e.json"), [], os.fsync, []
+
+    def flush(file):
+        times.append(file)
+        if len(times) <= full:
+            raise OSError(28, "No space left on device")
+        fsync(file)
+
+    monkeypatch.setattr(os, "fsync", flush)
+    if full == 1:
+        assert evaluate(Job("pick_and_throw"), [1, 2], keep=keep, stopped=told.append).complete
+        assert json.loads((tmp_path / "e.json").read_text())["episodes"] == 2 and not told
+    else:
+        with pytest.raises(MachineError, match="No space left"):
+            evaluate(Job("pick_and_throw"), [1, 2], keep=keep, stopped=told.append)
+        assert [len(found.outcomes) for found in told] == [2]
 
 
 def test_where_it_cannot_be_kept_nothing_is_run(tmp_path):
