@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.plain import shown
 from bt_tasksim.core.world import PlaceModel
 
 Floats = NDArray[np.float64]
@@ -215,7 +216,7 @@ def checked_log(log: Log, where: str) -> Log:
         InputError: It has no demonstration, an unknown source, two of one name, or a faulty demonstration.
     """
     if log.source not in SOURCES:
-        raise InputError(f"{where} has source '{log.source}'{nearest(log.source, SOURCES)}")
+        raise InputError(f"{where} has source '{shown(log.source)}'{nearest(log.source, SOURCES)}")
     if not log.demonstrations:
         raise InputError(f"{where} has no demonstrations; nothing can be learned from an empty log")
     names = [demonstration.name for demonstration in log.demonstrations]

@@ -11,6 +11,9 @@ import errno
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+LONGEST = 100
+"""Characters of a name in which near ones are looked for."""
+
 
 class BtTasksimError(Exception):
     """Root of every error that this framework raises on purpose."""
@@ -107,7 +110,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
     if not names:
         return "; none is known"
     folded = {candidate.casefold(): candidate for candidate in names}
-    close = difflib.get_close_matches(name.casefold(), list(folded), n=3, cutoff=0.6)
+    close = difflib.get_close_matches(name[:LONGEST].casefold(), list(folded), n=3, cutoff=0.6)
     if close:
         return f"; did you mean {' or '.join(repr(folded[match]) for match in close)}?"
     return f"; known: {', '.join(names)}"

@@ -112,6 +112,9 @@ def test_a_good_one_passes_and_quaternions_become_unit(good):
 def test_a_log_needs_a_known_source_and_demonstrations_of_different_names(good):
     with pytest.raises(InputError, match="did you mean 'human'"):
         checked_log(Log("humann", (good,)), "x")
+    with pytest.raises(InputError) as caught:
+        checked_log(Log("x" * 100_000, (good,)), "x")
+    assert len(str(caught.value)) < 200
     with pytest.raises(InputError, match="no demonstrations"):
         checked_log(Log("human", ()), "x")
     with pytest.raises(InputError, match="two demonstrations of one name"):
