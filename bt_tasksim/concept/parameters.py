@@ -50,17 +50,20 @@ class Quantity:
 
 Vector = tuple[float, float, float]
 
-Metres = Annotated[float, Quantity("m", low=0.0)]
-Offset = Annotated[float, Quantity("m")]
-Radians = Annotated[float, Quantity("rad")]
+MOST = 1e6
+"""What no length, angle, force or speed of a robot comes near, and motions are still computed with."""
+
+Metres = Annotated[float, Quantity("m", low=0.0, high=MOST)]
+Offset = Annotated[float, Quantity("m", low=-MOST, high=MOST)]
+Radians = Annotated[float, Quantity("rad", low=-MOST, high=MOST)]
 Seconds = Annotated[float, Quantity("s", low=0.0)]
-Newtons = Annotated[float, Quantity("N", low=0.0)]
-MetresPerSecond = Annotated[float, Quantity("m/s", low=0.0)]
+Newtons = Annotated[float, Quantity("N", low=0.0, high=MOST)]
+MetresPerSecond = Annotated[float, Quantity("m/s", low=0.0, high=MOST)]
 Ratio = Annotated[float, Quantity("1", low=0.0, high=1.0)]
 Direction = Annotated[Vector, Quantity("1", "vector", unit_vector=True)]
 Axis = Annotated[Vector, Quantity("1", "vector", unit_vector=True, two_sided=True)]
-Position = Annotated[Vector, Quantity("m", "vector")]
-Points = Annotated[tuple[Vector, ...], Quantity("m", "points")]
+Position = Annotated[Vector, Quantity("m", "vector", low=-MOST, high=MOST)]
+Points = Annotated[tuple[Vector, ...], Quantity("m", "points", low=-MOST, high=MOST)]
 ObjectName = Annotated[str, Quantity("", "object")]
 PlaceName = Annotated[str, Quantity("", "place")]
 Text = Annotated[str, Quantity("", "text")]
@@ -202,8 +205,10 @@ def _number(value: Any, quantity: Quantity) -> float:
     number = float(value)
     if not math.isfinite(number):
         raise ValueError("it is not finite")
-    if number < quantity.low and math.isinf(quantity.high):
+    if number < quantity.low == 0.0 and quantity.high >= MOST:
         raise ValueError(f"it should not be below {quantity.low:g}")
+    if number > quantity.high >= MOST:
+        raise ValueError(f"it should not be above {quantity.high:g}")
     if not quantity.low <= number <= quantity.high:
         raise ValueError(f"it should lie between {quantity.low:g} and {quantity.high:g}")
     return number
@@ -214,7 +219,7 @@ def _vector(value: Any, quantity: Quantity) -> Vector:
         not isinstance(value, Sequence) and not hasattr(value, "__len__")
     ):
         raise TypeError
-    numbers = [_number(v, Quantity(quantity.unit)) for v in value]
+    numbers = [_number(v, quantity) for v in value]
     if len(numbers) != 3:
         raise ValueError(f"it has {len(numbers)} numbers")
     if quantity.unit_vector:

@@ -25,6 +25,10 @@ LARGEST = 1.0
 FORMATS = ("obj", "stl", "ply", "off", "glb")
 """Forms of mesh files, each in one file."""
 MOST_BYTES = 64 << 20
+MOST_BODIES = 256
+"""Separate bodies of a mesh: physics looks at each one's contacts."""
+FARTHEST = 1e6
+"""Largest coordinate in a mesh's own units."""
 _MOST_VERTICES = 64
 _HOLLOW = 1.2
 
@@ -114,14 +118,19 @@ def _read(path: str, version: tuple[int, ...]) -> tuple[TriangleMesh, tuple[Tria
     try:
         # From memory: a mesh file may name other files, of materials and pictures, which are not opened.
         content = io.BytesIO(Path(path).read_bytes())
-        loaded = trimesh.load(content, file_type=form, force="mesh", skip_materials=True)
-        loaded.merge_vertices()
+        with np.errstate(all="ignore"):  # numbers without bounds, which are looked at below
+            loaded = trimesh.load(content, file_type=form, force="mesh", skip_materials=True)
+            loaded.merge_vertices()
     except Exception as error:  # readers of a dozen formats raise whatever they please
         raise InputError(f"mesh '{path}' cannot be read: {type(error).__name__}: {error}") from error
     if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) < 4:
         raise InputError(f"mesh '{path}' has no solid in it: fewer than four triangles")
     if not np.all(np.isfinite(loaded.vertices)):
         raise InputError(f"mesh '{path}' has coordinates that are not finite numbers")
+    if np.abs(loaded.vertices).max() > FARTHEST:
+        raise InputError(
+            f"mesh '{path}' has coordinates beyond {FARTHEST:g}: save it in metres or millimetres"
+        )
     if not loaded.is_watertight:
         raise InputError(
             f"mesh '{path}' is not watertight: {_holes(loaded)} of its edges do not join two triangles"
@@ -132,6 +141,10 @@ def _read(path: str, version: tuple[int, ...]) -> tuple[TriangleMesh, tuple[Tria
         raise InputError(f"mesh '{path}' is flat: it encloses no volume")
     if loaded.volume < 0:
         loaded.invert()
+    if loaded.body_count > MOST_BODIES:
+        raise InputError(
+            f"mesh '{path}' has {loaded.body_count} separate bodies, more than {MOST_BODIES}: save fewer"
+        )
     bodies = loaded.split(only_watertight=True)
     return _plain(loaded), tuple(_plain(body) for body in bodies)
 

@@ -225,6 +225,21 @@ def test_separate_bodies_keep_hollows(tmp_path):
     assert geometry.volume == pytest.approx(2 * 0.06 * 0.01 * 0.05)
 
 
+def test_a_mesh_of_too_many_bodies_is_refused(tmp_path):
+    save(tmp_path / "gravel.obj", *(block(0.001, 0.001, 0.001, (0.002 * k, 0, 0)) for k in range(300)))
+    with pytest.raises(InputError, match="has 300 separate bodies, more than 256"):
+        mesh_shape(str(tmp_path / "gravel.obj"), (0.06, 0.06, 0.1))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e15, 1e307])
+def test_coordinates_without_bounds_are_refused(tmp_path, size):
+    mesh = block(1.0, 1.0, 1.0)
+    save(tmp_path / "far.obj", TriangleMesh(mesh.vertices * size, mesh.faces))
+    with pytest.raises(InputError, match=r"coordinates (beyond|that are not finite)"):
+        mesh_shape(str(tmp_path / "far.obj"), (0.06, 0.06, 0.1))
+
+
 def test_fine_meshes_get_few_corners(tmp_path):
     save(tmp_path / "can.obj", prism(circle(200) * 0.03, 0.1))
     corners = mesh_shape(str(tmp_path / "can.obj"), (0.06, 0.06, 0.1)).collision[0].corners()
