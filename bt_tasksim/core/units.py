@@ -65,8 +65,8 @@ MORE_DIGITS = 6
 def told_apart(numbers: Sequence[Shown]) -> list[str]:
     """The texts of one sentence's numbers: those that differ and would read alike get more digits.
 
-    Every number of such a group gets as many more as they need, up to `MORE_DIGITS`; if they are alike even then,
-    they keep their format.
+    Every number of such a group gets as many more as they need, up to `MORE_DIGITS`; if they are alike
+    even then, they keep their format.
     """
     texts = [number.text() for number in numbers]
     for text, count in Counter(texts).items():
