@@ -20,6 +20,7 @@ from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.former import advice
 from bt_tasksim.core.plugins import line_in
 from bt_tasksim.policy.policy import concept_name
+from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.trees.check import check_tree
 
@@ -68,10 +69,13 @@ def load_source(
         policies: Concepts and the policies that their leaves take, see `with_policies`.
 
     Raises:
-        InputError: There is no such tree or scene, or the file is no good.
+        InputError: There is no such tree, scene or robot, the file is no good, or its ``scene`` does not
+            take the robot that is named.
         NoSceneError: The tree says nothing of its scene, and none is named.
     """
     path = Path(tree)
+    if robot is not None:
+        load_robot(robot)
     if path.suffix == ".py":
         module = _module(path)
         build = _function(module, "build", path)
@@ -289,6 +293,11 @@ def _made(build: Any, robot: str | None, path: Path) -> Scene:
     made = _called(build, path) if robot is None else _called(build, path, robot)
     if not isinstance(made, Scene):
         raise InputError(f"'{path}': scene() should return a Scene, found {type(made).__name__}")
+    if robot is not None and made.robot != made.with_robot(robot).robot:
+        raise InputError(
+            f"'{path}': scene() gives robot '{made.robot}', though --robot asks for '{robot}': "
+            "pass its argument robot on to Scene(robot)"
+        )
     return made
 
 

@@ -27,13 +27,17 @@ from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import part
 from bt_tasksim.core.resources import is_file
 from bt_tasksim.robot.limits import SafetyLimits, read_limits
-from bt_tasksim.robot.urdf_links import joint_limits
+from bt_tasksim.robot.urdf_links import joint_depths, joint_limits, joint_speeds
 
 if TYPE_CHECKING:
     from bt_tasksim.robot.schema import EnvelopeEntry, RobotFile
 
 ROUNDED = 1e-3
 """Rad or m by which a robot file's joint positions may differ from its URDF's, which are often rounded."""
+FASTER = 10.0
+"""Times its URDF's speed above which a joint's speed is a mistake, mostly of units, and no better motor."""
+SLANT = 0.05
+"""Least horizontal part of the direction in which a hand closes, of length one."""
 
 
 @dataclass(frozen=True)
@@ -304,6 +308,13 @@ def _check(robot: RobotDescription) -> None:
         raise FieldError("'arm.rest' is not within 'arm.lower' and 'arm.upper'", "arm", "rest")
     if np.array_equal(robot.hand_open, robot.hand_closed):
         raise FieldError("'hand.open' and 'hand.closed' are the same", "hand", "closed")
+    if math.hypot(*robot.closing[:2]) < SLANT:
+        raise FieldError(
+            "'tool.closing' is parallel to the approach of a tool that points straight down: "
+            "give the direction in which the hand closes, across it",
+            "tool",
+            "closing",
+        )
     if not np.any(robot.task_mask > 0.0):
         raise FieldError("'task_mask' should have one positive weight at least", "task_mask")
     if np.count_nonzero(robot.task_mask) > len(robot.arm_joints):
@@ -319,16 +330,41 @@ def _check(robot: RobotDescription) -> None:
 
 
 def _check_urdf(robot: RobotDescription) -> None:
-    """No joint of the hand is sent to where its URDF does not let it go."""
+    """The arm is listed in its order, and no joint is sent to where its URDF does not let it go."""
+    depths = joint_depths(robot.urdf)
+    if all(joint in depths for joint in robot.arm_joints):
+        order = sorted(robot.arm_joints, key=depths.__getitem__)
+        if tuple(order) != robot.arm_joints:
+            raise FieldError(
+                f"'arm.joints' should be listed from the base on: {', '.join(order)}", "arm", "joints"
+            )
+    _check_positions(robot, robot.arm_joints, "arm", {"lower": robot.arm_lower, "upper": robot.arm_upper})
+    _check_positions(robot, robot.hand_joints, "hand", {"open": robot.hand_open, "closed": robot.hand_closed})
+    speeds = joint_speeds(robot.urdf)
+    for i, (joint, value) in enumerate(zip(robot.arm_joints, robot.arm_velocity.tolist(), strict=True)):
+        if value > FASTER * speeds.get(joint, np.inf):
+            raise FieldError(
+                f"'arm.velocity' lets joint '{joint}' move at {value:g}, and its URDF at {speeds[joint]:g}: "
+                "give rad/s",
+                "arm",
+                "velocity",
+                i,
+            )
+
+
+def _check_positions(
+    robot: RobotDescription, joints: Sequence[str], group: str, fields: Mapping[str, Array]
+) -> None:
+    """Positions ``(n,)`` of joints, by field, are within the limits of their URDF."""
     limits = joint_limits(robot.urdf)
-    for name, values in (("open", robot.hand_open), ("closed", robot.hand_closed)):
-        for i, (joint, value) in enumerate(zip(robot.hand_joints, values.tolist(), strict=True)):
+    for name, values in fields.items():
+        for i, (joint, value) in enumerate(zip(joints, values.tolist(), strict=True)):
             lower, upper = limits.get(joint, (-np.inf, np.inf))
             if not lower - ROUNDED <= value <= upper + ROUNDED:
                 raise FieldError(
-                    f"'hand.{name}' puts joint '{joint}' at {value:g}, and its URDF lets it go "
+                    f"'{group}.{name}' puts joint '{joint}' at {value:g}, and its URDF lets it go "
                     f"from {lower:g} to {upper:g}",
-                    "hand",
+                    group,
                     name,
                     i,
                 )

@@ -126,6 +126,46 @@ def joint_limits(urdf: Path) -> dict[str, tuple[float, float]]:
     return found
 
 
+def joint_speeds(urdf: Path) -> dict[str, float]:
+    """Largest speed, rad/s or m/s, of those joints of a URDF that state one; 0 states none.
+
+    Raises:
+        InputError: The file is no URDF, or a speed is no number.
+    """
+    found = {}
+    for joint in read_urdf(urdf).findall("joint"):
+        limit = joint.find("limit")
+        try:
+            speed = 0.0 if limit is None else float(limit.get("velocity", "0"))
+        except ValueError as error:
+            raise InputError(f"URDF '{urdf}': limit of joint '{joint.get('name')}': {error}") from error
+        if speed > 0.0:
+            found[str(joint.get("name"))] = speed
+    return found
+
+
+def joint_depths(urdf: Path) -> dict[str, int]:
+    """How many joints each joint of a URDF hangs on: what carries another one has fewer.
+
+    Raises:
+        InputError: The file is no URDF.
+    """
+    parents, carriers = {}, {}
+    for joint in read_urdf(urdf).findall("joint"):
+        parent, child = joint.find("parent"), joint.find("child")
+        if parent is not None and child is not None:
+            parents[str(joint.get("name"))] = parent.get("link", "")
+            carriers[child.get("link", "")] = str(joint.get("name"))
+    depths = {}
+    for name in parents:
+        above, seen = carriers.get(parents[name]), {name}
+        while above is not None and above not in seen:  # a circle is said where the links are read
+            seen.add(above)
+            above = carriers.get(parents[above])
+        depths[name] = len(seen) - 1
+    return depths
+
+
 def links_below(links: tuple[LinkJoint, ...], root: str) -> set[str]:
     """Names of a link and of all links that it carries."""
     names = {root}

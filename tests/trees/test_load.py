@@ -9,6 +9,7 @@ from bt_tasksim.concept.plugins import load_parts
 from bt_tasksim.concept_nodes import Grasp, Pick
 from bt_tasksim.core import plugins
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.resources import asset
 from bt_tasksim.trees import save_tree, sequence
 from bt_tasksim.trees.load import load_source, names_in, own_nodes, scenarios
 
@@ -129,6 +130,25 @@ def test_a_python_file_with_its_own_scene(write):
     source = load_source(write("lift.py", GOOD), "xarm7_ability")
     assert source.name == "lift" and source.scene.name == "mine" and source.scene.robot == "xarm7_ability"
     assert [n.name for n in source.build().children] == ["grasp cup", "pick cup"]
+
+
+def test_a_scene_that_passes_over_the_robot_that_is_named(write):
+    path = write("lift.py", GOOD.replace("Scene(robot,", "Scene('panda',"))
+    sentence = refused(path, "xarm7_ability")
+    assert "lift.py" in sentence and "'panda'" in sentence and "'xarm7_ability'" in sentence
+    assert load_source(path, "panda").scene.robot == "panda"
+
+
+@pytest.mark.parametrize("text", [GOOD, GOOD.replace("Scene(robot,", "Scene('panda',")])
+def test_a_robot_that_there_is_not(write, text):
+    sentence = refused(write("lift.py", text), "nonsense")
+    assert "'nonsense'" in sentence and "--robot" not in sentence
+
+
+def test_a_python_file_takes_a_robot_file_by_a_relative_path(write, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.yaml").write_bytes(asset("robots", "panda.yaml").read_bytes())
+    assert load_source(write("lift.py", GOOD), "mine.yaml").scene.robot == str(tmp_path / "mine.yaml")
 
 
 def test_a_python_file_with_a_named_scene(write):

@@ -180,6 +180,12 @@ BAD: list[tuple[str, Any, str]] = [
     ("arm.velocity", [-1.0] * 7, "'arm.velocity[0]' should be positive"),
     ("tips", [{"name": "a", "links": ["b"], "point": [0, 0, 1e12]}], "'tips[0].point[2]'"),
     ("tool.closing", [0, 0, 0], "'tool.closing' should be a direction"),
+    ("tool.closing", [0, 0, 1], "'tool.closing' is parallel to the approach"),
+    ("tool.closing", [0.001, 0, -2], "'tool.closing' is parallel to the approach"),
+    ("arm.lower", [-166, *[-1.7] * 2, -3, -2, 0, -2], "'arm.lower' puts joint 'panda_joint1' at -166"),
+    ("arm.upper", [2.8, 1.7, 2.8, 0.5, 2.8, 3.7, 2.8], "at 0.5, and its URDF lets it go from -3.0718"),
+    ("arm.velocity", [2, 2, 2, 60, 2, 2, 2], "'arm.velocity' lets joint 'panda_joint4' move at 60"),
+    ("arm.joints", [f"panda_joint{i}" for i in (2, 1, 3, 4, 5, 6, 7)], "from the base on: panda_joint1"),
     ("solver_iterations", 10**9, "'solver_iterations' should be at most"),
     ("name", "pan/da", "'name' should hold no '/'"),
     ("urdf", "/etc/passwd", "should lie in the folder"),
@@ -205,6 +211,14 @@ def test_bad_robot_file(tmp_path: Path, key: str, value: Any, says: str) -> None
         load_robot(str(path))
     assert says in str(error.value)
     assert re.search(r"mine\.yaml', line \d+: ", str(error.value)) and "\n" not in str(error.value)
+
+
+def test_a_faster_motor_than_the_urdfs_is_taken(tmp_path: Path) -> None:
+    data = yaml.safe_load(asset("robots", "panda.yaml").read_text())
+    data["arm"]["velocity"] = [9.0] * 7
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(data))
+    assert load_robot(str(path)).arm_velocity.tolist() == [9.0] * 7
 
 
 def test_the_line_is_that_of_the_field(tmp_path: Path) -> None:
@@ -264,7 +278,6 @@ WRONG_FOR_URDF: list[tuple[str, Any, str]] = [
     ("base_link", "panda_hand", "moves with a joint"),
     ("wrist_link", "wrist", "no link 'wrist'"),
     ("hand.joints", ["panda_finger_joint1", "panda_finger_joint3"], "no joint 'panda_finger_joint3'"),
-    ("arm.joints", [f"panda_joint{i}" for i in (2, 1, 3, 4, 5, 6, 7)], "from the base on"),
 ]
 
 
