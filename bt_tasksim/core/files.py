@@ -8,6 +8,7 @@ has left under a hidden name is cleared away when its place is written the next 
 from __future__ import annotations
 
 import contextlib
+import errno
 import functools
 import os
 import platform
@@ -20,9 +21,12 @@ from pathlib import Path
 
 from bt_tasksim.core.errors import InputError, MachineError, is_bad_path
 from bt_tasksim.core.interrupts import terminable
+from bt_tasksim.core.locks import locked
 
 _NEW, _OLD = "new", "old"
 """Kinds of hidden names: what is being written, and what was there before."""
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
+"""Errors of file systems that know no locks: there, two processes may write to one place."""
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
@@ -108,41 +112,60 @@ def whole_folder(path: str | Path, names: Collection[str] = ()) -> Iterator[Path
         An empty folder beside it.
 
     Raises:
-        InputError: A folder above is a file, or the path holds something else.
+        InputError: A folder above is a file, the path holds something else, or another process fills it.
         MachineError: The disk is full or not writable.
     """
     path = Path(os.path.abspath(path))
     clear_away(path)
     check_folder(path, names)
-    unfinished, before = _beside(path, _NEW), _beside(path, _OLD)
-    made = [folder for folder in path.parents if not os.path.exists(folder)]
-    try:
-        with terminable():
-            unfinished.mkdir(parents=True)
-            yield unfinished
-            check_folder(path, names)
-            for file in unfinished.rglob("*"):
-                if file.is_file():
-                    _flush(file)
-            if os.path.exists(path):
-                os.rename(path, before)
-            os.rename(unfinished, path)
-    except (ConnectionError, TimeoutError):
-        raise
-    except MachineError as error:
-        if str(unfinished) not in str(error):
+    with alone(path):
+        unfinished, before = _beside(path, _NEW), _beside(path, _OLD)
+        try:
+            with terminable():
+                unfinished.mkdir(parents=True)
+                yield unfinished
+                check_folder(path, names)
+                for file in unfinished.rglob("*"):
+                    if file.is_file():
+                        _flush(file)
+                if os.path.exists(path):
+                    os.rename(path, before)
+                os.rename(unfinished, path)
+        except (ConnectionError, TimeoutError):
             raise
-        raise MachineError(str(error).replace(str(unfinished), str(path))) from error
-    except OSError as error:
-        raise _cannot_write(path, error) from error
-    finally:
-        if os.path.exists(before) and not os.path.exists(path):
-            os.rename(before, path)
-        for rest in (unfinished, before):
-            shutil.rmtree(rest, ignore_errors=True)
-        for folder in made:
-            with contextlib.suppress(OSError):  # it is needed if it is not empty
-                folder.rmdir()
+        except MachineError as error:
+            if str(unfinished) not in str(error):
+                raise
+            raise MachineError(str(error).replace(str(unfinished), str(path))) from error
+        except OSError as error:
+            raise _cannot_write(path, error) from error
+        finally:
+            if os.path.exists(before) and not os.path.exists(path):
+                os.rename(before, path)
+            for rest in (unfinished, before):
+                shutil.rmtree(rest, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def alone(path: str | Path) -> Iterator[None]:
+    """No other process that asks writes to a path in the ``with`` block: of two, one would be lost.
+
+    Args:
+        path: A file or folder; folders above it are made, and removed at the end if nothing came into them.
+
+    Raises:
+        InputError: Another process is writing there.
+        MachineError: The disk is not writable.
+    """
+    path = Path(os.path.abspath(path))
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(locked(path.with_name(f".{path.name}.writing"), f"writing '{path}'"))
+        except MachineError as error:
+            assert isinstance(error.__cause__, OSError)
+            if error.__cause__.errno not in _NO_LOCKS:
+                raise _cannot_write(path, error.__cause__) from error
+        yield
 
 
 def file_version(path: str | Path) -> tuple[int, ...]:

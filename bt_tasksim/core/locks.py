@@ -28,18 +28,20 @@ def locked(path: str | Path, what: str) -> Iterator[None]:
         MachineError: The file cannot be made.
     """
     path = Path(os.path.abspath(path))
-    made = [folder for folder in path.parents if not folder.exists()]
+    made = [folder for folder in path.parents if not os.path.exists(folder)]
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = _taken(path, what)
-    except OSError as error:
-        raise MachineError(f"cannot write '{path}': {error.strerror or error}") from error
-    try:
-        yield
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = _taken(path, what)
+        except OSError as error:
+            raise MachineError(f"cannot write '{path}': {error.strerror or error}") from error
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                path.unlink()  # while it is held: whoever waits for it sees that the file is another one now
+            os.close(file)
     finally:
-        with contextlib.suppress(OSError):
-            path.unlink()  # while it is held: whoever waits for it sees that the file is another one now
-        os.close(file)
         for folder in made:
             with contextlib.suppress(OSError):  # it is needed if it is not empty
                 folder.rmdir()
@@ -55,7 +57,7 @@ def _taken(path: Path, what: str) -> int:
             os.close(file)
         except (BlockingIOError, PermissionError):
             os.close(file)
-            raise LockedError(f"another process is {what}: wait for it, or choose another folder") from None
+            raise LockedError(f"another process is {what}: wait for it, or choose another place") from None
         except BaseException:
             os.close(file)
             raise

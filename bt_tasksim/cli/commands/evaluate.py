@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,6 +38,7 @@ def evaluate(
     ] = None,
 ) -> None:
     """Run a tree on many seeded draws and count successes."""
+    from bt_tasksim.core.files import alone
     from bt_tasksim.training import evaluation
 
     if seed + episodes > arguments.SEEDS:
@@ -49,8 +51,9 @@ def evaluate(
     def tell(found: Evaluation) -> None:
         say(*map(printable, found.lines()))
 
+    only = contextlib.nullcontext() if json_ is None else alone(json_)
     try:
-        with progress("episodes", episodes) as advance:
+        with only, progress("episodes", episodes) as advance:
             found = evaluation.evaluate(
                 job,
                 range(seed, seed + episodes),

@@ -85,7 +85,9 @@ def test_where_nobody_can_be_told_nothing_is_raised():
 
 
 @pytest.mark.parametrize(
-    "out", ["/", "x" * 300, "x" * 240, "/".join(["y" * 200] * 25)], ids=["root", "name", "hidden", "path"]
+    "out",
+    ["/", "x" * 300, "a/b/" + "x" * 300, "x" * 240, "/".join(["y" * 200] * 25)],
+    ids=["root", "name", "below", "hidden", "path"],
 )
 def test_a_folder_that_cannot_be_is_bad_input(refused, out):
     assert "cannot write" in refused("run", "pick_and_place", "--out", out)

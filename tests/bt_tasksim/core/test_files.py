@@ -1,6 +1,7 @@
 """Files appear whole or not at all."""
 
 import errno
+import fcntl
 import os
 import resource
 import signal
@@ -12,6 +13,7 @@ import pytest
 from bt_tasksim.core import files
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.files import (
+    alone,
     check_folder,
     check_writable,
     whole_file,
@@ -189,19 +191,14 @@ def writing(kind, path):
     return process
 
 
-@pytest.mark.parametrize("kind", ["file", "folder"])
-def test_what_a_killed_process_left_is_cleared_by_the_next_one(tmp_path, kind):
+def test_what_a_killed_process_left_is_cleared_by_the_next_one(tmp_path):
     path = tmp_path / "one.d"
-    process = writing(kind, path)
-    other = writing(kind, path)
+    process = writing("file", path)
+    other = writing("file", path)
     process.kill()
     process.wait()
     assert len(os.listdir(tmp_path)) == 2
-    if kind == "folder":
-        with whole_folder(path):
-            assert len(os.listdir(tmp_path)) == 2  # the other process's, and this one's
-    else:
-        write_text(path, "whole")
+    write_text(path, "whole")
     assert len(os.listdir(tmp_path)) == 2
     other.kill()
     other.wait()
@@ -209,6 +206,18 @@ def test_what_a_killed_process_left_is_cleared_by_the_next_one(tmp_path, kind):
     assert len(os.listdir(tmp_path)) == 3
     process.stdout.close()
     other.stdout.close()
+
+
+def test_what_a_killed_process_left_of_a_folder_is_cleared_by_the_next_one(tmp_path):
+    path = tmp_path / "one.d"
+    process = writing("folder", path)
+    process.kill()
+    process.wait()
+    process.stdout.close()
+    assert len(os.listdir(tmp_path)) == 2
+    with whole_folder(path):
+        assert len(os.listdir(tmp_path)) == 2  # this process's folder, and its lock
+    assert os.listdir(tmp_path) == ["one.d"]
 
 
 @pytest.mark.parametrize("kind", ["file", "folder"])
@@ -245,3 +254,39 @@ def test_whether_a_file_can_be_written_is_known_beforehand(tmp_path):
         with pytest.raises(InputError):
             check_writable(path)
     assert os.listdir(tmp_path) == []
+
+
+WRITE = """
+import sys
+from bt_tasksim.core.files import alone, whole_folder
+with (whole_folder(sys.argv[2]) if sys.argv[1] == "folder" else alone(sys.argv[2])) as inside:
+    print("writing", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("kind", ["folder", "file"])
+def test_of_two_processes_that_write_to_one_place_the_second_is_refused(tmp_path, kind):
+    path = tmp_path / "new" / "one"
+    first = subprocess.Popen(
+        [sys.executable, "-c", WRITE, kind, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert first.stdout.readline() == b"writing\n"
+    for place in (whole_folder, alone):
+        with pytest.raises(InputError, match=r"another process is writing '.*one'"), place(path):
+            pass
+    first.communicate(b"")
+    assert first.returncode == 0
+    with whole_folder(path) as inside:
+        (inside / "a").write_text("a")
+    assert sorted(p.name for p in path.parent.iterdir()) == ["one"]
+
+
+def test_a_file_system_without_locks_is_written_to(tmp_path, monkeypatch):
+    def none(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "lockf", none)
+    with whole_folder(tmp_path / "one") as inside:
+        (inside / "a").write_text("a")
+    assert (tmp_path / "one" / "a").read_text() == "a"
