@@ -10,7 +10,7 @@ from bt_tasksim.core.markup import html_pairs
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.engines.clock import Timing
 from bt_tasksim.scene.configuration import ActorConfiguration
-from bt_tasksim.scene.success import Verdict
+from bt_tasksim.scene.success import NO_GOAL, Verdict
 
 
 @dataclass(repr=False)
@@ -66,10 +66,12 @@ class Result:
 
     def _repr_html_(self) -> str:
         """A small table, for notebooks."""
+        unjudged = self.verdict is not None and self.verdict.outcome.is_a(NO_GOAL)
         tree = "" if self.success else f" (the tree ended {self.status.name})"
         return html_pairs(
             {
                 "status": f"{'SUCCESS' if self.success else 'FAILURE'}{tree}",
+                "judged": "nothing, no goal is set" if unjudged else "",
                 "why": self.outcome.sentence,
                 **({} if self.success else self.outcome.cause.table_rows()),
                 "leaf": self.leaf,

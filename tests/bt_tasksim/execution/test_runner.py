@@ -1,5 +1,8 @@
 """The tick loop: an episode from reset to judgement, errors that end everything, independent trees."""
 
+import dataclasses
+import math
+
 import numpy as np
 import py_trees
 import pytest
@@ -17,6 +20,7 @@ from bt_tasksim.core.plugins import load_plugin
 from bt_tasksim.core.world import Command
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import NOT_JUDGED, Runner
+from bt_tasksim.scene.success import NO_GOAL, Verdict
 from bt_tasksim.trees import fallback, parallel, retry, sequence, timeout
 from bt_tasksim.trees.load import load_source
 
@@ -122,6 +126,14 @@ def test_a_table_holds_what_became_of_the_episode(toy, act):
     assert {"why", "seed", "time", "policies"} <= rows.keys()
     good = table(finished(toy(act("a", ticks=2))))
     assert good["status"] == "SUCCESS" and not {"reason", "leaf"} & good.keys()
+
+
+def test_the_table_says_that_nothing_was_judged(toy, act):
+    good = finished(toy(act("a", ticks=2)))
+    assert "judged" not in table(good)
+    for reason, said in ((NO_GOAL, True), (NOT_JUDGED, False)):
+        verdict = Verdict(True, reason(), math.nan, math.nan, 0.0)
+        assert ("judged" in table(dataclasses.replace(good, verdict=verdict))) is said
 
 
 def table(shown):
