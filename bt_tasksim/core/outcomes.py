@@ -32,7 +32,7 @@ from bt_tasksim.core.errors import (
 )
 from bt_tasksim.core.markup import html_pairs
 from bt_tasksim.core.registry import part, register
-from bt_tasksim.core.units import METRES, RADIANS, SECONDS, Unit
+from bt_tasksim.core.units import METRES, RADIANS, SECONDS, Shown, Unit, told_apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,14 +44,22 @@ class Form:
             number in another format than its unit's own.
         units: Units of the numbers, by gap.
         names: The other gaps.
+        shown: The numbers that the sentence shows, each with the format that it asks for.
     """
 
     template: str
     units: Mapping[str, Unit] = field(default_factory=dict)
     names: tuple[str, ...] = field(init=False)
+    shown: tuple[tuple[str, str], ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        gaps = [gap for _, gap, _, _ in string.Formatter().parse(self.template) if gap is not None]
+        parsed = [
+            (gap, spec or "")
+            for _, gap, spec, _ in string.Formatter().parse(self.template)
+            if gap is not None
+        ]
+        gaps = [gap for gap, _ in parsed]
+        object.__setattr__(self, "shown", tuple(dict.fromkeys(p for p in parsed if p[0] in self.units)))
         object.__setattr__(self, "names", tuple(dict.fromkeys(g for g in gaps if g not in self.units)))
 
     def __call__(self, detail: Statement | None = None, /, **values: Any) -> Statement:
@@ -89,7 +97,10 @@ class Statement:
     @property
     def own_sentence(self) -> str:
         """The sentence without the detail; the only place where one is made."""
-        gaps = {name: _Shown(value, self.form.units[name]) for name, value in self.numbers.items()}
+        asked = [(n, spec) for n, spec in self.form.shown if n in self.numbers]
+        texts = told_apart([Shown(self.numbers[n], self.form.units[n], spec) for n, spec in asked])
+        told = dict(zip(asked, texts, strict=True))
+        gaps = {name: _Gap(name, told) for name in self.numbers}
         return self.form.template.format(**gaps, **self.names)
 
     @property
@@ -101,8 +112,8 @@ class Statement:
     @property
     def values(self) -> dict[str, str]:
         """What fills the gaps, as people read it: known numbers with their units, and names."""
-        known = {n: self.form.units[n].text(v) for n, v in self.numbers.items() if isfinite(v)}
-        return {**known, **self.names}
+        known = {n: Shown(v, self.form.units[n]) for n, v in self.numbers.items() if isfinite(v)}
+        return {**dict(zip(known, told_apart(list(known.values())), strict=True)), **self.names}
 
     def __str__(self) -> str:
         return self.sentence
@@ -189,14 +200,14 @@ class Outcome(Statement):
         return {"reason": self.form.name, **super().to_data()}
 
 
-class _Shown:
-    """A number that shows itself with its unit."""
+class _Gap:
+    """A number that shows itself as it was told apart from the others, by its name and format."""
 
-    def __init__(self, value: float, unit: Unit) -> None:
-        self._value, self._unit = value, unit
+    def __init__(self, name: str, told: Mapping[tuple[str, str], str]) -> None:
+        self._name, self._told = name, told
 
     def __format__(self, spec: str) -> str:
-        return self._unit.text(self._value, spec)
+        return self._told[self._name, spec]
 
 
 # ---- the register -----------------------------------------------------------------------------------------

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 
@@ -30,6 +32,54 @@ class Unit:
             spec: A format, instead of the unit's own.
         """
         return f"{value * self.scale:{spec or self.spec}} {self.shown}".rstrip()
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A number as one sentence shows it.
+
+    Attributes:
+        value: The number, in SI units.
+        unit: Its unit.
+        spec: A format, instead of the unit's own.
+    """
+
+    value: float
+    unit: Unit
+    spec: str = ""
+
+    def text(self, digits: int = 0) -> str:
+        """The number with its unit, with so many digits more than its format has."""
+        spec = self.spec or self.unit.spec
+        if digits:
+            front, _, end = spec.rstrip("efgEFG%").partition(".")
+            kind = spec[len(spec.rstrip("efgEFG%")) :]
+            spec = f"{front}.{int(end or 6) + digits}{kind}"
+        return self.unit.text(self.value, spec)
+
+
+MORE_DIGITS = 6
+"""Digits beyond those of its format that a number gets at most, see `told_apart`."""
+
+
+def told_apart(numbers: Sequence[Shown]) -> list[str]:
+    """The texts of one sentence's numbers: those that differ and would read alike get more digits.
+
+    Every number of such a group gets as many more as they need, up to `MORE_DIGITS`; if they are alike
+    even then, they keep their format.
+    """
+    texts = [number.text() for number in numbers]
+    for text, count in Counter(texts).items():
+        alike = [i for i, other in enumerate(texts) if other == text]
+        values = {numbers[i].value for i in alike if math.isfinite(numbers[i].value)}
+        if count < 2 or len(values) < 2:
+            continue
+        longer = ([numbers[i].text(more) for i in alike] for more in range(1, MORE_DIGITS + 1))
+        best = max(longer, key=lambda found: len(set(found)))
+        if len(set(best)) > 1:
+            for i, found in zip(alike, best, strict=True):
+                texts[i] = found
+    return texts
 
 
 METRES = Unit("m", "mm", 1000.0)

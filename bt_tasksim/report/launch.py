@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.errors import InputError, MachineError, nearest
 from bt_tasksim.core.files import check_folder, check_writable, write_bytes
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
@@ -17,7 +18,11 @@ from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report.video import Film, VideoRecorder
 from bt_tasksim.report.write import FILES, VIDEO, write_run
 from bt_tasksim.scene.scene import Scene
+from bt_tasksim.trees.load import with_policies
 
+_ENGINES = tuple(f.name for f in dataclasses.fields(EngineOptions))
+_OPTIONS = ("seed", "video", "out", "film", "policy", "options")
+"""What `run` takes by keyword besides."""
 _log = logging.getLogger(__name__)
 
 
@@ -29,6 +34,7 @@ def run(
     video: str | Path | bool | None = None,
     out: str | Path | None = None,
     film: Film | None = None,
+    policy: Mapping[str, str] | None = None,
     options: EngineOptions | None = None,
     **engines: Any,
 ) -> Result:
@@ -43,6 +49,8 @@ def run(
             report, all of them or none. An earlier run's folder is replaced, any other that is not empty is
             refused. None: nothing is kept.
         film: How a video is made: camera, size, frames a second.
+        policy: Policies by concept, such as ``{"grasp": "policies/grasp"}``: every leaf of the concept takes
+            it, whatever the tree says, and keeps it. ``"programmed"``, or a policy's name or folder.
         options: Which engines; or name them by keyword, such as ``noise="none"``, ``perception="camera"``.
         **engines: See `EngineOptions`.
 
@@ -50,10 +58,13 @@ def run(
         What became of it; ``result.status`` and ``result.why`` say it in short.
 
     Raises:
-        InputError: The tree, the scene, an option, or a place to write to is no good.
+        InputError: The tree, the scene, a policy, an option, or a place to write to is no good.
         MachineError: An engine failed, the machine cannot film, or the disk is full or not writable.
         KeyboardInterrupt: The run was interrupted; the folder, if any, holds what was run until then.
     """
+    unknown = next((name for name in engines if name not in _ENGINES), None)
+    if unknown is not None:
+        raise InputError(f"unknown option '{unknown}'{nearest(unknown, (*_ENGINES, *_OPTIONS))}")
     film, path = film or Film(), None if isinstance(video, bool) or video is None else Path(video)
     if video is True and out is None:
         raise InputError("video=True films into the run's folder: give out=FOLDER, or video='run.mp4'")
@@ -69,7 +80,7 @@ def run(
         raise InputError(f"give options= or {next(iter(engines))}=, not both")
     if filmed:
         options = dataclasses.replace(options, rendering=True)
-    runner = Runner(tree, scene, options)
+    runner = Runner(with_policies(lambda: tree, (policy or {}).items())(), scene, options)
     try:
         if out is not None:
             return _kept(Path(out), runner, seed, path, film)

@@ -5,19 +5,23 @@ from __future__ import annotations
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.units import METRES, RADIANS
+from bt_tasksim.core.units import METRES, RADIANS, Unit
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
 from bt_tasksim.scene.specs import Goal
 
-_OFF = {"missing": METRES, "angle": RADIANS}
-HELD_UP = register_reason("held_up", "{object} is held up, {missing} below and {angle} off", **_OFF)
-NOT_LIFTED = register_reason(
-    "not_lifted", "{object} is not in the hand: {missing} below and {angle} off", **_OFF
-)
-SLIPPED = register_reason(
-    "slipped", "{object} did not follow the hand: {missing} below and {angle} off", **_OFF
-)
-TILTED = register_reason("tilted", "{object} did not keep upright: {missing} below and {angle} off", **_OFF)
+
+class _Below(Unit):
+    """A height that is missing; of one that is too much, the sentence says so."""
+
+    def text(self, value: float, spec: str = "") -> str:
+        return f"{super().text(abs(value), spec)} {'above' if value < 0.0 else 'below'}"
+
+
+_OFF = {"missing": _Below(METRES.symbol, METRES.shown, METRES.scale), "angle": RADIANS}
+HELD_UP = register_reason("held_up", "{object} is held up, {missing} and {angle} off", **_OFF)
+NOT_LIFTED = register_reason("not_lifted", "{object} is not in the hand: {missing} and {angle} off", **_OFF)
+SLIPPED = register_reason("slipped", "{object} did not follow the hand: {missing} and {angle} off", **_OFF)
+TILTED = register_reason("tilted", "{object} did not keep upright: {missing} and {angle} off", **_OFF)
 
 
 @register("goal relation", "lifted")

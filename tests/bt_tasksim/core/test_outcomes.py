@@ -37,6 +37,17 @@ def test_the_sentence_shows_numbers_in_handy_units_and_the_value_keeps_si(slippe
     assert outcome.numbers == {"way": 0.0312, "turn": math.pi / 4} and outcome.names == {"object": "cup"}
 
 
+def test_two_numbers_that_differ_never_read_alike():
+    heavy = Form("nut weighs {value}, more than {limit}", {"value": NEWTONS, "limit": NEWTONS})
+    said = heavy(value=3.207, limit=3.0)
+    assert said.sentence == "nut weighs 3.2 N, more than 3.0 N"
+    assert said.values == {"value": "3.2 N", "limit": "3.0 N"}
+    assert heavy(value=3.0, limit=3.0).sentence == "nut weighs 3 N, more than 3 N"
+    assert heavy(value=math.nan, limit=3.0).sentence == "nut weighs nan N, more than 3 N"
+    formatted = Form("{value:.2f} over {limit:g}", {"value": NEWTONS, "limit": NEWTONS})
+    assert formatted(value=3.0001, limit=3.0).sentence == "3.00 N over 3 N"
+
+
 def test_files_hold_the_name_the_numbers_and_their_units(slipped):
     outcome = CANNOT_START(slipped(object="cup", way=0.03, turn=math.inf))
     data = outcome.to_data()

@@ -49,6 +49,24 @@ def test_a_place_that_is_no_good_is_refused_before_the_run(tmp_path, monkeypatch
     assert sorted(p.name for p in tmp_path.iterdir()) == ["mine"]
 
 
+@pytest.mark.parametrize(("wrong", "right"), [("nosie", "noise"), ("polices", "policy"), ("sead", "seed")])
+def test_an_option_that_there_is_not(wrong, right):
+    with pytest.raises(InputError, match=rf"unknown option '{wrong}'; did you mean .*'{right}'"):
+        run(pick_and_place.build(), pick_and_place.scene(), **{wrong: "none"})
+
+
+def test_a_policy_goes_over_the_trees_own(monkeypatch):
+    monkeypatch.setattr(
+        Runner,
+        "run",
+        lambda self, seed: {n.name: n.policy for n in self.tree.iterate() if hasattr(n, "policy")},
+    )
+    tree, scene = pick_and_place.build(), pick_and_place.scene()
+    assert run(tree, scene, policy={"grasp": "programmed"})["grasp target"] == "programmed"
+    with pytest.raises(InputError, match=r"'grsp'.*did you mean 'grasp'"):
+        run(pick_and_place.build(), scene, policy={"grsp": "programmed"})
+
+
 def test_what_could_not_be_written_is_said(tmp_path, caplog):
     with caplog.at_level(logging.WARNING):
         run(retry(30, TimePassed(0.5)), Scene(), out=tmp_path / "one")

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from bt_tasksim.checking import new_concept
+from bt_tasksim.checking.declaration import UNITS
 from bt_tasksim.cli.main import main
 from bt_tasksim.core import files
 from bt_tasksim.core.errors import InputError, MachineError
@@ -114,6 +115,13 @@ def test_nothing_stays_half_written(monkeypatch):
     with pytest.raises(MachineError, match="No space left"):
         new_concept.write_concept("push", "some/where")
     assert len(count) == 3 and here() == []
+
+
+@pytest.mark.parametrize("like", [[], ["--like", "push"]])
+def test_its_costs_say_their_unit(like):
+    assert main(["new", "concept", "shift", *like]) == 0
+    costs = re.findall(r'def \w+_cost\(.*?"""(.*?)"""', Path("shift.py").read_text(), re.DOTALL)
+    assert len(costs) == 2 and all(UNITS.search(said) for said in costs), costs
 
 
 def test_it_is_neutral_unless_an_example_is_asked_for(capsys):

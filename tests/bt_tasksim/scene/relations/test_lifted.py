@@ -69,3 +69,15 @@ def test_each_reason_and_nothing_else_wrong(held, change, reason):
     found = evaluate_success(configuration, world, dataclasses.replace(hidden, **change(hidden)))
     assert found.outcome.is_a(reason) and found.success is (reason is HELD_UP)
     assert found.reason == ("" if found.success else reason.name)
+
+
+@pytest.mark.parametrize(
+    ("way", "words"), [(0.021, "21 mm below"), (-0.001, "1 mm above"), (-0.04, "40 mm above")]
+)
+def test_the_sentence_says_whether_it_is_too_low_or_too_high(held, way, words):
+    configuration, world, hidden = held
+    outcome = evaluate_success(
+        configuration, world, dataclasses.replace(hidden, **lower(hidden, way))
+    ).outcome
+    assert words in outcome.sentence and outcome.numbers["missing"] == pytest.approx(way)
+    assert words in outcome.values["missing"]
