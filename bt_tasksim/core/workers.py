@@ -6,6 +6,7 @@ import contextlib
 import copy
 import multiprocessing
 import os
+import signal
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -118,6 +119,8 @@ class Workers(Generic[StateT]):
 
 def _serve(make: Callable[[], StateT], pipe: Connection, others: list[Connection]) -> None:
     """A worker process: what it keeps is a variable of this function."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)  # how the parent ends in order is not how a copy of it ends
     os.environ["OMP_NUM_THREADS"] = "1"
     for other in others:
         other.close()

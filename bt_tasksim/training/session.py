@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shlex
 import shutil
 from collections.abc import Callable, Mapping
@@ -14,6 +15,7 @@ from typing import Any
 from bt_tasksim.core.document import located, read_document
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.files import check_folder
+from bt_tasksim.core.interrupts import terminable
 from bt_tasksim.core.locks import LockedError
 from bt_tasksim.core.plugins import loaded
 from bt_tasksim.core.typed_file import record_model, validate
@@ -72,7 +74,7 @@ def run(request: Request, report: Callable[[Progress], None]) -> str:
     Raises:
         InputError: Anything that was asked for is no good; then nothing was written.
         MachineError: The libraries for training are missing, or a worker ended.
-        KeyboardInterrupt: Ended by the user; says how to go on.
+        KeyboardInterrupt: Ended by the user, SIGTERM or SIGHUP; says how to go on.
     """
     from bt_tasksim.trees.load import load_source
 
@@ -87,24 +89,23 @@ def run(request: Request, report: Callable[[Progress], None]) -> str:
     places = ppo.policy_folders(tree, out)
     fresh = _check(places.values(), request.resume)
     try:
-        ppo.train(
-            tree,
-            source.scene,
-            out=out,
-            config=config,
-            workers=request.workers,
-            resume=request.resume,
-            backward=request.backward,
-            report=report,
-            name=source.name,
-        )
-    except KeyboardInterrupt:
+        with terminable():
+            ppo.train(
+                tree,
+                source.scene,
+                out=out,
+                config=config,
+                workers=request.workers,
+                resume=request.resume,
+                backward=request.backward,
+                report=report,
+                name=source.name,
+            )
+    except KeyboardInterrupt as stop:
         kept = any((training_folder(folder) / CHECKPOINT).is_file() for folder in places.values())
         _forget(fresh)
         go_on = f"go on with: {shlex.join(request.words())}"
-        raise KeyboardInterrupt(
-            go_on if kept else "there was no checkpoint yet, so nothing is kept"
-        ) from None
+        raise type(stop)(go_on if kept else "there was no checkpoint yet, so nothing is kept") from None
     except LockedError:
         raise  # what is there is the other one's
     except BaseException:
@@ -180,6 +181,8 @@ def _check(folders: Any, resume: bool) -> list[Path]:
     for k, folder in enumerate(folders):
         check_folder(folder, FILES)
         beside = training_folder(folder)
+        if os.path.lexists(beside) and not beside.is_dir():
+            raise InputError(f"'{beside}', which is for the checkpoint, is a file: choose another --out")
         if resume and k == 0 and not (beside / CHECKPOINT).is_file():
             raise InputError(f"there is no checkpoint in '{beside}' to go on from: train without --resume")
         if not beside.exists():

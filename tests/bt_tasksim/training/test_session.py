@@ -177,6 +177,8 @@ def test_bad_input_is_one_sentence_and_leaves_nothing(refused, tiny):
     Path("full/letter.txt").write_text("keep me")
     assert "it holds other things, such as 'letter.txt'" in refused("grasp_then_pick", "--out", "full")
     assert "is a file" in refused("grasp_then_pick", "--out", "full/letter.txt/policy")
+    Path("p.training").write_text("mine")
+    assert "'p.training', which is for the checkpoint, is a file" in refused("grasp_then_pick", "--out", "p")
 
 
 def test_a_tree_whose_node_is_never_reached(refused, tiny):
@@ -199,8 +201,13 @@ def test_progress_in_words():
     assert said == "50 % success, held apart 3 of 4, stage 'all shapes', 900 decisions/s, 2 h 05 min left"
 
 
+@pytest.mark.parametrize(
+    ("number", "code", "said"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+    ids=["interrupt", "terminate"],
+)
 @pytest.mark.parametrize("kept", [True, False])
-def test_an_interrupt_says_how_to_go_on(tiny, tmp_path, kept):
+def test_an_interrupt_says_how_to_go_on(tiny, tmp_path, kept, number, code, said):
     settings = tiny(steps=1_000_000, evaluate_every=0, checkpoint_every=1 if kept else 100_000)
     words = ["train", "grasp_then_pick", "--out", "p", "--workers", "2", "--settings", settings.name]
     process = subprocess.Popen(
@@ -210,14 +217,14 @@ def test_an_interrupt_says_how_to_go_on(tiny, tmp_path, kept):
     assert process.stderr is not None
     assert " of 1000000, " in process.stderr.readline()
     time.sleep(0.3)
-    os.killpg(process.pid, signal.SIGINT)
+    os.killpg(process.pid, number)
     _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == code and "Traceback" not in err
     last = err.splitlines()[-1]
     if kept:
-        assert last == f"interrupted; go on with: bt-tasksim {' '.join(words)} --resume"
+        assert last == f"{said}; go on with: bt-tasksim {' '.join(words)} --resume"
     else:
-        assert last == "interrupted; there was no checkpoint yet, so nothing is kept"
+        assert last == f"{said}; there was no checkpoint yet, so nothing is kept"
     assert {p.name for p in tmp_path.iterdir()} == {"tiny.json", *(["p.training"] if kept else [])}
     with pytest.raises(ProcessLookupError):
         os.killpg(process.pid, 0)
