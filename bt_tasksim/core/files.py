@@ -216,17 +216,26 @@ def check_writable(path: str | Path) -> None:
         raise _cannot_write(path, error) from error
 
 
-def check_targets(paths: Iterable[str | Path]) -> None:
+def check_targets(paths: Iterable[str | Path | None], sources: Iterable[str | Path | None] = ()) -> None:
     """Check that `write_texts` may write here, before there is anything to write.
 
+    Args:
+        paths: Where to; None where nothing is wanted.
+        sources: What is read, and so must not be written over.
+
     Raises:
-        InputError: See `check_writable`, or two paths are the same file.
+        InputError: See `check_writable`, or two paths are the same file, or one is a source.
         MachineError: A folder is not writable.
     """
     known: set[str] = set()
+    read = {os.path.realpath(source) for source in sources if source is not None}
     for path in paths:
+        if path is None:
+            continue
         check_writable(path)
         whole = os.path.realpath(path)
+        if whole in read:
+            raise InputError(f"cannot write into '{path}', which is read: give another name")
         if whole in known:
             raise InputError(f"cannot write two things into '{path}': give each a name of its own")
         known.add(whole)

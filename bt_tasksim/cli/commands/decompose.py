@@ -51,7 +51,7 @@ def decompose(
 
     if picture is not None:
         svg(picture)
-    check_targets(path for path in (json_, xml, picture) if path is not None)
+    check_targets((json_, xml, picture), logs)
     opened = [_opened(log) for log in logs]
     with progress("decomposing", None):
         found = decompose_log(opened[0] if len(opened) == 1 else opened, episode)

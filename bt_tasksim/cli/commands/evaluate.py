@@ -38,11 +38,12 @@ def evaluate(
     ] = None,
 ) -> None:
     """Run a tree on many seeded draws and count successes."""
-    from bt_tasksim.core.files import alone
+    from bt_tasksim.core.files import alone, check_targets
     from bt_tasksim.training import evaluation
 
     if seed + episodes > arguments.SEEDS:
         raise InputError(f"evaluate: the last seed would be {seed + episodes - 1}, beyond 64 bits")
+    check_targets([json_], (tree.tree, tree.scene, tree.robot))
     tree.load_nodes()
     chosen = policies(engines.policy)
     job = evaluation.Job(tree.tree, tree.scene, tree.robot, engines.options(), chosen)

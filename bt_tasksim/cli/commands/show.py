@@ -27,7 +27,7 @@ def show(
 
     if picture is not None:
         svg(picture)
-    check_targets(path for path in (picture, xml) if path is not None)
+    check_targets((picture, xml), (tree.tree, tree.scene, tree.robot))
     try:
         source = tree.load()
         root, scene = source.build(), source.scene.name

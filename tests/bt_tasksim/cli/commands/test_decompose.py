@@ -131,6 +131,20 @@ def test_nothing_is_written_where_one_of_the_targets_cannot_be(refused, bad):
     assert sorted(Path().rglob("*")) == before
 
 
+def test_what_is_read_is_not_written_over(refused):
+    shutil.copy(LOG, "log.h5")
+    Path("t.py").write_text("TREE = 1")
+    for words in (
+        ("decompose", "log.h5", "--xml", "log.h5"),
+        ("decompose", LOG, "log.h5", "--json", "../" + Path.cwd().name + "/log.h5"),
+        ("show", "t.py", "--xml", "t.py"),
+        ("evaluate", "t.py", "--json", "t.py"),
+        ("evaluate", "pick_and_place", "--scene", "t.py", "--json", "t.py"),
+    ):
+        assert "which is read" in refused(*words)
+    assert Path("log.h5").read_bytes() == Path(LOG).read_bytes() and Path("t.py").read_text() == "TREE = 1"
+
+
 def test_nothing_is_written_where_there_is_no_tree(refused):
     spoiled(lambda demonstration: demonstration["hand/opening"].write_direct(np.full(
         demonstration["hand/opening"].shape, 0.08)))  # fmt: skip
