@@ -226,7 +226,8 @@ class ConceptNode(ContextLeaf, abc.ABC):
         command, after = model.carry_out(action.motion, seen, memory)
         context.write(command, self)
         self.memory = after
-        self.report(None)
+        if self.outcome is not None or self.feedback_message:
+            self.report(None)
         return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
