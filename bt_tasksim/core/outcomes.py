@@ -32,7 +32,7 @@ from bt_tasksim.core.errors import (
 )
 from bt_tasksim.core.markup import html_pairs
 from bt_tasksim.core.registry import part, register
-from bt_tasksim.core.units import METRES, RADIANS, SECONDS, Shown, Unit, told_apart
+from bt_tasksim.core.units import METRES, RADIANS, SECONDS, Measured, Unit, told_apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ class Statement:
     def own_sentence(self) -> str:
         """The sentence without the detail; the only place where one is made."""
         asked = [(n, spec) for n, spec in self.form.shown if n in self.numbers]
-        texts = told_apart([Shown(self.numbers[n], self.form.units[n], spec) for n, spec in asked])
+        texts = told_apart([Measured(self.numbers[n], self.form.units[n], spec) for n, spec in asked])
         told = dict(zip(asked, texts, strict=True))
         gaps = {name: _Gap(name, told) for name in self.numbers}
         return self.form.template.format(**gaps, **self.names)
@@ -112,7 +112,7 @@ class Statement:
     @property
     def values(self) -> dict[str, str]:
         """What fills the gaps, as people read it: known numbers with their units, and names."""
-        known = {n: Shown(v, self.form.units[n]) for n, v in self.numbers.items() if isfinite(v)}
+        known = {n: Measured(v, self.form.units[n]) for n, v in self.numbers.items() if isfinite(v)}
         return {**dict(zip(known, told_apart(list(known.values())), strict=True)), **self.names}
 
     def __str__(self) -> str:

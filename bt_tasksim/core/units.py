@@ -35,7 +35,7 @@ class Unit:
 
 
 @dataclass(frozen=True)
-class Shown:
+class Measured:
     """A number as one sentence shows it.
 
     Attributes:
@@ -62,7 +62,7 @@ MORE_DIGITS = 6
 """Digits beyond those of its format that a number gets at most, see `told_apart`."""
 
 
-def told_apart(numbers: Sequence[Shown]) -> list[str]:
+def told_apart(numbers: Sequence[Measured]) -> list[str]:
     """The texts of one sentence's numbers: those that differ and would read alike get more digits.
 
     Every number of such a group gets as many more as they need, up to `MORE_DIGITS`; if they are alike

@@ -5,10 +5,10 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_tasksim.core.units import METRES, MORE_DIGITS, NEWTONS, SECONDS, Shown, told_apart
+from bt_tasksim.core.units import METRES, MORE_DIGITS, NEWTONS, SECONDS, Measured, told_apart
 
 numbers = st.builds(
-    Shown,
+    Measured,
     st.one_of(st.floats(-10.0, 10.0), st.sampled_from([3.0, 3.2, 3.207, math.nan, math.inf])),
     st.sampled_from([METRES, NEWTONS, SECONDS]),
     st.sampled_from(["", ".2f", "g", ".1e"]),
@@ -27,7 +27,7 @@ def test_those_that_differ_never_read_alike(shown):
 
 @given(st.lists(st.sampled_from([3.0, 3.2, 3.207, 4.0]), min_size=2, max_size=4))
 def test_equal_numbers_read_alike(values):
-    texts = told_apart([Shown(value, NEWTONS) for value in values])
+    texts = told_apart([Measured(value, NEWTONS) for value in values])
     for a, said_a in zip(values, texts, strict=True):
         for b, said_b in zip(values, texts, strict=True):
             assert (a == b) == (said_a == said_b)
