@@ -22,10 +22,9 @@ from bt_tasksim.core.beside import beside
 from bt_tasksim.core.document import located
 from bt_tasksim.core.errors import FieldError, InputError, nearest, within
 from bt_tasksim.core.files import file_version
+from bt_tasksim.core.named_data import named_data
 from bt_tasksim.core.plain import shown, where_text
 from bt_tasksim.core.poses import Array, array_namespace
-from bt_tasksim.core.registry import part
-from bt_tasksim.core.resources import is_file
 from bt_tasksim.robot.limits import SafetyLimits, read_limits
 from bt_tasksim.robot.urdf_links import joint_depths, joint_limits, joint_speeds
 
@@ -222,16 +221,8 @@ def load_robot(name: str) -> RobotDescription:
     Raises:
         InputError: No such robot, its URDF is not to be found, or the file lacks or misstates something.
     """
-    if is_file(name):
-        path = Path(name).resolve()
-        if not path.is_file():
-            raise InputError(f"no robot file '{shown(name, 200)}'")
-    else:
-        found: Path | RobotDescription = part("robot", name)
-        if isinstance(found, RobotDescription):
-            return found
-        path = found
-    return _load(path, file_version(path))
+    found = named_data("robot", name, RobotDescription)
+    return found if isinstance(found, RobotDescription) else _load(found, file_version(found))
 
 
 @lru_cache(maxsize=32)

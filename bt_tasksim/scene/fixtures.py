@@ -13,14 +13,12 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.document import Document
-from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import file_version
+from bt_tasksim.core.named_data import named_data
 from bt_tasksim.core.names import check_name
-from bt_tasksim.core.plain import Plain, shown
+from bt_tasksim.core.plain import Plain
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.registry import part
 from bt_tasksim.core.renamed import renamed_fields
-from bt_tasksim.core.resources import is_file
 from bt_tasksim.core.world import PlaceModel
 
 if TYPE_CHECKING:
@@ -173,16 +171,8 @@ def load_fixture(name: str) -> Fixture:
     Raises:
         InputError: No such fixture, or the file is not one; says what is wrong and where.
     """
-    if is_file(name):
-        path = Path(name).resolve()
-        if not path.is_file():
-            raise InputError(f"no fixture file '{shown(name, 200)}'")
-    else:
-        found: Path | Fixture = part("fixture", name)
-        if isinstance(found, Fixture):
-            return found
-        path = found
-    return _load(path, file_version(path))
+    found = named_data("fixture", name, Fixture)
+    return found if isinstance(found, Fixture) else _load(found, file_version(found))
 
 
 @lru_cache(maxsize=64)

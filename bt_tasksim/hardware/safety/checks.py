@@ -91,14 +91,7 @@ def _worst(reason: Reason, values: Array, bounds: Array, names: Sequence[str]) -
 
 def shape_and_numbers(position: Array, velocity: Array, names: Sequence[str]) -> Outcome | None:
     """A command has one finite position and velocity a joint ``(n,)``."""
-    for part, values in (("positions", position), ("velocities", velocity)):
-        if np.shape(values) != (len(names),):
-            found = f"{np.shape(values)} {part} commanded for {len(names)} joints"
-            return WRONG_JOINTS(found=found)
-        if not np.all(np.isfinite(values)):
-            i = int(np.argmin(np.isfinite(values)))
-            return NOT_FINITE(what=f"{part} commanded, {names[i]} at {values[i]}")
-    return None
+    return _one_finite_number_a_joint("commanded", (position, velocity), names)
 
 
 def joint_position(
@@ -189,13 +182,17 @@ def joint_names(found: Sequence[str], expected: Sequence[str]) -> Outcome | None
 
 def reported_numbers(arrays: Sequence[Array], names: Sequence[str]) -> Outcome | None:
     """Joint positions and velocities: one finite number a joint ``(n,)``."""
+    return _one_finite_number_a_joint("reported", arrays, names)
+
+
+def _one_finite_number_a_joint(how: str, arrays: Sequence[Array], names: Sequence[str]) -> Outcome | None:
     for part, values in zip(("positions", "velocities"), arrays, strict=True):
         if np.shape(values) != (len(names),):
-            found = f"{np.shape(values)} {part} reported for {len(names)} joints"
+            found = f"{np.shape(values)} {part} {how} for {len(names)} joints"
             return WRONG_JOINTS(found=found)
         if not np.all(np.isfinite(values)):
             i = int(np.argmin(np.isfinite(values)))
-            return NOT_FINITE(what=f"{part} reported, {names[i]} at {values[i]}")
+            return NOT_FINITE(what=f"{part} {how}, {names[i]} at {values[i]}")
     return None
 
 
