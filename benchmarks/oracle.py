@@ -30,7 +30,7 @@ import numpy as np
 
 from benchmarks import sealed
 from benchmarks.success import RESULTS
-from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Pick
 from bt_tasksim.concept_nodes.grasp import Grasp, _approach_begins, _way_out
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory

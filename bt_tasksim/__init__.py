@@ -13,7 +13,6 @@ from bt_tasksim import _names
 
 if TYPE_CHECKING:
     from bt_tasksim.concept.condition import Condition
-    from bt_tasksim.concept.context import Known, Seen
     from bt_tasksim.concept.limit import Limit
     from bt_tasksim.concept.model import ConceptModel
     from bt_tasksim.concept.parameters import (
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
         Seconds,
         Text,
     )
+    from bt_tasksim.concept.seen import Known, Seen
     from bt_tasksim.core import poses, units
     from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
     from bt_tasksim.core.outcomes import Form, Outcome, register_reason
@@ -55,7 +55,7 @@ _names.install()
 
 _HOMES = {
     "bt_tasksim.concept.condition": ("Condition",),
-    "bt_tasksim.concept.context": ("Known", "Seen"),
+    "bt_tasksim.concept.seen": ("Known", "Seen"),
     "bt_tasksim.concept.limit": ("Limit",),
     "bt_tasksim.concept.model": ("ConceptModel",),
     "bt_tasksim.concept.parameters": (

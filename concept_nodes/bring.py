@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from bt_tasksim.concept.contact import ContactChange, ContactState
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.demonstrated import position_words, rounded, rounded_points
 from bt_tasksim.concept.parameters import (
     Metres,
@@ -21,15 +21,17 @@ from bt_tasksim.concept.parameters import (
     Position,
 )
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
-from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, resting_place
+from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, resting_place
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.facts import ObjectFacts, take_rows
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.world import ObjectModel, PlaceModel
+from bt_tasksim.core.world import Obstacle
 from bt_tasksim.planning.reference_motion import plan
 from bt_tasksim.planning.ways import Carried, clear_path
 
@@ -108,164 +110,173 @@ class Bring(Carry):
 
     def begin(self, seen: Seen) -> MoveMemory:
         """Find the way."""
-        now, model = seen.object(self.target), seen.model(self.target)
-        goal, origin = self._goal(seen, now, model)
-        grip = poses.multiply(poses.inverse(now), seen.tool)
+        now = seen.object(self.target)
+        goal, origin = self._goal(seen, now)
+        grip = poses.relative(now, seen.tool)
         tool_goal = poses.multiply(goal, grip)
         if self.via:
-            fractions = np.linspace(0.0, 1.0, len(self.via) + 2)[1:-1]
-            middle = [
-                poses.multiply(poses.pose(origin + np.asarray(v), poses.interpolate(now, goal, f)[3:]), grip)
-                for v, f in zip(self.via, fractions, strict=True)
-            ]
-            way = [seen.tool, *middle, tool_goal]
+            way = [seen.tool, *self._via(now, goal, origin, grip), tool_goal]
         else:
-            carried = Carried(seen.robot.envelope, model.extent, poses.inverse(grip))
-            way = self._way(seen, tool_goal, carried)
+            way = self._ways(seen, tool_goal, grip)
         return MoveMemory(plan(way, self.speed, blend=0.04))
 
-    def _goal(self, seen: Seen, now: Array, model: ObjectModel) -> tuple[Array, Array]:
-        """Pose of the object at the end, and the destination's origin that ``via`` refers to."""
+    def _goal(self, seen: Seen, now: Array) -> tuple[Array, Array]:
+        """Poses ``(N, 7)`` of the object at the end, and the destination's origin that ``via`` refers to."""
+        xp = array_namespace(now)
         if self.position is not None:
-            position = np.asarray(self.position, float)
-            return poses.pose(position, now[3:]), position
+            origin = xp.zeros_like(now[:, :3]) + constant(self.position, now)
+            return xp.concat([origin, now[:, 3:]], axis=-1), origin
         assert self.to is not None
         frame, rim = destination(seen, self.to)
-        grip = poses.quat_multiply(poses.quat_conjugate(now[3:]), seen.tool[3:])
-        approach = poses.z_axis(seen.tool[3:])
-        neutral = neutral_rotation(seen, approach, frame[:3])
+        grip = poses.quat_multiply(poses.quat_conjugate(now[:, 3:]), seen.tool[:, 3:])
+        neutral = neutral_rotation(seen, poses.z_axis(seen.tool[:, 3:]), frame[:, :3])
         easiest = poses.quat_multiply(neutral, poses.quat_conjugate(grip))
-        return standing_pose(frame, now, model, rim + self.hover, easiest), frame[:3]
+        goal = standing_pose(frame, now, seen.model(self.target), rim + self.hover, easiest)
+        return goal, frame[:, :3]
 
-    def _way(self, seen: Seen, goal: Array, carried: Carried) -> list[Array]:
-        """Tool poses to the goal; a hand that turns by nearly half a turn goes by its neutral orientation."""
-        start, obstacles, exits = seen.tool, seen.world.obstacles, self._exits(seen, goal)
-        middle = _by_neutral(seen, start, goal)
-        if middle is not None:
-            with contextlib.suppress(NoWayError):
-                first = clear_path(start, middle, carried, obstacles)
-                return [*first[:-1], *clear_path(middle, goal, carried, obstacles)]
-        return clear_path(start, goal, carried, obstacles, exits)
+    def _via(self, now: Array, goal: Array, origin: Array, grip: Array) -> list[Array]:
+        """Tool poses at the via-points, turned evenly from one to the next."""
+        xp, out = array_namespace(now), []
+        for k, via in enumerate(self.via):
+            share = xp.zeros_like(now[:, 0]) + (k + 1) / (len(self.via) + 1)
+            turned = poses.interpolate(now, goal, share)[:, 3:]
+            out.append(poses.multiply(xp.concat([origin + constant(via, now), turned], axis=-1), grip))
+        return out
 
-    def _exits(self, seen: Seen, tool_goal: Array) -> tuple[Array, Array]:
-        """Displacements that take the tool out of what it starts in, and out of where it ends."""
-        place = resting_place(seen, self.target) or _place_below(seen, self.target)
-        out = np.zeros(3) if place is None else place.clearance * place.exit
-        into = np.zeros(3)
-        if self.to is not None and self.to in seen.world.places:
-            goal = seen.place(self.to)
-            into = goal.clearance * goal.exit
-            if goal.kind == "bin":
-                into = np.zeros(3)
-        return out, into
+    def _ways(self, seen: Seen, tool_goal: Array, grip: Array) -> list[Array]:
+        """Tool poses ``(N, 7)`` to the goal, searched for in one world after the other.
+
+        Raises:
+            NoWayError: There is none in one of them.
+        """
+        extent = seen.model(self.target).extent
+        middle, turns = _by_neutral(seen, tool_goal)
+        held, exits = poses.inverse(grip), self._exits(seen)
+        arrays = (seen.tool, tool_goal, middle, held, extent, *exits)
+        start, goal, middle, held, extent, out, into = (np.asarray(values) for values in arrays)
+        ways = []
+        for k in range(goal.shape[0]):
+            carried = Carried(seen.robot.envelope, tuple(extent[k].tolist()), held[k])
+            turn = middle[k] if bool(turns[k]) else None
+            ways.append(_way(start[k], goal[k], turn, carried, obstacles_of(seen, k), (out[k], into[k])))
+        most = max(len(way) for way in ways)
+        padded = np.array([[*way, *[way[-1]] * (most - len(way))] for way in ways])
+        return [constant(padded[:, k], tool_goal) for k in range(most)]
+
+    def _exits(self, seen: Seen) -> tuple[Array, Array]:
+        """Displacements ``(N, 3)`` that take the tool out of what it starts in, and out of where it ends."""
+        xp = array_namespace(seen.tool)
+        stands, below = resting_place(seen, self.target), place_below(seen, self.target)
+        nothing = xp.zeros_like(seen.tool[:, :3])
+        out = xp.where(below.found[:, None], below.place.clearance[:, None] * below.place.exit, nothing)
+        out = xp.where(stands.found[:, None], stands.place.clearance[:, None] * stands.place.exit, out)
+        if self.to is None or self.to not in seen.world.place_columns:
+            return out, nothing
+        goal = seen.place(self.to)
+        return out, xp.where(goal.container[:, None], nothing, goal.clearance[:, None] * goal.exit)
 
 
-def _by_neutral(seen: Seen, start: Array, goal: Array) -> Array | None:
-    """The pose half way where the shortest turn would lead the hand round by its hindmost orientation.
+def obstacles_of(seen: Seen, world: int) -> list[Obstacle]:
+    """What is to be kept clear of in one world, by its row."""
+    boxes = seen.world.obstacle_facts
+    there, pose, size = (np.asarray(values[world]) for values in (boxes.present, boxes.pose, boxes.size))
+    return [Obstacle(pose[k], tuple(size[k].tolist()), "") for k in np.flatnonzero(there).tolist()]
 
-    Turned by nearly half a turn, the shorter way may be the one that the arm cannot go: then this is the
-    middle of the other one. None where the shortest turn is good.
+
+def _way(
+    start: Array,
+    goal: Array,
+    turn: Array | None,
+    carried: Carried,
+    obstacles: list[Obstacle],
+    exits: tuple[Array, Array],
+) -> list[Array]:
+    """Tool poses ``(7,)`` to a goal in one world.
+
+    Args:
+        start: Where the tool is.
+        goal: Where it should be.
+        turn: A pose on the way where it should turn by, or None.
+        carried: What moves with the tool.
+        obstacles: What to keep clear of.
+        exits: See `bt_tasksim.planning.ways.clear_path`.
     """
-    if float(poses.angle_between(start[3:], goal[3:])) < LONG_TURN:
-        return None
-    middle = poses.interpolate(start, goal, 0.5)
-    approach = poses.z_axis(middle[3:])
-    neutral = neutral_rotation(seen, approach, middle[:3])
-    if float(poses.angle_between(neutral, middle[3:])) <= np.pi / 2:
-        return None
-    return poses.pose(middle[:3], poses.quat_multiply(middle[3:], np.array([0.0, 0.0, 0.0, 1.0])))
+    if turn is not None:
+        with contextlib.suppress(NoWayError):
+            first = clear_path(start, turn, carried, obstacles)
+            return [*first[:-1], *clear_path(turn, goal, carried, obstacles)]
+    return clear_path(start, goal, carried, obstacles, exits)
 
 
-def destination(seen: Seen, name: str) -> tuple[Array, float]:
-    """Frame ``(7,)`` of a place or ``(..., 7)`` of the top of an object, and its rim's height in metres."""
-    if name in seen.world.places:
+def _by_neutral(seen: Seen, goal: Array) -> tuple[Array, Array]:
+    """The poses ``(N, 7)`` half way of the longer turn, and booleans ``(N,)``: it is the one to take.
+
+    Turned by nearly half a turn, the shorter way may be the one that the arm cannot go, since it leads the
+    hand round by its hindmost orientation.
+    """
+    start = seen.tool
+    xp = array_namespace(start)
+    far = poses.angle_between(start[:, 3:], goal[:, 3:]) >= LONG_TURN
+    middle = poses.interpolate(start, goal, 0.5 + xp.zeros_like(start[:, 0]))
+    neutral = neutral_rotation(seen, poses.z_axis(middle[:, 3:]), middle[:, :3])
+    hindmost = poses.angle_between(neutral, middle[:, 3:]) > math.pi / 2
+    turned = poses.quat_multiply(middle[:, 3:], constant([0.0, 0.0, 0.0, 1.0], middle))
+    return xp.concat([middle[:, :3], turned], axis=-1), far & hindmost
+
+
+def destination(seen: Seen, name: str) -> tuple[Array, Array]:
+    """Frames ``(N, 7)`` of a place or of the top of an object, and their rims' heights ``(N,)`` in metres."""
+    if name in seen.world.place_columns:
         place = seen.place(name)
-        return place.pose, (place.height if place.kind == "bin" else 0.0)
-    below, model = seen.object(name), seen.model(name)
-    return below + poses.constant([0, 0, model.extent[2] / 2, 0, 0, 0, 0], below), 0.0
+        return place.pose, place.rim
+    below, height = seen.object(name), seen.model(name).extent[:, 2] / 2
+    xp = array_namespace(below)
+    nothing = xp.zeros_like(height)
+    return poses.shifted(below, xp.stack([nothing, nothing, height], axis=-1)), nothing
 
 
 def standing_pose(
-    frame: Array, now: Array, model: ObjectModel, height: float, towards: Array | None = None
+    frame: Array, now: Array, model: ObjectFacts, height: Array | float = 0.0, towards: Array | None = None
 ) -> Array:
-    """Pose ``(..., 7)`` of an object that stands above a frame, turned as its symmetry allows.
+    """Poses ``(N, 7)`` of an object that stands above a frame, turned as its symmetry allows.
 
     Args:
-        frame: Pose ``(..., 7)`` of the place.
-        now: Present pose ``(..., 7)`` of the object.
+        frame: Poses ``(N, 7)`` of the place.
+        now: Present poses ``(N, 7)`` of the object.
         model: The object.
-        height: Free height below it, metres.
-        towards: Rotation ``(..., 4)`` of the object that is preferred; by default the present one.
+        height: Free height below it, metres, one for all or ``(N,)``.
+        towards: Rotations ``(N, 4)`` of the object that are preferred; by default the present ones.
     """
-    towards = now[..., 3:] if towards is None else towards
-    frame = poses.constant(frame, now)
-    half = (max(model.extent) if model.cubic else model.extent[2]) / 2
-    position = poses.transform(frame, poses.constant([0.0, 0.0, height + half], now))
-    if model.symmetry == 0 and not model.cubic:
-        best = _upright(frame, now)
-    else:
-        turns = (
-            _CUBE
-            if model.cubic
-            else [poses.yaw(2 * np.pi * k / model.symmetry) for k in range(model.symmetry)]
-        )
-        ways = [poses.quat_multiply(frame[..., 3:], poses.constant(q, now)) for q in turns]
-        best = _nearest_rotation(ways, towards)
+    towards = now[:, 3:] if towards is None else towards
     xp = array_namespace(now)
-    batch = now.shape[:-1]
-    return xp.concat([xp.broadcast_to(position, (*batch, 3)), xp.broadcast_to(best, (*batch, 4))], axis=-1)
+    centre = model.standing_height + height
+    nothing = xp.zeros_like(centre)
+    position = poses.transform(frame, xp.stack([nothing, nothing, centre], axis=-1))
+    nearest = _nearest_rotation(frame[:, 3:], model, towards)
+    best = xp.where(model.revolved[:, None], _upright(frame, now), nearest)
+    return xp.concat([position, best], axis=-1)
 
 
 def _upright(frame: Array, now: Array) -> Array:
-    """The rotations ``(..., 4)`` that set the z axis upright on a frame by the shortest turn."""
+    """The rotations ``(N, 4)`` that set the z axis upright on a frame by the shortest turn."""
     xp = array_namespace(now)
-    z = poses.constant([0.0, 0.0, 1.0], now)
-    up, should = poses.rotate(now[..., 3:], z), poses.rotate(frame[..., 3:], z)
+    up, should = poses.z_axis(now[:, 3:]), poses.z_axis(frame[:, 3:])
     axis = poses.cross(up, should)
-    length = xp.sqrt(xp.sum(axis * axis, axis=-1, keepdims=True))
-    angle = xp.atan2(length, xp.sum(up * should, axis=-1, keepdims=True))
+    length = poses.norm(axis)
     small = length <= 1e-9
-    tilt = axis * xp.where(
-        small, xp.zeros_like(length), angle / xp.where(small, xp.ones_like(length), length)
-    )
-    return poses.quat_multiply(poses.from_rotation_vector(tilt), now[..., 3:])
+    angle = xp.atan2(length, poses.dot(up, should)) / xp.where(small, xp.ones_like(length), length)
+    tilt = axis * xp.where(small, xp.zeros_like(length), angle)[:, None]
+    return poses.quat_multiply(poses.from_rotation_vector(tilt), now[:, 3:])
 
 
-def _nearest_rotation(ways: list[Array], towards: Array) -> Array:
-    """Of rotations ``(..., 4)`` the one that is the shortest turn away; of equal ones the first."""
-    if len(ways) == 1:
-        return ways[0]
+def _nearest_rotation(frame: Array, model: ObjectFacts, towards: Array) -> Array:
+    """Of the rotations ``(N, 4)`` in which an object looks the same, the one that is the shortest turn away.
+
+    Of equal ones it is the first.
+    """
     xp = array_namespace(towards)
+    ways = poses.quat_multiply(frame[:, None, :], model.rotations)
     # Alike as rotations where q and -q are: the larger |q . r|, the shorter the turn.
-    nearness = xp.stack([xp.abs(xp.sum(q * towards, axis=-1)) for q in ways], axis=-1)
-    first = xp.argmax(xp.round(nearness * 1e9), axis=-1)
-    best = ways[0]
-    for k in range(1, len(ways)):
-        best = xp.where((first == k)[..., None], ways[k], best)
-    return best
-
-
-def _place_below(seen: Seen, target: str) -> PlaceModel | None:
-    """The place of a fixture above which a lifted object is, where that fixture would be in its way out."""
-    pose = seen.object(target)
-    best: tuple[float, PlaceModel] | None = None
-    for place in seen.world.places.values():
-        local = poses.transform(poses.inverse(place.pose), pose[:3])
-        inside = all(abs(float(local[i]) - place.centre[i]) <= place.extent[i] / 2 for i in range(2))
-        if inside and 0.0 < float(local[2]) < min(place.height, 0.4) and (best is None or local[2] < best[0]):
-            best = (float(local[2]), place)
-    return best[1] if best else None
-
-
-def _cube_rotations() -> list[Array]:
-    quarter = [poses.yaw(k * np.pi / 2) for k in range(4)]
-    tips = [np.array([1.0, 0.0, 0.0, 0.0])]
-    for axis in (0, 1):
-        for angle in (np.pi / 2, np.pi, -np.pi / 2) if axis == 0 else (np.pi / 2, -np.pi / 2):
-            v = np.zeros(3)
-            v[axis] = angle
-            tips.append(poses.from_rotation_vector(v))
-    return [poses.quat_multiply(q, t) for t in tips for q in quarter]
-
-
-_CUBE = _cube_rotations()
+    nearness = abs(poses.dot(ways, towards[:, None, :]))
+    counts = xp.where(model.rotation_counts, xp.round(nearness * 1e9), -xp.ones_like(nearness))
+    return take_rows(ways, xp.argmax(counts, axis=1))

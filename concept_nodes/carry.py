@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held, tool_distance
 from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
 from bt_tasksim.core import poses
-from bt_tasksim.core.outcomes import Form, Outcome, Statement
+from bt_tasksim.core.outcomes import Form, Possible, Statement
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.units import METRES, NEWTONS
 from bt_tasksim.core.world import Command
@@ -42,7 +42,7 @@ class Carry(ConceptModel[MoveMemory]):
 
     maintains = (HOLDING,)
 
-    def initial_state(self, seen: Seen) -> Outcome | None:
+    def initial_state(self, seen: Seen) -> Possible:
         """The object must be in the hand."""
         return not_held(seen, self.target)
 
@@ -73,16 +73,15 @@ class Carry(ConceptModel[MoveMemory]):
         `SLIP` and of its tilt against the hand over `TILT`, where it is known how it lay there at first.
         """
         free = ~known.supported(self.target) & (known.hand_force(self.target) > 0.2)
-        xp = array_namespace(known.hidden.objects)
-        cost = xp.where(xp.asarray(free), 0.0, 10.0)
+        xp = array_namespace(known.hidden.tool_pose)
+        nothing = xp.zeros_like(known.hidden.tool_pose[:, 0])
+        cost = xp.where(free, nothing, nothing + 10.0)
         if known.began is None:
             return cost
         first = Known(known.began, known.world)
-        before, after = (
-            poses.multiply(poses.inverse(k.hidden.tool_pose), k.object(self.target)) for k in (first, known)
-        )
-        slip = poses.norm(after[..., :3] - before[..., :3]) / SLIP
-        tilt = poses.angle_between(before[..., 3:], after[..., 3:]) / TILT
+        before, after = (poses.relative(k.hidden.tool_pose, k.object(self.target)) for k in (first, known))
+        slip = poses.norm(after[:, :3] - before[:, :3]) / SLIP
+        tilt = poses.angle_between(before[:, 3:], after[:, 3:]) / TILT
         return xp.maximum(cost, xp.maximum(slip, tilt))
 
     def explain(self, seen: Seen, memory: MoveMemory) -> Statement:
@@ -96,5 +95,5 @@ class Carry(ConceptModel[MoveMemory]):
 
 
 def miss(seen: Seen, path: Path) -> Array:
-    """Distance ``(...)`` in metres of the tool from the end of a path."""
-    return poses.norm(seen.tool[..., :3] - path.table[..., -1, :3])
+    """Distance ``(N,)`` in metres of the tool from the end of a path."""
+    return poses.norm(seen.tool[:, :3] - path.table[:, -1, :3])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from bt_tasksim.concept.condition import Condition
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.parameters import Metres, ObjectName, PlaceName, Radians, Seconds
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.holding import holding, tool_distance
 from bt_tasksim.core import poses
@@ -67,9 +67,9 @@ class AtPose(Condition):
     def _off(self, seen: Seen) -> tuple[Array, Array]:
         now = seen.object(self.target)
         frame, _ = destination(seen, self.on)
-        goal = standing_pose(frame, now, seen.model(self.target), 0.0)
-        gap = now[..., :3] - goal[..., :3]
-        return poses.norm(gap), poses.angle_between(now[..., 3:], goal[..., 3:])
+        goal = standing_pose(frame, now, seen.model(self.target))
+        gap = now[:, :3] - goal[:, :3]
+        return poses.norm(gap), poses.angle_between(now[:, 3:], goal[:, 3:])
 
 
 @register("concept")
@@ -93,7 +93,7 @@ class Upright(Condition):
         return TILTED(object=self.target, angle=self._tilt(seen))
 
     def _tilt(self, seen: Seen) -> Array:
-        return poses.tilt(seen.object(self.target)[..., 3:])
+        return poses.tilt(seen.object(self.target)[:, 3:])
 
 
 @register("concept")

@@ -6,15 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from bt_tasksim.concept.contact import ContactChange, ContactState
-from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.demonstrated import coming_from, snapped
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Axis, Direction, Metres, MetresPerSecond, Newtons, ObjectName, Ratio
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes import grasp_features
 from bt_tasksim.concept_nodes.grasp_features import ALONG, CLOSE, HASTE
@@ -23,12 +21,12 @@ from bt_tasksim.concept_nodes.grasp_pose import grasp_pose, half_extent, resting
 from bt_tasksim.concept_nodes.holding import HOLDING, tool_distance
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.core import poses
-from bt_tasksim.core.outcomes import Form, Outcome, Statement, register_reason
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
-from bt_tasksim.planning.reference_motion import Path, minimum_jerk, plan, sample
+from bt_tasksim.planning.reference_motion import Path, minimum_jerk_time, plan, sample
 from bt_tasksim.robot.description import RobotDescription
 
 NOT_SEEN = register_reason("not_seen", "{object} is not seen")
@@ -72,13 +70,13 @@ TIPPED = math.radians(10.0)
 
 
 class GraspMotion(NamedTuple):
-    """What an action makes of the reference motion at a tick; batch dimensions ``(...)``.
+    """What an action makes of the reference motion at a tick, in ``N`` worlds.
 
     Attributes:
         delay: Seconds by which the motion is behind the reference.
-        offset: Offsets ``(..., 5)`` from it.
+        offset: Offsets ``(N, 5)`` from it.
         middle: Offsets that the middle of an action stands for from now on.
-        target: Tool pose ``(..., 7)`` to command.
+        target: Tool pose ``(N, 7)`` to command.
         closed: Closure to command.
     """
 
@@ -148,58 +146,61 @@ class Grasp(ConceptModel[GraspMemory]):
         target = {"target": task.parameters["target"]}
         return target if approach is None else {**target, "approach": approach}
 
-    def initial_state(self, seen: Seen) -> Outcome | None:
+    def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
         """The object must be seen and fit into the hand."""
-        if not np.isfinite(seen.object(self.target)[0]):
-            return NOT_SEEN(object=self.target)
-        width = min(seen.model(self.target).grasp_widths)
-        if self.closing is None and width > seen.world.opening:
-            return TOO_WIDE(object=self.target, width=width, opening=seen.world.opening)
-        return None
+        xp = array_namespace(seen.tool)
+        unseen = NOT_SEEN.where(~xp.isfinite(seen.object(self.target)[:, 0]), object=self.target)
+        if self.closing is not None:
+            return (unseen,)
+        width, opening = xp.min(seen.model(self.target).grasp_widths, axis=-1), seen.world.opening
+        return unseen, TOO_WIDE.where(width > opening, object=self.target, width=width, opening=opening)
 
     def begin(self, seen: Seen) -> GraspMemory:
         """Choose the grasp pose and plan the way to it."""
         goal = grasp_pose(seen, self.target, self.approach, self.closing)
-        approach = poses.z_axis(goal[3:])
-        back = goal.copy()
-        back[:3] -= self.standoff * approach
+        approach = poses.z_axis(goal[:, 3:])
+        back = poses.shifted(goal, -self.standoff * approach)
         way = [*_way_out(seen, back), back, goal]
         path = plan(way, self.speed, blend=0.03, acceleration=ACCELERATION)
         estimate = self._estimate(seen, goal, approach)
-        middle = np.zeros(CLOSE + 1)
-        deeper = SLANTED * math.sqrt(max(0.0, 1.0 - estimate[3] ** 2))
-        middle[ALONG] = min(max((0.02 * estimate[4] + deeper) / grasp_features.SCALE[ALONG], -1.0), 1.0)
+        xp = array_namespace(goal)
+        nothing = xp.zeros_like(path.duration)
+        offset = nothing[:, None] * xp.ones((CLOSE + 1,), dtype=goal.dtype, device=goal.device)
+        deeper = SLANTED * xp.sqrt(poses.clip(1.0 - estimate[:, 3] ** 2, 0.0, 1.0))
+        along = poses.clip((0.02 * estimate[:, 4] + deeper) / grasp_features.SCALE[ALONG], -1.0, 1.0)
         return GraspMemory(
             path=path,
             begins=_approach_begins(path, self.standoff),
             goal=goal,
-            delay=np.float64(0.0),
-            middle=middle,
-            offset=np.zeros(CLOSE + 1),
+            delay=nothing,
+            middle=along[:, None] * grasp_features.axis(ALONG, goal),
+            offset=offset,
             target=seen.tool,
-            closing=np.float64(-1.0),
-            closed=np.float64(0.0),
+            closing=nothing - 1.0,
+            closed=nothing,
             closure=seen.closure,
-            settled=np.int64(0),
-            preshape=np.float64(0.0),
-            touched=np.zeros(len(seen.robot.tips)),
-            first=np.float64(0.0),
+            settled=xp.astype(nothing, xp.int64),
+            preshape=nothing,
+            touched=xp.zeros_like(xp.astype(seen.contacts, goal.dtype)),
+            first=nothing,
             estimate=estimate,
             start=seen.object(self.target),
             now=seen.object(self.target),
         )
 
     def _estimate(self, seen: Seen, goal: Array, approach: Array) -> Array:
-        centre, place = seen.object(self.target)[:3], resting_place(seen, self.target)
-        beyond = float((centre - goal[:3]) @ approach)
-        if place is None:
-            return np.array([0.0, 0.0, beyond / 0.05, 1.0, 0.0])
-        up = poses.z_axis(place.pose[3:])
-        onto = -float(up @ approach)
-        goal_height, height = (float((p - place.pose[:3]) @ up) for p in (goal[:3], centre))
-        standing = half_extent(seen.object(self.target), seen.model(self.target), up)
-        above = (height - standing) / max(onto, 0.3)
-        return np.array([goal_height / 0.05, height / 0.05, beyond / 0.05, onto, above / 0.02])
+        pose, stands = seen.object(self.target), resting_place(seen, self.target)
+        xp, place = array_namespace(goal), stands.place
+        beyond = poses.dot(pose[:, :3] - goal[:, :3], approach)
+        up = poses.z_axis(place.pose[:, 3:])
+        onto = -poses.dot(up, approach)
+        above_goal, height = (poses.dot(p[:, :3] - place.pose[:, :3], up) for p in (goal, pose))
+        standing = half_extent(pose, seen.model(self.target), up)
+        above = (height - standing) / poses.clip(onto, 0.3, math.inf)
+        nothing = xp.zeros_like(onto)
+        known = xp.stack([above_goal / 0.05, height / 0.05, beyond / 0.05, onto, above / 0.02], axis=-1)
+        unknown = xp.stack([nothing, nothing, beyond / 0.05, nothing + 1.0, nothing], axis=-1)
+        return xp.where(stands.found[:, None], known, unknown)
 
     @classmethod
     def layout(cls, robot: RobotDescription) -> dict[str, int]:
@@ -228,51 +229,18 @@ class Grasp(ConceptModel[GraspMemory]):
         return _commanded(motion), self._after(motion, seen, memory)
 
     def _after(self, motion: GraspMotion, seen: Seen, memory: GraspMemory) -> GraspMemory:
-        if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
-            return self._after_one(motion, seen, memory)
-        delay, target = motion.delay, motion.target
-        gap = poses.norm(seen.tool[..., :3] - target[..., :3])
-        arrived = (seen.elapsed - delay >= memory.path.duration) & (gap < self.tolerance)
-        late = seen.elapsed - delay >= memory.path.duration + 1.0
+        late = seen.elapsed - motion.delay - memory.path.duration
+        gap = poses.norm(seen.tool[:, :3] - motion.target[:, :3])
+        arrived = (late >= 0.0) & ((gap < self.tolerance) | (late >= 1.0))
         begun = memory.closing >= 0.0
         still = abs(seen.closure - memory.closure) < 0.01
         good = seen.opposed() & still & begun
-        along = poses.transform(poses.inverse(memory.goal), seen.tool[..., :3])[..., 2]
+        along = poses.localise(memory.goal, seen.tool[:, :3])[:, 2]
         xp = array_namespace(seen.tool)
-        touched = xp.where(seen.contacts, 1.0, memory.touched)
-        fresh = (xp.max(touched, axis=-1) > 0.0) & (xp.max(memory.touched, axis=-1) == 0.0)
+        touched = xp.maximum(memory.touched, xp.astype(seen.contacts, memory.touched.dtype))
+        fresh = xp.any(touched > 0.0, axis=-1) & ~xp.any(memory.touched > 0.0, axis=-1)
         go_on = memory.closing + seen.world.control_period
-        return memory._replace(
-            now=seen.object(self.target),
-            delay=delay,
-            offset=motion.offset,
-            middle=motion.middle,
-            target=target,
-            closed=motion.closed,
-            closing=xp.where(begun, go_on, xp.where(arrived | late, 0.0, memory.closing)),
-            closure=seen.closure,
-            settled=xp.where(good, memory.settled + 1, 0),
-            touched=touched,
-            first=xp.where(fresh, along, memory.first),
-        )
-
-    def _after_one(self, motion: GraspMotion, seen: Seen, memory: GraspMemory) -> GraspMemory:
-        """`_after` for one grasp, in plain numbers: they are quicker than arrays of one."""
-        closing, closure = float(memory.closing), seen.closure
-        begun, settled = closing >= 0.0, np.int64(0)
-        if begun:
-            closing += seen.world.control_period
-            still = abs(float(closure) - float(memory.closure)) < 0.01
-            settled = memory.settled + 1 if still and seen.opposed() else settled
-        else:
-            late = float(seen.elapsed) - float(motion.delay) - float(memory.path.duration)
-            gap = poses.norm(seen.tool[:3] - motion.target[:3]) if 0.0 <= late < 1.0 else 0.0
-            closing = 0.0 if late >= 0.0 and gap < self.tolerance else closing
-        touched, first = memory.touched, memory.first
-        if True in seen.contacts.tolist():
-            if max(touched.tolist()) == 0.0:
-                first = poses.transform(poses.inverse(memory.goal), seen.tool[:3])[2]
-            touched = np.where(seen.contacts, 1.0, touched)
+        begins = xp.where(arrived, xp.zeros_like(go_on), memory.closing)
         return memory._replace(
             now=seen.object(self.target),
             delay=motion.delay,
@@ -280,11 +248,11 @@ class Grasp(ConceptModel[GraspMemory]):
             middle=motion.middle,
             target=motion.target,
             closed=motion.closed,
-            closing=np.float64(closing),
-            closure=closure,
-            settled=settled,
+            closing=xp.where(begun, go_on, begins),
+            closure=seen.closure,
+            settled=xp.where(good, memory.settled + 1, xp.zeros_like(memory.settled)),
             touched=touched,
-            first=first,
+            first=xp.where(fresh, along, memory.first),
         )
 
     def _motion(self, action: Array, seen: Seen, memory: GraspMemory) -> GraspMotion:
@@ -299,10 +267,8 @@ class Grasp(ConceptModel[GraspMemory]):
         return GraspMotion(delay, offset, middle, target, closed)
 
     def _asked(self, offset: Array) -> Array:
-        """The closure ``(...)`` that offsets ``(..., 5)`` ask for in the end."""
-        if type(offset) is np.ndarray and offset.ndim == 1:
-            return np.float64(min(max(self.grip + float(offset[CLOSE]), 0.0), 1.0))
-        return poses.clip(self.grip + offset[..., CLOSE], 0.0, 1.0)
+        """The closure ``(N,)`` that offsets ``(N, 5)`` ask for in the end."""
+        return poses.clip(self.grip + offset[:, CLOSE], 0.0, 1.0)
 
     def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:
         """The middle of an action, at the reference motion's own speed.
@@ -321,8 +287,8 @@ class Grasp(ConceptModel[GraspMemory]):
     def limits(self, seen: Seen, memory: GraspMemory) -> tuple[Limit, ...]:
         """The hand has closed on nothing, presses too hard, or has pushed the object away or over."""
         now, names = seen.object(self.target), {"object": self.target}
-        pushed = poses.norm(now[..., :3] - memory.start[..., :3])
-        tipped = poses.tilt(now[..., 3:], memory.start[..., 3:])
+        pushed = poses.norm(now[:, :3] - memory.start[:, :3])
+        tipped = poses.tilt(now[:, 3:], memory.start[:, 3:])
         return (
             Limit(CLOSED_ON_NOTHING, seen.closure, EMPTY * self.grip, counts=memory.closing > 0.8),
             strain(seen, self.force_limit),
@@ -336,28 +302,26 @@ class Grasp(ConceptModel[GraspMemory]):
         The mean distance of the fingertips to where they would touch the object, over 0.1 m; 0.3 while
         opposing fingertips have no contact; and how far the object was pushed, over 0.05 m.
         """
-        gap = seen.observation.tips - seen.observation.contact_points
-        if type(gap) is np.ndarray and gap.ndim == 2:
-            mean = sum(math.sqrt(x * x + y * y + z * z) for x, y, z in gap.tolist()) / len(gap)
-            far = float(poses.norm(seen.object(self.target)[:3] - memory.start[:3]))
-            return np.float64(mean / 0.1 + (0.0 if seen.opposed() else 0.3) + far / 0.05)
+        gap = poses.norm(seen.observation.tips - seen.observation.contact_points)
         xp = array_namespace(gap)
-        distance = xp.mean(xp.sqrt(xp.sum(gap * gap, axis=-1)), axis=-1)
-        pushed = poses.norm(seen.object(self.target)[..., :3] - memory.start[..., :3])
-        return distance / 0.1 + 0.3 * xp.astype(~xp.asarray(seen.opposed()), distance.dtype) + pushed / 0.05
+        pushed = poses.norm(seen.object(self.target)[:, :3] - memory.start[:, :3])
+        apart = 0.3 * xp.astype(~seen.opposed(), gap.dtype)
+        return xp.mean(gap, axis=-1) / 0.1 + apart + pushed / 0.05
 
     def sufficient_cost(self, known: Known, memory: GraspMemory) -> Array:
         """1 unless the hand presses on the object."""
         force = known.hand_force(self.target)
-        xp = array_namespace(force)
-        return xp.where(force > 0.5, 0.0, 1.0)
+        return array_namespace(force).astype(~(force > 0.5), force.dtype)
 
     def explain(self, seen: Seen, memory: GraspMemory) -> Statement:
         """Contacts, opening and how far the tool is from the object."""
-        touching = [t for t, c in zip(seen.world.tips, seen.contacts, strict=True) if c]
+        touching = [
+            [tip for tip, touches in zip(seen.world.tips, row, strict=True) if touches]
+            for row in seen.contacts.tolist()
+        ]
         return GRASPING(
             closure=seen.closure,
-            contact=f"contact at {', '.join(touching)}" if touching else "no contact",
+            contact=tuple(f"contact at {', '.join(tips)}" if tips else "no contact" for tips in touching),
             distance=tool_distance(seen, self.target),
             object=self.target,
             force=force_at_wrist(seen),
@@ -365,25 +329,24 @@ class Grasp(ConceptModel[GraspMemory]):
 
 
 def _commanded(motion: GraspMotion) -> Command:
-    return Command(tool=motion.target, hand=motion.closed[..., None])
+    return Command(tool=motion.target, hand=motion.closed[:, None])
 
 
 def _approach_begins(path: Path, standoff: float) -> Array:
-    """Seconds after which no more than ``standoff`` metres are left of a path."""
-    left = np.linalg.norm(path.table[:, :3] - path.table[-1, :3], axis=-1)
-    inside = np.flatnonzero(left > standoff)
-    fraction = 0.0 if len(inside) == 0 else (inside[-1] + 1) / (len(path.table) - 1)
-    times = np.linspace(0.0, 1.0, 101)
-    return np.float64(np.interp(fraction, minimum_jerk(times), times) * float(path.duration))
+    """Seconds ``(N,)`` after which no more than ``standoff`` metres are left of a path."""
+    xp, n = array_namespace(path.table), path.table.shape[1]
+    left = poses.norm(path.table[:, :, :3] - path.table[:, -1:, :3])
+    numbers = xp.astype(xp.arange(1, n + 1, device=left.device), left.dtype)
+    fraction = xp.max((left > standoff) * numbers, axis=-1) / (n - 1)
+    return minimum_jerk_time(fraction) * path.duration
 
 
 def _way_out(seen: Seen, goal: Array) -> list[Array]:
     """Waypoints from the present tool pose that keep the hand above what stands around."""
-    start = seen.tool.copy()
-    level = max(float(start[2]), float(goal[2]))
-    far = float(np.linalg.norm(start[:2] - goal[:2])) > 0.05
-    if float(start[2]) < level - 0.02 and far and level < 0.35:
-        up = start.copy()
-        up[2] = level
-        return [start, up]
-    return [start]
+    start = seen.tool
+    xp = array_namespace(start)
+    level = xp.maximum(start[:, 2], goal[:, 2])
+    far = poses.norm(start[:, :2] - goal[:, :2]) > 0.05
+    low = (start[:, 2] < level - 0.02) & far & (level < 0.35)
+    rise = xp.where(low, level - start[:, 2], xp.zeros_like(level))
+    return [start, poses.shifted(start, rise[:, None] * constant([0.0, 0.0, 1.0], start))]

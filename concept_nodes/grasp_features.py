@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant
@@ -76,80 +75,42 @@ def layout(robot: RobotDescription) -> dict[str, int]:
 
 
 def features(seen: Seen, memory: GraspMemory) -> Array:
-    """The features ``(..., n)``, all of the order of one."""
-    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
-        return _features_one(seen, memory)
-    local = poses.multiply(poses.inverse(memory.goal), seen.tool)
-    turn = poses.rotation_vector(local[..., 3:])[..., 2:]
-    behind = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])
-    pushed = poses.rotate(
-        poses.quat_conjugate(memory.goal[..., 3:]), memory.now[..., :3] - memory.start[..., :3]
-    )
-    robot = seen.robot
+    """The features ``(N, n)``, all of the order of one."""
+    local = poses.relative(memory.goal, seen.tool)
+    turn = poses.rotation_vector(local[:, 3:])[:, 2:]
+    behind = poses.localise(memory.target, seen.tool[:, :3])
+    moved = memory.now[:, :3] - memory.start[:, :3]
+    pushed = poses.rotate(poses.quat_conjugate(memory.goal[:, 3:]), moved)
+    robot, observation = seen.robot, seen.observation
     opened, span = constant(robot.hand_open, seen.tool), constant(_span(robot), seen.tool)
-    joints = (seen.observation.hand_position - opened) / span
-    numbers = (
-        (seen.closure - memory.closure) / 0.1,
-        (memory.closed - seen.closure) / 0.2,
-        memory.first / 0.03,
+    xp = array_namespace(seen.tool)
+    settled = xp.astype(memory.settled, seen.tool.dtype)
+    times = (
         poses.clip(seen.elapsed - memory.delay - memory.path.duration, -1.0, 2.0),
         poses.clip(memory.delay, 0.0, 4.0),
         poses.clip(memory.closing, -0.1, 2.0),
-        poses.clip(memory.settled / 3.0, 0.0, 2.0),
+        poses.clip(settled / 3.0, 0.0, 2.0),
     )
-    xp = array_namespace(seen.tool)
-    columns = [xp.astype(n, seen.tool.dtype)[..., None] for n in numbers]
     parts = [
-        local[..., :3] / 0.03,
+        local[:, :3] / 0.03,
         turn / 0.2,
         behind / 0.01,
         memory.offset / constant(SCALE, seen.tool),
-        joints,
-        *columns[:2],
+        (observation.hand_position - opened) / span,
+        ((seen.closure - memory.closure) / 0.1)[:, None],
+        ((memory.closed - seen.closure) / 0.2)[:, None],
         xp.astype(seen.contacts, seen.tool.dtype),
         memory.touched,
-        *columns[2:],
+        (memory.first / 0.03)[:, None],
+        xp.stack(times, axis=-1),
         memory.estimate,
         pushed / 0.01,
     ]
     return xp.concat(parts, axis=-1)
 
 
-def _features_one(seen: Seen, memory: GraspMemory) -> Array:
-    """`features` of one grasp, in plain numbers: they are quicker than arrays of one to five."""
-    tool, robot = seen.tool, seen.robot
-    there, goal = tool.tolist(), memory.goal.tolist()
-    x, y, z, *turned = poses.composed(poses.inverted(goal), there)
-    turn = float(poses.rotation_vector(np.array(turned))[2])
-    behind = poses.point(poses.inverted(memory.target.tolist()), there[:3])
-    moved = (memory.now[:3] - memory.start[:3]).tolist()
-    pushed = poses.point([0.0, 0.0, 0.0, goal[3], -goal[4], -goal[5], -goal[6]], moved)
-    joints = (seen.observation.hand_position - robot.hand_open) / _span(robot)
-    closure, delay = float(seen.closure), float(memory.delay)
-    late = float(seen.elapsed) - delay - float(memory.path.duration)
-    return np.array(
-        [
-            x / 0.03, y / 0.03, z / 0.03, turn / 0.2,
-            *[v / 0.01 for v in behind],
-            *[v / scale for v, scale in zip(memory.offset.tolist(), SCALE, strict=True)],
-            *joints.tolist(),
-            (closure - float(memory.closure)) / 0.1,
-            (float(memory.closed) - closure) / 0.2,
-            *seen.contacts.tolist(),
-            *memory.touched.tolist(),
-            float(memory.first) / 0.03,
-            min(max(late, -1.0), 2.0),
-            min(delay, 4.0),
-            min(max(float(memory.closing), -0.1), 2.0),
-            min(int(memory.settled) / 3.0, 2.0),
-            *memory.estimate.tolist(),
-            *[v / 0.01 for v in pushed],
-        ]
-    )  # fmt: skip
-
-
 class Met(NamedTuple):
-    """What a motion that takes care has met; booleans ``(...)``.
+    """What a motion that takes care has met; booleans ``(N,)``.
 
     Attributes:
         stands: A finger of the open hand stands on something: it touches, and is held up.
@@ -162,26 +123,17 @@ class Met(NamedTuple):
 
 def met(action: Array, seen: Seen, memory: GraspMemory) -> Met:
     """See `Met`; nothing for an action in `HASTE`, and before the straight approach."""
-    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
-        begun = float(seen.elapsed) - float(memory.delay) >= float(memory.begins)
-        if not begun or action[TIME_SCALING] >= HASTE or True not in seen.contacts.tolist():
-            return _NOTHING_MET
-        if memory.closing >= 0.0:
-            return Met(np.False_, np.bool_(not seen.opposed()))
-        ahead = poses.transform(poses.inverse(memory.target), seen.tool[:3])[2]
-        return Met(ahead < -OBSTRUCTED, ahead < -OBSTRUCTED)
-    xp = array_namespace(memory.delay)
-    touching = xp.any(xp.astype(seen.contacts, xp.bool), axis=-1)
+    touching = array_namespace(seen.tool).any(seen.contacts, axis=-1)
     begun = seen.elapsed - memory.delay >= memory.begins
-    feels = begun & touching & (action[..., TIME_SCALING] < HASTE)
-    ahead = poses.transform(poses.inverse(memory.target), seen.tool[..., :3])[..., 2]
+    feels = begun & touching & (action[:, TIME_SCALING] < HASTE)
+    ahead = poses.localise(memory.target, seen.tool[:, :3])[:, 2]
     closing = memory.closing >= 0.0
     stands = feels & ~closing & (ahead < -OBSTRUCTED)
-    return Met(stands, stands | (feels & closing & ~xp.asarray(seen.opposed())))
+    return Met(stands, stands | (feels & closing & ~seen.opposed()))
 
 
 def moved_offset(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Array:
-    """The offsets ``(..., 5)`` one control period on: towards the action, no faster than `RATE`.
+    """The offsets ``(N, 5)`` one control period on: towards the action, no faster than `RATE`.
 
     They grow with the square of the action: around its middle a hand that should go straight does, to within
     a fraction of a millimetre, and is not led astray by exploration either. While a finger stands on
@@ -189,107 +141,71 @@ def moved_offset(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Ar
     how fast it goes aside, and what it has gone stays (`found_middle`).
     """
     share = seen.world.control_period / PERIOD
-    if type(action) is np.ndarray and action.ndim == 1:
-        return _moved(action.tolist(), met, share, memory.middle.tolist(), memory.offset.tolist())
-    asked = poses.clip(action[..., :TIME_SCALING], -1.0, 1.0)
-    xp = array_namespace(memory.offset)
-    back_rate, rate = constant(_BACK_RATE, memory.offset), constant(RATE, memory.offset)
-    gap = (asked * abs(asked) + memory.middle) * constant(SCALE, memory.offset) - memory.offset
-    gap = gap - xp.astype(met.stands, gap.dtype)[..., None] * constant(_BACK, gap)
-    gap = xp.where(met.searches[..., None] & (constant(_BESIDE, gap) > 0.0), asked * rate * share, gap)
-    return memory.offset + poses.clip(gap, -back_rate * share, rate * share)
+    asked = poses.clip(action[:, :TIME_SCALING], -1.0, 1.0)
+    xp, like = array_namespace(memory.offset), memory.offset
+    rate, back_rate = constant(RATE, like) * share, constant(_BACK_RATE, like) * share
+    gap = (asked * abs(asked) + memory.middle) * constant(SCALE, like) - memory.offset
+    gap = gap - xp.astype(met.stands, gap.dtype)[:, None] * (WITHDRAWS * axis(ALONG, gap))
+    gap = xp.where(met.searches[:, None] & (axis(ACROSS, gap) > 0.0), asked * rate, gap)
+    return memory.offset + poses.clip(gap, -back_rate, rate)
 
 
 def found_middle(offset: Array, met: Met, memory: GraspMemory) -> Array:
-    """The middle ``(..., 5)`` of an action from now on: what a search aside has gone is added to it.
+    """The middle ``(N, 5)`` of an action from now on: what a search aside has gone is added to it.
 
     Args:
-        offset: The offsets ``(..., 5)`` from now on, see `moved_offset`.
+        offset: The offsets ``(N, 5)`` from now on, see `moved_offset`.
         met: What was met.
         memory: The grasp's memory.
     """
-    if met.searches.ndim == 0 and not met.searches:
-        return memory.middle
-    xp = array_namespace(memory.offset)
-    gone = (offset - memory.offset) / constant(SCALE, memory.offset) * constant(_BESIDE, memory.offset)
-    return xp.where(met.searches[..., None], poses.clip(memory.middle + gone, -1.0, 1.0), memory.middle)
+    gone = (offset - memory.offset) / constant(SCALE, offset) * axis(ACROSS, offset)
+    further = poses.clip(memory.middle + gone, -1.0, 1.0)
+    return array_namespace(offset).where(met.searches[:, None], further, memory.middle)
 
 
 def time_scaling(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Array:
-    """Time scaling ``(...)`` of the reference motion: 1 before the straight approach.
+    """Time scaling ``(N,)`` of the reference motion: 1 before the straight approach.
 
     Then it is 1 for `HASTE`, and for the middle of an action `CAREFUL`, or 0 while a finger stands on
     something.
     """
-    if type(action) is np.ndarray and action.ndim == 1:
-        if float(seen.elapsed) - float(memory.delay) < float(memory.begins):
-            return np.float64(1.0)
-        one = (0.0 if met.stands else CAREFUL) + EAGER * float(action[TIME_SCALING])
-        return np.float64(min(max(one, 0.0), 1.0))
     xp = array_namespace(memory.delay)
-    asked = poses.clip(xp.where(met.stands, 0.0, CAREFUL) + EAGER * action[..., TIME_SCALING], 0.0, 1.0)
-    return xp.where(seen.elapsed - memory.delay >= memory.begins, asked, 1.0)
+    nothing = xp.zeros_like(memory.delay)
+    usual = xp.where(met.stands, nothing, nothing + CAREFUL)
+    asked = poses.clip(usual + EAGER * action[:, TIME_SCALING], 0.0, 1.0)
+    return xp.where(seen.elapsed - memory.delay >= memory.begins, asked, nothing + 1.0)
 
 
 def closed(scaling: Array, asked: Array, tightening: float, seen: Seen, memory: GraspMemory) -> Array:
-    """The closure ``(...)`` to command: the preshape, and once the hand closes what is ``asked`` for.
+    """The closure ``(N,)`` to command: the preshape, and once the hand closes what is ``asked`` for.
 
     At a time scaling below 1 the fingers come as much slower than the hand can, and from contact of
     opposing ones on the hand tightens at ``tightening`` of its speed: force grows bit by bit until the
     grasp is done.
     """
-    if type(seen.tool) is np.ndarray and seen.tool.ndim == 1:
-        if not memory.closing >= 0.0:
-            return memory.preshape
-        own = tightening if seen.opposed() else float(scaling)
-        if scaling >= 1.0 or own >= 1.0:
-            return asked
-        further = float(memory.closed) + own * seen.robot.hand_speed * seen.world.control_period
-        return np.float64(min(float(asked), further))
     xp = array_namespace(memory.closed)
-    share = xp.where(xp.asarray(seen.opposed()), tightening, scaling)
-    step = share * seen.robot.hand_speed * seen.world.control_period
+    share = xp.where(seen.opposed(), xp.zeros_like(scaling) + tightening, scaling)
+    step = share * (seen.robot.hand_speed * seen.world.control_period)
     reached = xp.where((scaling < 1.0) & (share < 1.0), xp.minimum(asked, memory.closed + step), asked)
     return xp.where(memory.closing >= 0.0, reached, memory.preshape)
 
 
 def displaced(reference: Array, offset: Array) -> Array:
-    """Tool poses ``(..., 7)`` on the reference motion, moved by offsets ``(..., 5)`` in the tool's frame."""
-    if type(offset) is np.ndarray and offset.ndim == 1:
-        x, y, z, turn, _ = offset.tolist()
-        if abs(x) + abs(y) + abs(z) + abs(turn) < _NOTHING:
-            return reference
-        return poses.multiply(
-            reference, np.array([x, y, z, math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)])
-        )
+    """Tool poses ``(N, 7)`` on the reference motion, moved by offsets ``(N, 5)`` in the tool's frame."""
     xp = array_namespace(reference)
-    half = offset[..., TURN] / 2
+    half = offset[:, TURN] / 2
     zero = xp.zeros_like(half)
     turn = xp.stack([xp.cos(half), zero, zero, xp.sin(half)], axis=-1)
-    return poses.multiply(reference, xp.concat([offset[..., :3], turn], axis=-1))
+    return poses.multiply(reference, xp.concat([offset[:, :3], turn], axis=-1))
 
 
-def _moved(action: list[float], met: Met, share: float, middle: list[float], offset: list[float]) -> Array:
-    """`moved_offset` for one grasp, in plain numbers."""
-    out = []
-    for k, scale in enumerate(SCALE):
-        asked = min(max(action[k], -1.0), 1.0)
-        gap = (asked * abs(asked) + middle[k]) * scale - offset[k]
-        if k == ALONG and met.stands:
-            gap -= WITHDRAWS
-        elif k == ACROSS and met.searches:
-            gap = asked * RATE[k] * share
-        back = BACK_RATE if k == ALONG else RATE[k]
-        out.append(offset[k] + min(max(gap, -back * share), RATE[k] * share))
-    return np.array(out)
+def axis(number: int, like: Array) -> Array:
+    """One of the offsets' axes ``(5,)``, in the library of ``like``."""
+    return constant(_AXES[number], like)
 
 
-_NOTHING = 1e-12
-_NOTHING_MET = Met(np.False_, np.False_)
-_SCALE = np.array(SCALE)
+_AXES = np.eye(CLOSE + 1)
 _BACK_RATE = np.array([BACK_RATE if k == ALONG else rate for k, rate in enumerate(RATE)])
-_BACK = [WITHDRAWS if k == ALONG else 0.0 for k in range(CLOSE + 1)]
-_BESIDE = [float(k == ACROSS) for k in range(CLOSE + 1)]
 
 
 def _span(robot: RobotDescription) -> Array:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.limit import Limit
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.poses import Array, norm
 from bt_tasksim.core.units import NEWTONS
@@ -21,5 +21,5 @@ def strain(seen: Seen, limit: float) -> Limit:
 
 
 def force_at_wrist(seen: Seen) -> Array:
-    """Magnitude ``(...)`` of the force at the wrist, N."""
-    return norm(seen.wrench[..., :3])
+    """Magnitude ``(N,)`` of the force at the wrist, N."""
+    return norm(seen.wrench[:, :3])

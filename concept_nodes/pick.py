@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from bt_tasksim.concept.contact import ContactChange, ContactState
-from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.demonstrated import rounded, snapped, straight_words
 from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
 from bt_tasksim.planning.reference_motion import plan
@@ -67,8 +66,7 @@ class Pick(Carry):
 
     def begin(self, seen: Seen) -> MoveMemory:
         """A straight path."""
-        goal = seen.tool.copy()
-        goal[:3] += self.distance * np.asarray(self.direction)
+        goal = poses.shifted(seen.tool, self.distance * poses.constant(self.direction, seen.tool))
         return MoveMemory(plan([seen.tool, goal], self.speed, samples=2))
 
     def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:

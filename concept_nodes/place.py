@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from bt_tasksim.concept.contact import ContactChange, ContactState
-from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.demonstrated import position_words, straight_words
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import Form, Outcome, Statement
+from bt_tasksim.core.outcomes import Form, Possible, Statement
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS
@@ -35,13 +33,13 @@ FELT = 2
 
 
 class PlaceMemory(NamedTuple):
-    """What a place remembers; batch dimensions ``(...)``.
+    """What a place remembers in ``N`` worlds.
 
     Attributes:
         path: Tool path to the deepest pose that is tried.
-        baseline: Force ``(...)`` against the direction of placing when it began, N.
-        felt: Ticks in a row with the support's force.
-        progress: Seconds of the path that have been commanded.
+        baseline: Force ``(N,)`` against the direction of placing when it began, N.
+        felt: Ticks ``(N,)`` in a row with the support's force.
+        progress: Seconds ``(N,)`` of the path that have been commanded.
     """
 
     path: Path
@@ -110,23 +108,25 @@ class Place(ConceptModel[PlaceMemory]):
             )
         return {"target": given["target"], "on": given["on"]}
 
-    def initial_state(self, seen: Seen) -> Outcome | None:
+    def initial_state(self, seen: Seen) -> Possible:
         """The object must be in the hand."""
         return not_held(seen, self.target)
 
     def begin(self, seen: Seen) -> PlaceMemory:
         """A straight path down to the place's origin."""
-        now, model = seen.object(self.target), seen.model(self.target)
+        xp, now = array_namespace(seen.tool), seen.object(self.target)
         frame, _ = destination(seen, self.on)
-        goal = standing_pose(frame, now, model, 0.0)
-        d = np.asarray(self.direction)
-        goal[:3] += self.overshoot * d
+        d = poses.constant(self.direction, now)
+        goal = poses.shifted(standing_pose(frame, now, seen.model(self.target)), self.overshoot * d)
         if self.distance is not None:
-            along = float((goal[:3] - now[:3]) @ d)
-            goal[:3] += min(0.0, self.distance + self.overshoot - along) * d
-        tool_goal = poses.multiply(goal, poses.multiply(poses.inverse(now), seen.tool))
+            along = poses.dot(goal[:, :3] - now[:, :3], d)
+            beyond = xp.minimum(self.distance + self.overshoot - along, xp.zeros_like(along))
+            goal = poses.shifted(goal, beyond[:, None] * d)
+        tool_goal = poses.multiply(goal, poses.relative(now, seen.tool))
         path = plan([seen.tool, tool_goal], self.speed, samples=2)
-        return PlaceMemory(path, self._force(seen), np.int64(0), np.float64(-seen.world.control_period))
+        nothing = xp.zeros_like(path.duration)
+        felt = xp.astype(nothing, xp.int64)
+        return PlaceMemory(path, self._force(seen), felt, nothing - seen.world.control_period)
 
     def command(self, action: Array, seen: Seen, memory: PlaceMemory) -> Command:
         """Follow the path, and stop on it as long as the support is felt; the hand keeps its grip."""
@@ -135,7 +135,7 @@ class Place(ConceptModel[PlaceMemory]):
     def advance(self, action: Array, seen: Seen, memory: PlaceMemory) -> PlaceMemory:
         """Count the ticks at which the support is felt."""
         xp = array_namespace(seen.tool)
-        felt = xp.where(self._supported(seen, memory), memory.felt + 1, 0)
+        felt = xp.where(self._supported(seen, memory), memory.felt + 1, xp.zeros_like(memory.felt))
         return memory._replace(felt=felt, progress=self._progress(seen, memory))
 
     def limits(self, seen: Seen, memory: PlaceMemory) -> tuple[Limit, ...]:
@@ -154,13 +154,12 @@ class Place(ConceptModel[PlaceMemory]):
         """Distance of the object from where it should stand, metres."""
         frame, _ = destination(seen, self.on)
         now = seen.object(self.target)
-        gap = now[..., :3] - standing_pose(frame, now, seen.model(self.target), 0.0)[..., :3]
-        return poses.norm(gap)
+        return poses.norm(now[:, :3] - standing_pose(frame, now, seen.model(self.target))[:, :3])
 
     def sufficient_cost(self, known: Known, memory: PlaceMemory) -> Array:
         """1 unless the object touches its support."""
-        xp = array_namespace(known.hidden.objects)
-        return xp.where(xp.asarray(known.supported(self.target)), 0.0, 1.0)
+        xp, cost = array_namespace(known.hidden.tool_pose), known.hidden.tool_pose[:, 0]
+        return xp.where(known.supported(self.target), xp.zeros_like(cost), xp.ones_like(cost))
 
     def explain(self, seen: Seen, memory: PlaceMemory) -> Statement:
         """What is felt, and how far the object is from where it should stand."""
@@ -171,11 +170,9 @@ class Place(ConceptModel[PlaceMemory]):
         )
 
     def _force(self, seen: Seen) -> Array:
-        """Force ``(...)`` in N against the direction of placing."""
-        d = -np.asarray(self.direction)
-        f = poses.rotate(seen.tool[..., 3:], seen.wrench[..., :3])
-        xp = array_namespace(f)
-        return xp.sum(f * poses.constant(d, f), axis=-1)
+        """Force ``(N,)`` in N against the direction of placing."""
+        force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+        return -poses.dot(force, poses.constant(self.direction, force))
 
     def _progress(self, seen: Seen, memory: PlaceMemory) -> Array:
         xp = array_namespace(seen.tool)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from bt_tasksim.concept.contact import ContactChange, ContactState
-from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Seconds
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.holding import HOLDING
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.core import poses
@@ -30,12 +29,12 @@ OPENED = Form(
 
 
 class ReleaseMemory(NamedTuple):
-    """What a release remembers; batch dimensions ``(...)``.
+    """What a release remembers in ``N`` worlds.
 
     Attributes:
         path: Tool path away from the object.
-        start: Closure at the begin.
-        opened: Seconds since the hand was seen open; negative before.
+        start: Closure ``(N,)`` at the begin.
+        opened: Seconds ``(N,)`` since the hand was seen open; negative before.
     """
 
     path: Path
@@ -80,29 +79,23 @@ class Release(ConceptModel[ReleaseMemory]):
 
     def begin(self, seen: Seen) -> ReleaseMemory:
         """A straight path back."""
-        back = seen.tool.copy()
-        back[:3] -= self.retreat * poses.z_axis(back[3:])
-        return ReleaseMemory(plan([seen.tool, back], self.speed, samples=2), seen.closure, np.float64(-1.0))
+        back = poses.shifted(seen.tool, -self.retreat * poses.z_axis(seen.tool[:, 3:]))
+        path = plan([seen.tool, back], self.speed, samples=2)
+        return ReleaseMemory(path, seen.closure, -array_namespace(seen.tool).ones_like(path.duration))
 
     def command(self, action: Array, seen: Seen, memory: ReleaseMemory) -> Command:
         """Open, then draw back."""
-        xp = array_namespace(seen.tool)
-        share = xp.clip(1.0 - seen.elapsed / self.opening, 0.0, 1.0)
-        since = xp.maximum(memory.opened, xp.asarray(0.0))
-        return Command(
-            tool=sample(memory.path, since),
-            hand=xp.asarray(memory.start * share)[..., None],
-        )
+        share = poses.clip(1.0 - seen.elapsed / self.opening, 0.0, 1.0)
+        since = poses.clip(memory.opened, 0.0, math.inf)
+        return Command(tool=sample(memory.path, since), hand=(memory.start * share)[:, None])
 
     def advance(self, action: Array, seen: Seen, memory: ReleaseMemory) -> ReleaseMemory:
         """Notice when the hand is open."""
         xp = array_namespace(seen.tool)
-        period = seen.world.control_period
         open_now = (seen.elapsed > self.opening) & (seen.closure < 0.15)
-        opened = xp.where(
-            memory.opened >= 0.0, memory.opened + period, xp.where(open_now, 0.0, memory.opened)
-        )
-        return memory._replace(opened=opened)
+        begun = xp.where(open_now, xp.zeros_like(memory.opened), memory.opened)
+        going = memory.opened >= 0.0
+        return memory._replace(opened=xp.where(going, memory.opened + seen.world.control_period, begun))
 
     def limits(self, seen: Seen, memory: ReleaseMemory) -> tuple[Limit, ...]:
         """The force at the wrist."""
@@ -110,26 +103,24 @@ class Release(ConceptModel[ReleaseMemory]):
 
     def done(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """The hand is open, touches nothing, and has drawn back."""
-        gap = seen.tool[..., :3] - memory.path.table[..., -1, :3]
-        xp = array_namespace(gap)
-        close = poses.norm(gap) < self.tolerance
-        free = ~xp.any(xp.asarray(seen.contacts), axis=-1)
-        return (memory.opened >= memory.path.duration) & close & free
+        gap = poses.norm(seen.tool[:, :3] - memory.path.table[:, -1, :3])
+        free = ~array_namespace(gap).any(seen.contacts, axis=-1)
+        return (memory.opened >= memory.path.duration) & (gap < self.tolerance) & free
 
     def necessary_cost(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """Share of the fingertips that still touch something."""
         xp = array_namespace(seen.tool)
-        return xp.mean(xp.astype(xp.asarray(seen.contacts), seen.tool.dtype), axis=-1)
+        return xp.mean(xp.astype(seen.contacts, seen.tool.dtype), axis=-1)
 
     def sufficient_cost(self, known: Known, memory: ReleaseMemory) -> Array:
         """1 while the hand still presses on the object."""
-        xp = array_namespace(known.hidden.objects)
-        return xp.where(known.hand_force(self.target) > 0.05, 1.0, 0.0)
+        force = known.hand_force(self.target)
+        return array_namespace(force).astype(force > 0.05, force.dtype)
 
     def explain(self, seen: Seen, memory: ReleaseMemory) -> Statement:
         """How far the hand is open and what it touches."""
         return OPENED(
             opening=1.0 - seen.closure,
-            contacts=np.count_nonzero(seen.contacts),
+            contacts=array_namespace(seen.tool).count_nonzero(seen.contacts, axis=-1),
             force=force_at_wrist(seen),
         )

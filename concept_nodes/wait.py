@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Seconds
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register

@@ -15,8 +15,8 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import plugins, poses
 from bt_tasksim.core.world import Command, Hidden, Observation
 from bt_tasksim.execution.runner import Runner

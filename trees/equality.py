@@ -6,9 +6,7 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept.condition import Condition
-from bt_tasksim.concept.model import ConceptModel
-from bt_tasksim.trees.leaf_ports import SETTING_DOCS
+from bt_tasksim.concept.leaf import ConceptNode, ModelLeaf
 from bt_tasksim.trees.vocabulary import kind_of
 
 
@@ -37,8 +35,7 @@ def _arguments(node: Behaviour) -> dict[str, Any]:
     kind = kind_of(node)
     if kind is not None:
         return {"tag": kind.tag, **kind.read(node)}
-    if isinstance(node, Condition):
-        return dict(node.values)
-    if isinstance(node, ConceptModel):
-        return {**node.values, **{setting: getattr(node, setting) for setting in SETTING_DOCS}}
-    return {}
+    if isinstance(node, ConceptNode):
+        model, settings = node.model, ("timeout", "tolerance", "uncertainty")
+        return {**model.values, "policy": node.policy, **{name: getattr(model, name) for name in settings}}
+    return dict(node.model.values) if isinstance(node, ModelLeaf) else {}

@@ -13,7 +13,6 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.demonstrated import rounded
-from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.task import Task
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.demos_decomp.concepts import concepts
@@ -64,7 +63,7 @@ def _way(leaves: Sequence[Behaviour]) -> Behaviour:
     return leaves[0] if len(leaves) == 1 else sequence(leaves[0].name, *leaves)
 
 
-def _leaf(task: Task, later: Sequence[Task], uncertainty: Mapping[str, Any]) -> ConceptModel:
+def _leaf(task: Task, later: Sequence[Task], uncertainty: Mapping[str, Any]) -> Behaviour:
     known = concepts()
     if task.concept not in known:
         raise InputError(

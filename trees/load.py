@@ -15,6 +15,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.leaf import ConceptNode, ModelLeaf
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.former import advice
@@ -144,8 +145,8 @@ def with_policies(
 
 def _built_with(build: Callable[[], Behaviour], wanted: Mapping[str, str]) -> Behaviour:
     root = build()
-    leaves = [leaf for leaf in root.iterate() if isinstance(leaf, ConceptModel)]
-    concepts = {concept_name(type(leaf)) for leaf in leaves}
+    leaves = [leaf for leaf in root.iterate() if isinstance(leaf, ConceptNode)]
+    concepts = {concept_name(type(leaf.model)) for leaf in leaves}
     for concept in wanted:
         if concept not in concepts:
             raise InputError(
@@ -153,9 +154,9 @@ def _built_with(build: Callable[[], Behaviour], wanted: Mapping[str, str]) -> Be
                 f"{nearest(concept, concepts)}"
             )
     for leaf in leaves:
-        policy = wanted.get(concept_name(type(leaf)))
+        policy = wanted.get(concept_name(type(leaf.model)))
         if policy is not None:
-            leaf.policy = leaf._settings["policy"] = policy
+            leaf.policy = policy
     return root
 
 
@@ -175,10 +176,10 @@ def check_names(root: Behaviour, scene: Scene, where: Callable[[Behaviour], str]
     objects = set(scene.objects)
     places = {p.name for f in scene.fixtures for p in load_fixture(f).places} | {s.name for s in scene.spots}
     for leaf in root.iterate():
-        if not isinstance(leaf, ConceptModel | Condition):
+        if not isinstance(leaf, ModelLeaf):
             continue
-        for key, parameter in leaf.parameters().items():
-            value = leaf.values[key]
+        for key, parameter in leaf.model.parameters().items():
+            value = leaf.model.values[key]
             if value is None:
                 continue
             if parameter.quantity.kind == "object" and value not in objects:
@@ -217,12 +218,12 @@ def names_in(root: Behaviour) -> tuple[set[str], set[str]]:
     objects: set[str] = set()
     places: set[str] = set()
     for leaf in root.iterate():
-        if isinstance(leaf, ConceptModel | Condition):
-            for key, parameter in leaf.parameters().items():
-                if leaf.values[key] is not None and parameter.quantity.kind == "object":
-                    objects.add(leaf.values[key])
-                if leaf.values[key] is not None and parameter.quantity.kind == "place":
-                    places.add(leaf.values[key])
+        if isinstance(leaf, ModelLeaf):
+            for key, parameter in leaf.model.parameters().items():
+                if leaf.model.values[key] is not None and parameter.quantity.kind == "object":
+                    objects.add(leaf.model.values[key])
+                if leaf.model.values[key] is not None and parameter.quantity.kind == "place":
+                    places.add(leaf.model.values[key])
     return objects, places
 
 

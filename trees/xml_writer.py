@@ -10,8 +10,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept.condition import Condition
-from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.leaf import ModelLeaf
 from bt_tasksim.concept.parameters import Parameter
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
@@ -113,9 +112,9 @@ class _Writer:
         self.own: dict[str, NodeKind[Any]] = {}
         taken = {*node_kinds(), *OUTSIDE, *CATEGORIES}
         for node in root.iterate():
-            if isinstance(node, ConceptModel | Condition):
-                name = type(node).__name__
-                if self.leaves.setdefault(name, type(node)) is not type(node):
+            if isinstance(node, ModelLeaf):
+                name = type(node.model).__name__
+                if self.leaves.setdefault(name, type(node.model)) is not type(node.model):
                     raise InputError(f"two different leaves are called {name}: rename one of the classes")
                 if name in taken:
                     raise InputError(f"leaf {name} has the name of a node of BehaviorTree.CPP: rename it")
@@ -164,8 +163,8 @@ class _Writer:
     def _element(self, node: Behaviour, names: set[str]) -> tuple[str, dict[str, str]]:
         if type(node) is SubTree:
             return "SubTree", self._subtree(node, names)
-        if isinstance(node, ConceptModel | Condition):
-            return type(node).__name__, self._leaf(node)
+        if isinstance(node, ModelLeaf):
+            return type(node.model).__name__, self._leaf(node)
         kind = kind_of(node)
         if kind is None:
             cls = type(node)
@@ -180,13 +179,13 @@ class _Writer:
                 attributes[port.name] = str(values[port.name])
         return kind.tag, attributes
 
-    def _leaf(self, node: ConceptModel | Condition) -> dict[str, str]:
+    def _leaf(self, node: ModelLeaf) -> dict[str, str]:
         arguments: dict[str, Any] = node.arguments()
         attributes = {"name": arguments.pop("name")} if arguments.get("name") else {}
         owner = f"'{node.name}'"
-        for port in leaf_ports(type(node)):
+        for port in leaf_ports(type(node.model)):
             if port in arguments:
-                attributes[port] = port_to_text(type(node), port, arguments[port], owner)
+                attributes[port] = port_to_text(type(node.model), port, arguments[port], owner)
         return attributes
 
     def _subtree(self, node: SubTree, names: set[str]) -> dict[str, str]:

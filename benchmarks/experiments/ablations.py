@@ -20,8 +20,8 @@ from py_trees.common import Status
 from benchmarks.experiments import judged, pictures
 from benchmarks.experiments.common import Request, share
 from benchmarks.experiments.training import POLICIES, finished, history, learn
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.parameters import Seconds
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Grasp, Pick
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.core.files import write_text

@@ -11,8 +11,8 @@ from typing import Any
 
 from bt_tasksim.checking.questions import QUESTIONS
 from bt_tasksim.checking.situations import RecordedDecision, Situation, Situations
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.seen import Seen
 
 ERROR, WARNING = "ERROR", "WARNING"
 FAILED: Any = object()

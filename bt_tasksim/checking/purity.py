@@ -14,7 +14,7 @@ from bt_tasksim.checking.bundles import different, frozen, mapped, numbers, part
 from bt_tasksim.checking.findings import ERROR, FAILED, Case
 from bt_tasksim.checking.questions import QUESTIONS
 from bt_tasksim.checking.situations import Situation, Situations
-from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.seen import Seen
 
 DATA = (bool, int, float, str, list, dict, set, np.ndarray)
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.seen import Known, Seen
 
 
 class Asked(NamedTuple):

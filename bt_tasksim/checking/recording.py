@@ -10,8 +10,8 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.checking.situations import RecordedDecision
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.errors import BtTasksimError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden

@@ -12,8 +12,8 @@ from bt_tasksim.checking.bundles import TOLERANCE, different, in_torch, shapes, 
 from bt_tasksim.checking.perturbation import changed_hidden, changed_memory, changed_observation
 from bt_tasksim.checking.questions import ACT, QUESTIONS, Asked
 from bt_tasksim.concept.condition import Condition
-from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, Observation, WorldModel
 from bt_tasksim.robot.description import RobotDescription

@@ -10,8 +10,8 @@ import numpy as np
 from bt_tasksim.checking.bundles import numbers, parts
 from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
 from bt_tasksim.checking.situations import Situation, Situations, perturbed
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.outcomes import Outcome, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Command

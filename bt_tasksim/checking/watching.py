@@ -10,7 +10,7 @@ import numpy as np
 from bt_tasksim.checking.bundles import numbers
 from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
 from bt_tasksim.checking.situations import Situation, Situations
-from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.errors import nearest
 from bt_tasksim.core.observables import FIELDS, observable, observables
 from bt_tasksim.core.poses import Array

@@ -1,66 +1,86 @@
-"""Conditions: leaves of a behaviour tree that ask one question of what is seen."""
+"""Conditions: models of leaves that ask one question of what is seen."""
 
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
 from py_trees.common import Status
 
-from bt_tasksim.concept.context import Seen
-from bt_tasksim.concept.leaf import ContextLeaf
-from bt_tasksim.concept.parameters import Parameter, bind_arguments, declared_parameters
+from bt_tasksim.concept.leaf import ONE, ModelLeaf
+from bt_tasksim.concept.model import LeafModel
+from bt_tasksim.concept.parameters import Parameter, declared_parameters
 from bt_tasksim.concept.reporting import as_statement
-from bt_tasksim.core.outcomes import Statement, register_reason
+from bt_tasksim.concept.seen import Seen
+from bt_tasksim.core.outcomes import Outcome, Statement, register_reason
 from bt_tasksim.core.poses import Array
 
 HOLDS = register_reason("condition_holds", "")
 HOLDS_NOT = register_reason("condition_does_not_hold", "")
 
 
-class Condition(ContextLeaf):
-    """A leaf that asks a question and answers at once: SUCCESS for yes, FAILURE for no.
+class ConditionNode(ModelLeaf):
+    """The leaf of a condition: SUCCESS for yes, FAILURE for no, at once.
+
+    Args:
+        args: Parameters of the condition, in their order.
+        name: The leaf's name; by default the condition and its first parameter.
+        kwargs: Parameters by name.
+
+    Raises:
+        InputError: A parameter is unknown, missing or does not fit.
+    """
+
+    def __init__(self, *args: Any, name: str | None = None, **kwargs: Any) -> None:
+        super().__init__(self.model_class.value(*args, **kwargs), name)
+
+    @property
+    def model(self) -> Condition:
+        """What it asks, as a value."""
+        found: Condition = self._model
+        return found
+
+    def update(self) -> Status:
+        """Ask once."""
+        seen = self.context.seen(ONE, np.zeros(1))
+        yes = bool(self.model.holds(seen)[0])
+        self.report(self.model.answer(seen, 0, yes))
+        return Status.SUCCESS if yes else Status.FAILURE
+
+
+if TYPE_CHECKING:
+    # To type checkers a condition is what a call of its class makes, see `bt_tasksim.concept.model`.
+    _CalledCondition = ConditionNode
+else:
+    _CalledCondition = object
+
+
+class Condition(LeafModel, _CalledCondition):
+    """A question; a leaf of it answers at once: SUCCESS for yes, FAILURE for no.
 
     A subclass declares parameters like a concept and overrides `holds`.
     """
 
-    values: Mapping[str, Any]
+    leaf_base: ClassVar[type[ModelLeaf]] = ConditionNode
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        name = kwargs.pop("name", None)
-        kind = type(self).__name__
-        owner = f"condition {kind}"
-        checked = bind_arguments(self.parameters(), args, kwargs, owner)
-        first = next(iter(checked.values()), "")
-        super().__init__(name or f"{kind.lower()} {first}".strip())
-        self._named = name
-        self.values = checked
-        for key, value in checked.items():
-            setattr(self, key, value)
+        self._bind(args, kwargs, f"condition {type(self).__name__}")
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
         """The declared parameters, by name."""
         return {p.name: p for p in declared_parameters(cls, Condition)}
 
-    def arguments(self) -> dict[str, Any]:
-        """Keyword arguments that build an equal leaf."""
-        out = {k: v for k, v in self.values.items() if (p := self.parameters()[k]).required or v != p.default}
-        return out | ({"name": self._named} if self._named else {})
-
     @abc.abstractmethod
     def holds(self, seen: Seen) -> Array:
-        """The answer: boolean ``(...)``; pure and batched."""
+        """The answer: boolean ``(N,)``; what it is for one world may not depend on the others."""
 
     def explain(self, seen: Seen) -> Statement | str | None:
-        """The answer: a `Form` with its numbers, or words."""
+        """The answer: a `Form` with its numbers ``(N,)``, or words that are true of all worlds."""
         return None
 
-    def update(self) -> Status:
-        """Ask once."""
-        seen = self.context.seen(0.0)
-        yes = bool(self.holds(seen))
+    def answer(self, seen: Seen, world: int, yes: bool) -> Outcome:
+        """The answer in one world, by its row, as an outcome."""
         said = as_statement(self.explain(seen))
-        self.report(HOLDS(said) if yes else HOLDS_NOT(said))
-        return Status.SUCCESS if yes else Status.FAILURE
+        return (HOLDS if yes else HOLDS_NOT)(None if said is None else said.at(world))

@@ -1,185 +1,107 @@
-"""What a leaf reads and writes during a tick.
+"""What the leaves of a tree read and write during a tick, in as many worlds as the tree is ticked in.
 
 Each tree has one `Context`, handed to its leaves through ``setup(context=...)``; nothing is process-global.
-`Seen` and `Known` are the views through which the pure functions of concepts look at an observation and at
-the hidden state: they resolve names to array slices.
 """
 
 from __future__ import annotations
 
-import typing
-from math import isfinite
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept.seen import Seen
+from bt_tasksim.core.bundles import Rows
 from bt_tasksim.core.culprit import place_of
 from bt_tasksim.core.errors import CommandConflictError, LeafError
-from bt_tasksim.core.observables import observable
+from bt_tasksim.core.facts import FactsTable, WorldFacts
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.plain import shown
-from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import Command, Hidden, ObjectModel, Observation, PlaceModel, WorldModel
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.robot.description import RobotDescription
 
 NO_EPISODE = "no episode has begun: a tree with concepts is ticked by a Runner"
+NOBODY = -1
+_T = TypeVar("_T", Observation, Hidden)
 
 
-class Seen:
-    """An observation, with names resolved; batch dimensions ``(...)``.
+@dataclass(frozen=True)
+class Refusal:
+    """A command of the last tick that an engine could not carry out, in one world.
 
-    Args:
-        observation: What was observed.
-        world: Names and calibrated facts.
-        robot: The robot.
-        elapsed: ``(...)`` seconds since the concept became active.
+    Attributes:
+        leaf: The leaf that wrote it; None where nobody knows.
+        outcome: Why.
     """
 
-    __slots__ = ("_derived", "elapsed", "observation", "robot", "world")
-
-    def __init__(
-        self, observation: Observation, world: WorldModel, robot: RobotDescription, elapsed: Array
-    ) -> None:
-        self.observation = observation
-        self.world = world
-        self.robot = robot
-        self.elapsed = elapsed
-        self._derived: dict[str, Array] | None = None
-
-    def observable(self, name: str) -> Array:
-        """An observable by its name, computed when it is first asked for.
-
-        Raises:
-            InputError: There is none of this name.
-        """
-        if self._derived is None:
-            self._derived = {}
-        if name not in self._derived:
-            self._derived[name] = observable(name).read(self.observation, self.world)
-        return self._derived[name]
-
-    @property
-    def tool(self) -> Array:
-        """Tool pose ``(..., 7)``."""
-        return self.observation.tool_pose
-
-    @property
-    def closure(self) -> Array:
-        """Closure of the hand ``(...)``."""
-        return self.observation.closure
-
-    @property
-    def contacts(self) -> Array:
-        """Fingertip contacts ``(..., n_tips)``."""
-        return self.observation.contacts
-
-    @property
-    def wrench(self) -> Array:
-        """External wrench at the tool ``(..., 6)``."""
-        return self.observation.wrench
-
-    def object(self, name: str) -> Array:
-        """Estimated pose ``(..., 7)`` of an object."""
-        return self.observation.objects[..., self.world.object_index(name), :]
-
-    def model(self, name: str) -> ObjectModel:
-        """What is known beforehand of an object."""
-        return self.world.object(name)
-
-    def place(self, name: str) -> PlaceModel:
-        """A place of the scene."""
-        return self.world.place(name)
-
-    def opposed(self) -> Array:
-        """Boolean ``(...)``: at least one fingertip of each opposing group touches something."""
-        contacts = self.observation.contacts
-        if type(contacts) is np.ndarray and contacts.ndim == 1:
-            touching = contacts.tolist()
-            return np.bool_(all(any(touching[i] for i in group) for group in self.robot.opposition))
-        out = contacts[..., self.robot.opposition[0][0]] | False
-        for n, group in enumerate(self.robot.opposition):
-            touched = contacts[..., group[0]]
-            for i in group[1:]:
-                touched = touched | contacts[..., i]
-            out = touched if n == 0 else out & touched
-        return out
+    leaf: Behaviour | None
+    outcome: Outcome
 
 
-class Known:
-    """The hidden state, with names resolved; batch dimensions ``(...)``.
+@dataclass(frozen=True)
+class Written:
+    """What the leaves have written in a tick, in all worlds.
 
-    Args:
-        hidden: The state now.
-        world: Names and calibrated facts.
-        began: The state when the concept became active; None where nobody kept it.
+    Attributes:
+        tool: Tool targets ``(N, 7)``, NaN where nobody wrote one; None where nobody wrote any.
+        hand: Hand targets ``(N, 1 + n_synergies)``, likewise.
     """
 
-    __slots__ = ("began", "hidden", "world")
+    tool: Array | None
+    hand: Array | None
 
-    def __init__(self, hidden: Hidden, world: WorldModel, began: Hidden | None = None) -> None:
-        self.hidden = hidden
-        self.world = world
-        self.began = began
-
-    def object(self, name: str) -> Array:
-        """True pose ``(..., 7)`` of an object."""
-        return self.hidden.objects[..., self.world.object_index(name), :]
-
-    def velocity(self, name: str) -> Array:
-        """Linear and angular velocity ``(..., 6)`` of an object."""
-        return self.hidden.velocities[..., self.world.object_index(name), :]
-
-    def hand_force(self, name: str) -> Array:
-        """Sum ``(...)`` of the hand's contact forces on an object, N."""
-        return self.hidden.hand_force[..., self.world.object_index(name)]
-
-    def supported(self, name: str) -> Array:
-        """Boolean ``(...)``: an object touches something besides the hand."""
-        row = self.hidden.support[..., self.world.object_index(name), :]
-        out = row[..., 0]
-        for i in range(1, row.shape[-1]):
-            out = out | row[..., i]
-        return out
-
-    def place(self, name: str) -> PlaceModel:
-        """A place of the scene."""
-        return self.world.place(name)
+    def of_world(self, world: int) -> Command:
+        """The command of one world, by its row: a part is None where nobody wrote it."""
+        parts = (None if part is None else part[world] for part in (self.tool, self.hand))
+        return Command(*(None if part is None or np.isnan(part[0]) else part for part in parts))
 
 
 class Context:
-    """The one place through which a tree's leaves read the observation and write the command.
+    """The one place through which a tree's leaves read observations and write commands.
 
     Args:
         robot: The robot that the tree commands.
+        worlds: In how many worlds the tree is ticked.
     """
 
-    def __init__(self, robot: RobotDescription) -> None:
+    def __init__(self, robot: RobotDescription, worlds: int = 1) -> None:
         self.robot = robot
-        self._world: WorldModel | None = None
+        self.worlds = worlds
+        self.rows: Array = np.arange(worlds)
+        self._facts = FactsTable(worlds)
         self._observation: Observation | None = None
-        self.hidden: typing.Callable[[], Hidden | None] = lambda: None
-        self.now = 0.0
-        """Seconds since the episode began."""
-        self.refused: tuple[Behaviour | None, Outcome] | None = None
-        """The leaf whose command of the last tick an engine could not carry out, and why."""
-        self._tool: tuple[Array, Behaviour] | None = None
-        self._hand: tuple[Array, Behaviour] | None = None
-        self._held: set[tuple[str, str]] = set()
+        self.hidden: Callable[[], Hidden | None] = lambda: None
+        """Asks for the hidden state ``(N, ...)``; None where nobody knows it."""
+        self.times: Array = np.zeros(worlds)
+        """Seconds ``(N,)`` since each episode began."""
+        self.refused: dict[int, Refusal] = {}
+        """By world."""
+        self._held: dict[tuple[str, str], Array] = {}
+        self._parts = {"tool": _Part("tool", worlds), "hand": _Part("hand", worlds)}
 
     @property
-    def world(self) -> WorldModel:
-        """Names and calibrated facts of the episode.
+    def now(self) -> float:
+        """Seconds since the first world's episode began."""
+        return float(self.times[0])
+
+    @property
+    def world(self) -> WorldFacts:
+        """What is known beforehand of the worlds.
 
         Raises:
             RuntimeError: The tree is ticked outside an episode.
         """
-        if self._world is None:
+        facts = self._facts.facts
+        if facts is None:
             raise RuntimeError(NO_EPISODE)
-        return self._world
+        return facts
 
     @property
     def observation(self) -> Observation:
-        """The observation of this tick.
+        """The observation of this tick ``(N, ...)``.
 
         Raises:
             RuntimeError: The tree is ticked outside an episode.
@@ -188,103 +110,178 @@ class Context:
             raise RuntimeError(NO_EPISODE)
         return self._observation
 
-    def begin(self, world: WorldModel, observation: Observation) -> None:
-        """Begin an episode."""
-        self._world = world
-        self._held.clear()
-        self.advance(observation)
+    def begin(self, models: Sequence[WorldModel], rows: Array | None = None) -> None:
+        """Begin episodes; `advance` comes next.
+
+        Args:
+            models: What is known of these worlds.
+            rows: Which worlds ``(k,)``; by default all.
+        """
+        rows = self.rows if rows is None else rows
+        self._facts.replace(rows, models)
+        for held in self._held.values():
+            held[rows] = False
+        for row in rows.tolist():
+            self.refused.pop(row, None)
 
     def advance(self, observation: Observation) -> None:
-        """Go on to the next tick: a new observation, and an empty command."""
+        """Go on to the next tick: a new observation ``(N, ...)``, and an empty command."""
         self._observation = observation
-        self.now = float(observation.time)
-        self._tool = self._hand = None
-        self.refused = None
+        self.times = observation.time
+        for part in self._parts.values():
+            part.clear()
+        self.refused.clear()
 
-    def write(self, command: Command, leaf: Behaviour) -> None:
-        """Write a command, or a part of one.
+    def write(self, command: Command, rows: Array, leaf: Behaviour) -> None:
+        """Write commands ``(k, ...)``, or a part of them, for worlds ``rows (k,)``.
 
         Raises:
             CommandConflictError: Another leaf has written the same part in this tick.
             LeafError: A part is not a row of numbers of its length; says where the leaf's class makes it.
         """
         if command.tool is not None:
-            if self._tool is not None:
-                raise _conflict("tool", self._tool[1], leaf)
-            self._tool = (_checked("tool", command.tool, leaf), leaf)
+            self._parts["tool"].write(command.tool, rows, leaf)
         if command.hand is not None:
-            if self._hand is not None:
-                raise _conflict("hand", self._hand[1], leaf)
-            self._hand = (_checked("hand", command.hand, leaf), leaf)
+            self._parts["hand"].write(command.hand, rows, leaf)
 
-    @property
-    def tool_writer(self) -> Behaviour | None:
-        """The leaf that has commanded the tool in this tick."""
-        return None if self._tool is None else self._tool[1]
+    def tool_writer(self, world: int = 0) -> Behaviour | None:
+        """The leaf that has commanded the tool in this tick, in one world."""
+        return self._parts["tool"].writer(world)
 
-    def withdraw(self, leaf: Behaviour) -> None:
+    def withdraw(self, leaf: Behaviour, rows: Array) -> None:
         """Drop what a leaf has written in this tick: it was interrupted, and others may act instead."""
-        if self._tool is not None and self._tool[1] is leaf:
-            self._tool = None
-        if self._hand is not None and self._hand[1] is leaf:
-            self._hand = None
+        for part in self._parts.values():
+            part.withdraw(leaf, rows)
 
     @property
-    def command(self) -> Command:
+    def written(self) -> Written:
         """What the leaves have written in this tick.
 
         Raises:
             LeafError: A part is not finite; names the leaf that wrote it.
         """
-        tool, hand = self._tool, self._hand
-        for part, written in (("tool", tool), ("hand", hand)):
-            if written is not None and not isfinite(written[0] @ written[0]):
-                raise LeafError(
-                    f"leaf '{written[1].name}' commands a {part} target that is not finite: {written[0]}"
-                )
-        return Command(None if tool is None else tool[0], None if hand is None else hand[0])
+        return Written(self._parts["tool"].checked(), self._parts["hand"].checked())
 
-    def reach(self, goal: str, target: str) -> None:
+    @property
+    def command(self) -> Command:
+        """What the leaves have written in this tick for the first world, see `written`."""
+        return self.written.of_world(0)
+
+    def reach(self, goal: str, target: str, rows: Array) -> None:
         """A concept has reached a goal (such as ``holding``) that later ones may have to maintain."""
-        self._held.add((goal, target))
+        self._goal(goal, target)[rows] = True
 
-    def end(self, goal: str, target: str) -> None:
+    def end(self, goal: str, target: str, rows: Array) -> None:
         """A concept has ended a goal."""
-        self._held.discard((goal, target))
+        self._goal(goal, target)[rows] = False
 
-    def reached(self, goal: str, target: str) -> bool:
-        """An earlier concept reached this goal and none has ended it."""
-        return (goal, target) in self._held
+    def reached(self, goal: str, target: str, rows: Array) -> Array:
+        """Boolean ``(k,)``: an earlier concept reached this goal and none has ended it."""
+        return self._goal(goal, target)[rows]
 
-    def seen(self, elapsed: float) -> Seen:
-        """The view of this tick's observation."""
-        if self._world is None or self._observation is None:
-            raise RuntimeError(NO_EPISODE)
-        return Seen(self._observation, self._world, self.robot, np.float64(elapsed))
+    def _goal(self, goal: str, target: str) -> Array:
+        if (goal, target) not in self._held:
+            self._held[goal, target] = np.zeros(self.worlds, bool)
+        return self._held[goal, target]
+
+    def seen(self, rows: Array, elapsed: Array) -> Seen:
+        """The view of this tick's observation of some worlds.
+
+        Args:
+            rows: Which ``(k,)``, ascending.
+            elapsed: Seconds ``(k,)`` since the concept became active.
+        """
+        observation, facts = self.observation, self.world
+        if len(rows) == self.worlds:
+            return Seen(observation, facts, self.robot, elapsed)
+        picked: Observation = Rows(observation, lambda values: values[rows])  # type: ignore[assignment]
+        return Seen(picked, self._facts.taken(rows), self.robot, elapsed)
+
+
+class _Part:
+    """One part of the command: the targets of all worlds, and which leaf wrote each."""
+
+    def __init__(self, name: str, worlds: int) -> None:
+        self._name, self._worlds = name, worlds
+        self._leaves: list[Behaviour] = []
+        self._by: Array = np.full(worlds, NOBODY)
+        self._values: Array | None = None
+
+    def clear(self) -> None:
+        if self._values is not None:
+            self._leaves, self._by, self._values = [], np.full(self._worlds, NOBODY), None
+
+    def writer(self, world: int) -> Behaviour | None:
+        number = int(self._by[world])
+        return None if number == NOBODY else self._leaves[number]
+
+    def write(self, values: Array, rows: Array, leaf: Behaviour) -> None:
+        before = self._by[rows]
+        if self._values is not None and (before != NOBODY).any():
+            raise _conflict(self._name, self._leaves[int(before[before != NOBODY][0])], leaf)
+        values = self._shaped(values, len(rows), leaf)
+        if len(rows) == self._worlds:
+            self._values = values
+        else:
+            if self._values is None:
+                xp = array_namespace(values)
+                self._values = xp.full(
+                    (self._worlds, values.shape[-1]), np.nan, dtype=values.dtype, device=values.device
+                )
+            self._values[rows] = values
+        self._by[rows] = len(self._leaves)
+        self._leaves.append(leaf)
+
+    def withdraw(self, leaf: Behaviour, rows: Array) -> None:
+        if leaf not in self._leaves or self._values is None:
+            return
+        mine = rows[self._by[rows] == self._leaves.index(leaf)]
+        self._values = array_namespace(self._values).asarray(self._values, copy=True)
+        self._values[mine], self._by[mine] = np.nan, NOBODY
+
+    def checked(self) -> Array | None:
+        if self._values is None:
+            return None
+        xp = array_namespace(self._values)
+        finite = xp.all(xp.isfinite(self._values), axis=-1)
+        for world in np.flatnonzero(np.asarray(~finite) & (self._by != NOBODY)).tolist():
+            leaf = self._leaves[int(self._by[world])]
+            raise LeafError(
+                f"leaf '{leaf.name}' commands a {self._name} target that is not finite: {self._values[world]}"
+            )
+        return self._values
+
+    def _shaped(self, values: Array, worlds: int, leaf: Behaviour) -> Array:
+        """Targets as an array ``(k, n)``."""
+        try:
+            found = values if hasattr(values, "ndim") else np.asarray(values, float)
+            shape = tuple(found.shape)
+        except (TypeError, ValueError):
+            found, shape = values, ()
+        rows_of = len(shape) == 2 and shape[0] == worlds and shape[1] > 0
+        if rows_of and (self._name == "hand" or shape[1] == 7):
+            return found
+        place = place_of(getattr(type(leaf), "command", type(leaf)))
+        where = f" ({place})" if place else ""
+        raise LeafError(
+            f"leaf '{leaf.name}'{where} commands {self._name}={shown(repr(values))}: {WANTED[self._name]}"
+        )
 
 
 WANTED = {
-    "tool": "a tool target is 7 numbers: position, then quaternion w x y z",
-    "hand": "a hand target is a row of numbers, the closure first: hand=np.array([closure])",
+    "tool": "a tool target is (worlds, 7): of each world 7 numbers, position, then quaternion w x y z",
+    "hand": "a hand target is (worlds, n): of each world a row of numbers, the closure first: "
+    "hand=closure[..., None]",
 }
-
-
-def _checked(part: str, value: Array, leaf: Behaviour) -> Array:
-    """A part of a command as an array ``(n,)``."""
-    if type(value) is np.ndarray and value.ndim == 1 and (part == "hand" or value.size == 7):
-        return value
-    try:
-        found = np.asarray(value, float)
-    except (TypeError, ValueError):
-        found = np.zeros(())
-    if found.ndim != 1 or (part == "tool" and found.size != 7) or not found.size:
-        place = place_of(getattr(type(leaf), "command", type(leaf)))
-        where = f" ({place})" if place else ""
-        raise LeafError(f"leaf '{leaf.name}'{where} commands {part}={shown(repr(value))}: {WANTED[part]}")
-    return found
 
 
 def _conflict(part: str, first: Behaviour, second: Behaviour) -> CommandConflictError:
     return CommandConflictError(
         f"two leaves command the {part} in one tick: '{first.name}' and '{second.name}'"
     )
+
+
+def one_world(bundle: _T) -> _T:
+    """An observation, or a hidden state, of a single world, which has no axis of worlds, with one."""
+    found: _T = Rows(bundle, lambda values: np.asarray(values)[None])  # type: ignore[assignment]
+    return found

@@ -6,19 +6,19 @@ import abc
 import operator
 from collections.abc import Mapping, Sequence
 from functools import reduce
-from typing import Any, ClassVar, Generic, cast
+from typing import Any, ClassVar, Generic, Protocol, cast
 
-import numpy as np
 from typing_extensions import TypeVar
 
 from bt_tasksim.concept.contact import ContactChange
-from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.demonstrated import Shown, plain_argument, plain_words
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.parameters import Parameter, declared_parameters
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
-from bt_tasksim.core.outcomes import Outcome, Statement
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.outcomes import Outcome, Possible, Statement
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.world import Command
 from bt_tasksim.robot.description import RobotDescription
@@ -30,8 +30,9 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
     """What a concept declares and computes; `bt_tasksim.concept.model.ConceptModel` adds its parameters.
 
     In all functions ``seen`` is a `Seen`, ``memory`` whatever `begin` and `advance` returned, and every array
-    has leading batch dimensions ``(...)``; none of them may change anything. A concept says the memory's type
-    in its head, ``class Push(ConceptModel[PushMemory])``; without one it may be anything.
+    has a leading axis of worlds ``(N, ...)``: a single run has N = 1. None of them may change anything, and
+    what they give for one world may not depend on the others. A concept says the memory's type in its head,
+    ``class Push(ConceptModel[PushMemory])``: a bundle of arrays (`bt_tasksim.core.bundles`), or None.
     """
 
     actions: ClassVar[int] = 0
@@ -59,8 +60,6 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
 
     values: Mapping[str, Any]
     """Values of the declared parameters, by name."""
-    policy: str | None
-    """The policy that decides: ``"programmed"``, or the folder of a learned one; None: the one pinned."""
     timeout: float
     """Seconds after which it fails."""
     tolerance: float
@@ -87,16 +86,22 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
         """
         return ""
 
-    def initial_state(self, seen: Seen) -> Outcome | str | None:
-        """Why the concept cannot start now: a registered reason, or words; None when it can."""
-        return None
+    def initial_state(self, seen: Seen) -> Possible | Sequence[Possible]:
+        """Why the concept cannot start, each with the worlds in which it applies; the first one is said."""
+        return ()
 
     def begin(self, seen: Seen) -> MemoryT:
-        """The memory at the first tick: start poses, planned paths. What cannot be batched happens here."""
+        """The memory at the first tick: start poses, planned paths.
+
+        What cannot be batched, such as a search for a way, is a call for each world that needs it.
+
+        Raises:
+            NoWayError: There is no way in one of these worlds; then they are asked one by one.
+        """
         return cast("MemoryT", None)
 
     def advance(self, action: Array, seen: Seen, memory: MemoryT) -> MemoryT:
-        """The memory for the next tick, after the action ``(..., actions)``."""
+        """The memory for the next tick, after the action ``(N, actions)``."""
         return memory
 
     @classmethod
@@ -105,31 +110,31 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
         return {}
 
     def features(self, seen: Seen, memory: MemoryT) -> Array:
-        """What a learned policy sees: ``(..., n)``, from the declared observables only, as in `layout`."""
+        """What a learned policy sees: ``(N, n)``, from the declared observables only, as in `layout`."""
         raise NotImplementedError(f"{type(self).__name__} declares no features: it cannot be learned")
 
     def decides(self, seen: Seen, memory: MemoryT) -> Array:
-        """Boolean ``(...)``: a learned policy is asked at this tick; else the reference motion goes on."""
-        return np.True_
+        """Boolean ``(N,)``: a learned policy is asked at this tick; else the reference motion goes on."""
+        return booleans(seen.tool, True)
 
     @abc.abstractmethod
     def command(self, action: Array, seen: Seen, memory: MemoryT) -> Command:
-        """The command for an action ``(..., actions)`` of offsets on the reference motion."""
+        """The command for an action ``(N, actions)`` of offsets on the reference motion."""
 
     def carry_out(self, action: Array, seen: Seen, memory: MemoryT) -> tuple[Command, MemoryT]:
         """What `command` and `advance` say, of one action; to override where both need the same numbers."""
         return self.command(action, seen, memory), self.advance(action, seen, memory)
 
     def programmed_motion(self, seen: Seen, memory: MemoryT) -> Array:
-        """The programmed policy's action ``(..., actions)``; by default none: the reference motion itself."""
+        """The programmed policy's action ``(N, actions)``; by default none: the reference motion itself."""
         return zeros(seen.tool, self.actions)
 
     @abc.abstractmethod
     def done(self, seen: Seen, memory: MemoryT) -> Array:
-        """The programmed policy's completion signal: boolean ``(...)``."""
+        """The programmed policy's completion signal: boolean ``(N,)``."""
 
     def necessary_cost(self, seen: Seen, memory: MemoryT) -> Array:
-        """How far the observed state is from the necessary goal: ``(...)``, 0 when reached."""
+        """How far the observed state is from the necessary goal: ``(N,)``, 0 when reached."""
         return zeros(seen.tool)
 
     def limits(self, seen: Seen, memory: MemoryT) -> Sequence[Limit]:
@@ -137,23 +142,22 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
         return ()
 
     def violated(self, seen: Seen, memory: MemoryT) -> Array:
-        """A limit is exceeded: boolean ``(...)``; to override where it is more than `limits` can say."""
-        limits = self.limits(seen, memory)
-        return reduce(operator.or_, (limit.exceeded for limit in limits)) if limits else np.False_
+        """A limit is exceeded: boolean ``(N,)``; to override where it is more than `limits` can say."""
+        return any_of(seen.tool, self.limits(seen, memory))
 
     def maintained(self, goal: str, seen: Seen, memory: MemoryT) -> Array:
-        """A goal of `maintains` still holds: boolean ``(...)``."""
-        return np.True_
+        """A goal of `maintains` still holds: boolean ``(N,)``."""
+        return booleans(seen.tool, True)
 
     def sufficient_cost(self, known: Known, memory: MemoryT) -> Array:
-        """How far the hidden state is from the sufficient goal at the completion signal: ``(...)``.
+        """How far the hidden state is from the sufficient goal at the completion signal: ``(N,)``.
 
         In units of what is tolerable: below 1 the goal is reached.
         """
         return zeros(known.hidden.tool_pose)
 
     def explain(self, seen: Seen, memory: MemoryT) -> Statement | str | None:
-        """Where things stand: a `Form` with its numbers, or words."""
+        """Where things stand: a `Form` with its numbers ``(N,)``, or words that are true of all worlds."""
         return None
 
     # ---- demonstrations --------------------------------------------------------------------------------
@@ -193,7 +197,57 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
 
 
 def zeros(like: Array, *shape: int) -> Array:
-    """Zeros ``(..., *shape)`` in the library and with the batch dimensions of ``like (..., n)``."""
-    if type(like) is np.ndarray:
-        return np.zeros(like.shape[:-1] + shape)
-    return array_namespace(like).zeros((*like.shape[:-1], *shape), dtype=like.dtype, device=like.device)
+    """Zeros ``(N, *shape)`` in the library and with the worlds of ``like (N, n)``."""
+    xp = array_namespace(like)
+    return xp.zeros((*like.shape[:-1], *shape), dtype=like.dtype, device=like.device)
+
+
+def booleans(like: Array, value: bool) -> Array:
+    """The same answer ``(N,)`` for all worlds of ``like (N, n)``."""
+    xp = array_namespace(like)
+    return xp.full(like.shape[:-1], value, dtype=xp.bool, device=like.device)
+
+
+class Applying(Protocol):
+    """A `Possible` outcome or a `Limit`."""
+
+    @property
+    def applies(self) -> Array:
+        """Boolean ``(N,)``."""
+
+    def at(self, world: int) -> Outcome:
+        """The outcome of one world."""
+
+
+def any_of(like: Array, possibles: Sequence[Applying]) -> Array:
+    """Boolean ``(N,)``: one of these applies; ``like (N, n)`` says how many worlds there are."""
+    if not possibles:
+        return booleans(like, False)
+    return reduce(operator.or_, (possible.applies for possible in possibles))
+
+
+def sequence_of(possibles: Possible | Sequence[Possible] | None, owner: str) -> Sequence[Possible]:
+    """What `ConceptFunctions.initial_state` gives, which may be one or several.
+
+    Args:
+        possibles: What it gave.
+        owner: The concept's name, for the sentence.
+
+    Raises:
+        InputError: It gave something else.
+    """
+    if isinstance(possibles, Possible):
+        return (possibles,)
+    if possibles is None:
+        return ()
+    if isinstance(possibles, str) or not all(isinstance(possible, Possible) for possible in possibles):
+        raise InputError(
+            f"{owner}: initial_state should give what REASON.where(...) gives, or several of them, "
+            f"found {possibles!r}"
+        )
+    return possibles
+
+
+def first_of(possibles: Sequence[Applying], world: int) -> Outcome | None:
+    """The first of these that applies in a world, by its row."""
+    return next((possible.at(world) for possible in possibles if bool(possible.applies[world])), None)

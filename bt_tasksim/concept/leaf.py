@@ -1,36 +1,28 @@
-"""The leaf of a behaviour tree that runs a concept: once a tick it calls the concept's pure functions."""
+"""The leaves of a behaviour tree that run models: thin shells, which ask and tell a model once a tick."""
 
 from __future__ import annotations
 
-import abc
+import inspect
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.context import Context, Seen
-from bt_tasksim.concept.functions import ConceptFunctions, zeros
-from bt_tasksim.concept.reporting import Reporting, as_outcome, as_statement
-from bt_tasksim.core.errors import InputError, NoWayError
-from bt_tasksim.core.outcomes import (
-    CANNOT_START,
-    DONE,
-    GOAL_LOST,
-    INTERRUPTED,
-    LIMIT_VIOLATED,
-    NO_WAY,
-    PRECONDITION_UNMET,
-    TIMED_OUT,
-    Outcome,
-    Statement,
-)
+from bt_tasksim.concept.activation import Activation, Judged, no_action
+from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.functions import ConceptFunctions
+from bt_tasksim.concept.reporting import Reporting
+from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept.status import STATUSES
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.outcomes import INTERRUPTED
 from bt_tasksim.policy.policy import PROGRAMMED, Action, Policy, PolicySlot, concept_name, named_policy
 from bt_tasksim.robot.description import RobotDescription
 
-LOST_TICKS = 3
-"""Ticks in a row without a maintained goal after which it counts as lost (contacts flicker)."""
+ONE = np.array([0])
+"""Numbers of the worlds of a tree of py_trees: there is one."""
 
 
 class Decision(NamedTuple):
@@ -38,8 +30,8 @@ class Decision(NamedTuple):
 
     Attributes:
         leaf: The leaf; its `ConceptNode.decide` takes the action before the tick goes on.
-        seen: What is seen.
-        memory: The leaf's memory.
+        seen: What is seen ``(1, ...)``.
+        memory: The leaf's memory ``(1, ...)``.
     """
 
     leaf: ConceptNode
@@ -80,30 +72,88 @@ class ContextLeaf(Reporting):
         return self._context
 
 
-class ConceptNode(ContextLeaf, abc.ABC):
-    """The shell: RUNNING while acting, SUCCESS when the policy says done, FAILURE with a reason otherwise."""
+class ModelLeaf(ContextLeaf):
+    """A leaf that stands for a model; each model has its own class of leaf (`bt_tasksim.concept.model`)."""
 
-    _model: ConceptFunctions
+    model_class: ClassVar[Any]
+    """The model that it is a leaf of."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
-        self.memory: Any = None
-        self.activations = 0
+    def __init__(self, model: Any, name: str | None) -> None:
+        kind, first = type(model).__name__.lower(), next(iter(model.values.values()), "")
+        super().__init__(name or f"{kind} {first}".strip())
+        self._named = name
+        self._model = model
+
+    @property
+    def model(self) -> Any:
+        """What it does, as a value."""
+        return self._model
+
+    def arguments(self) -> dict[str, Any]:
+        """Keyword arguments that build an equal leaf: parameters and settings that are not defaults."""
+        arguments: dict[str, Any] = self._model.arguments()
+        return arguments | ({"name": self._named} if self._named else {})
+
+
+class ConceptNode(ModelLeaf):
+    """The leaf of a concept: RUNNING while acting, SUCCESS when the policy says done, else FAILURE.
+
+    Args:
+        args: Parameters of the concept, in their order.
+        name: The leaf's name; by default the concept and its first parameter.
+        policy: ``"programmed"``, or the folder of a learned policy; by default the one pinned.
+        kwargs: Parameters and settings by name, see `bt_tasksim.concept.model.ConceptModel`.
+
+    Raises:
+        InputError: A parameter or setting is unknown, missing or does not fit.
+    """
+
+    def __init__(self, *args: Any, name: str | None = None, policy: str | None = None, **kwargs: Any) -> None:
+        concept = self.model_class.__name__.lower()
+        owner = f"{concept} '{name}'" if name else concept
+        super().__init__(self.model_class.value(*args, owner=owner, **kwargs), name)
+        self.policy: str | None = _text(policy, owner, "policy")
+        """The policy that decides: ``"programmed"``, or the folder of a learned one; None: the one pinned."""
         self.lacks_policy = False
         """It has no policy: it is not programmed, and nothing was learned yet."""
         self.under_training = False
         """The leaf's ticks are suspended before it acts, see `Decision`."""
-        self._started = 0.0
-        self._active = False
-        self._lost = 0
+        self._activation: Activation | None = None
         self._policy: Policy | None = None
         self._decided: Action | None = None
+
+    @property
+    def model(self) -> ConceptFunctions:
+        """What it does, as a value."""
+        found: ConceptFunctions = self._model
+        return found
+
+    @property
+    def activation(self) -> Activation:
+        """The concept as it runs in the tree's world.
+
+        Raises:
+            RuntimeError: The leaf was not set up.
+        """
+        if self._activation is None:
+            raise not_set_up(self)
+        return self._activation
+
+    @property
+    def memory(self) -> Any:
+        """What the concept remembers ``(1, ...)``; None before it first began."""
+        return None if self._activation is None else self._activation.memory
+
+    @property
+    def activations(self) -> int:
+        """How often it has begun."""
+        return 0 if self._activation is None else int(self._activation.activations[0])
 
     @property
     def policy_in_use(self) -> Policy:
         """The policy that decides; resolved when the tree is set up."""
         if self.lacks_policy:
-            concept = type(self).__name__
+            concept = self.model_class.__name__
             raise InputError(
                 f"leaf '{self.name}' has no policy yet: {concept} is not programmed, and none is pinned for "
                 f"robot '{self.context.robot.name}'; train one, or name one with policy=..."
@@ -112,21 +162,20 @@ class ConceptNode(ContextLeaf, abc.ABC):
             raise not_set_up(self)
         return self._policy
 
-    @property
-    def model(self) -> ConceptFunctions:
-        """The concept's functions."""
-        return self._model
+    def arguments(self) -> dict[str, Any]:
+        """See `ModelLeaf.arguments`; with the policy, where one is named."""
+        return super().arguments() | ({"policy": self.policy} if self.policy else {})
 
     def setup(self, **kwargs: Any) -> None:
         """Take the tree's context and resolve the policy."""
         super().setup(**kwargs)
-        model = self._model
+        self._activation = Activation(self, self.model, self.context)
         self.lacks_policy = False
         if self.under_training:
             self._policy = None
             return
-        self._policy = resolve_policy(model, self.name, self.context.robot)
-        if not model.is_programmed and self._policy.name == PROGRAMMED:
+        self._policy = resolve_policy(self, self.context.robot)
+        if not self.model.is_programmed and self._policy.name == PROGRAMMED:
             self.lacks_policy, self._policy = True, None
 
     def use(self, policy: Policy) -> None:
@@ -134,16 +183,12 @@ class ConceptNode(ContextLeaf, abc.ABC):
         self._policy, self.lacks_policy = policy, False
 
     def decide(self, action: Action) -> None:
-        """Take the action that the suspended tick waits for, see `Decision`."""
+        """Take the action ``(1, ...)`` that the suspended tick waits for, see `Decision`."""
         self._decided = action
 
     def initialise(self) -> None:
         """py_trees calls this when the leaf becomes active."""
-        self._active = False
-        self._lost = 0
         self._decided = None
-        self._nearer = 0.0
-        self.activations += 1
 
     def tick(self) -> Iterator[Behaviour]:
         """One tick; under training it is suspended right before the leaf acts, by yielding a `Decision`."""
@@ -152,17 +197,18 @@ class ConceptNode(ContextLeaf, abc.ABC):
             return
         if self.status != Status.RUNNING:
             self.initialise()
-        found = self._judge()
-        if isinstance(found, Seen):
-            model, memory = self._model, self.memory
-            if bool(model.decides(found, memory)):
-                yield Decision(self, found, memory)  # type: ignore[misc]  # not a behaviour, on purpose
+        judged = self._judge()
+        if len(judged.rows):
+            if bool(self.model.decides(judged.seen, judged.memory)[0]):
+                yield Decision(self, judged.seen, judged.memory)  # type: ignore[misc]  # on purpose
                 if self._decided is None:
                     raise RuntimeError(f"leaf '{self.name}' is under training and was given no action")
                 action, self._decided = self._decided, None
             else:
-                action = Action(zeros(found.tool, model.actions), np.False_)
-            found = self._act(action, found)
+                action = no_action(judged, self.model.actions)
+            found = self._act(judged, action)
+        else:
+            found = self._said(judged.statuses)
         if found != Status.RUNNING:
             self.stop(found)
         self.status = found
@@ -170,65 +216,24 @@ class ConceptNode(ContextLeaf, abc.ABC):
 
     def update(self) -> Status:
         """One tick: judge, then act."""
-        found = self._judge()
-        if not isinstance(found, Seen):
-            return found
-        return self._act(self.policy_in_use.act(self._model, found, self.memory), found)
+        judged = self._judge()
+        if not len(judged.rows):
+            return self._said(judged.statuses)
+        return self._act(judged, self.policy_in_use.act(self.model, judged.seen, judged.memory))
 
-    def _judge(self) -> Seen | Status:
-        """What is seen, or FAILURE where the leaf cannot start or go on."""
-        model, context = self._model, self._context
-        if context is None:
-            raise not_set_up(self)
-        if context.refused is not None and context.refused[0] is self:
-            return self._fail(context.refused[1])
-        if not self._active:
-            self._started = context.now
-            seen = context.seen(0.0)
-            unmet = as_outcome(model.initial_state(seen), PRECONDITION_UNMET)
-            if unmet is not None:
-                return self._fail(CANNOT_START(unmet))
-            try:
-                self.memory = model.begin(seen)
-            except NoWayError as error:
-                return self._fail(CANNOT_START(NO_WAY(what=error)))
-            self._active = True
-        else:
-            seen = context.seen(context.now - self._started)
-        memory = self.memory
-        if bool(model.violated(seen, memory)):
-            return self._fail(LIMIT_VIOLATED(_exceeded(model, seen, memory)))
-        for goal in model.maintains:
-            if context.reached(goal, model.actor) and not bool(model.maintained(goal, seen, memory)):
-                self._lost += 1
-                if self._lost >= LOST_TICKS:
-                    context.end(goal, model.actor)
-                    measured = as_statement(model.explain(seen, memory))
-                    return self._fail(GOAL_LOST(measured, object=model.actor, goal=goal))
-                break
-        else:
-            self._lost = 0
-        return seen
+    def _judge(self) -> Judged:
+        return self.activation.judge(ONE, np.array([self.status != Status.RUNNING]))
 
-    def _act(self, action: Action, seen: Seen) -> Status:
+    def _act(self, judged: Judged, action: Action) -> Status:
         """Carry a decision out."""
-        model, memory, context = self._model, self.memory, self.context
-        self._nearer += float(action.terminate)
-        if self._nearer >= 1.0:
-            for goal in model.ends:
-                context.end(goal, model.actor)
-            for goal in model.reaches:
-                context.reach(goal, model.actor)
-            self.report(DONE(as_statement(model.explain(seen, memory)), elapsed=seen.elapsed))
-            return Status.SUCCESS
-        if seen.elapsed > model.timeout:
-            return self._fail(TIMED_OUT(as_statement(model.explain(seen, memory)), limit=model.timeout))
-        command, after = model.carry_out(action.motion, seen, memory)
-        context.write(command, self)
-        self.memory = after
-        if self.outcome is not None or self.feedback_message:
-            self.report(None)
-        return Status.RUNNING
+        return self._said(self.activation.act(judged, action))
+
+    def _said(self, statuses: Any) -> Status:
+        """Report what has ended it."""
+        outcome = self.activation.outcomes.get(0)
+        if outcome is not None or self.outcome is not None or self.feedback_message:
+            self.report(outcome)
+        return STATUSES[int(statuses[0])]
 
     def terminate(self, new_status: Status) -> None:
         """py_trees calls this when the leaf ends, or is interrupted: then its command is dropped."""
@@ -237,18 +242,26 @@ class ConceptNode(ContextLeaf, abc.ABC):
         if self.status == Status.RUNNING:
             self.report(INTERRUPTED())
         if self._context is not None:
-            self._context.withdraw(self)
-
-    def _fail(self, why: Outcome) -> Status:
-        self.report(why)
-        return Status.FAILURE
+            self._context.withdraw(self, ONE)
 
 
-def _exceeded(model: ConceptFunctions, seen: Seen, memory: Any) -> Statement | None:
-    """Which limit, and by how much; where the concept does not say it, where things stand."""
-    measured = as_statement(model.explain(seen, memory))
-    exceeded = (limit.outcome(measured) for limit in model.limits(seen, memory) if bool(limit.exceeded))
-    return next(exceeded, measured)
+def leaf_class_of(model: type, base: type[ModelLeaf]) -> type[ModelLeaf]:
+    """The class of a model's leaves: it has the model's name and documentation.
+
+    Args:
+        model: The model's class.
+        base: What its leaves do.
+    """
+    return type(
+        model.__name__,
+        (base,),
+        {
+            "__module__": model.__module__,
+            "__qualname__": f"{model.__qualname__}.leaf_class",
+            "__doc__": inspect.getdoc(model),
+            "model_class": model,
+        },
+    )
 
 
 def not_set_up(node: Behaviour) -> RuntimeError:
@@ -259,19 +272,25 @@ def not_set_up(node: Behaviour) -> RuntimeError:
     )
 
 
-def resolve_policy(model: ConceptFunctions, leaf: str, robot: RobotDescription) -> Policy:
+def resolve_policy(leaf: ConceptNode, robot: RobotDescription) -> Policy:
     """The policy that a leaf names, or the one pinned for its concept and robot, or the programmed one.
 
     Args:
-        model: The leaf's concept.
-        leaf: The leaf's name, for the sentence.
+        leaf: The leaf.
         robot: The robot that it runs on.
 
     Raises:
         InputError: There is no such policy, it is damaged, or it is none for this concept and robot.
     """
+    model = leaf.model
     try:
         slot = PolicySlot(concept_name(type(model)), robot.name, model.layout(robot), model.actions)
-        return named_policy(model.policy, slot)
+        return named_policy(leaf.policy, slot)
     except InputError as error:
-        raise InputError(f"leaf '{leaf}': {error}") from error
+        raise InputError(f"leaf '{leaf.name}': {error}") from error
+
+
+def _text(value: Any, owner: str, what: str) -> str | None:
+    if value is not None and not isinstance(value, str):
+        raise InputError(f"{owner}: '{what}' should be text, found {value!r}")
+    return value

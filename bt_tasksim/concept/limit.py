@@ -6,22 +6,22 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from bt_tasksim.core.outcomes import Outcome, Reason, Statement
+from bt_tasksim.core.outcomes import Outcome, Reason
 from bt_tasksim.core.poses import Array
 
 NO_NAMES: Mapping[str, str] = MappingProxyType({})
 
 
 class Limit(NamedTuple):
-    """One limit; batch dimensions ``(...)``.
+    """One limit in ``N`` worlds.
 
     Attributes:
         reason: What to say when it is exceeded; its gaps are ``value`` and ``limit``, both with units, and
             the ``names``.
-        value: What was measured ``(...)``, SI units.
-        limit: What it must not exceed ``(...)``, in the same unit.
+        value: What was measured ``(N,)``, SI units.
+        limit: What it must not exceed, one for all or ``(N,)``, in the same unit.
         names: The names that the reason is about.
-        counts: Boolean ``(...)``: the limit applies now.
+        counts: Boolean, one for all or ``(N,)``: the limit applies now.
     """
 
     reason: Reason
@@ -31,17 +31,14 @@ class Limit(NamedTuple):
     counts: Array | bool = True
 
     @property
-    def exceeded(self) -> Array:
-        """Boolean ``(...)``."""
+    def applies(self) -> Array:
+        """Boolean ``(N,)``: it is exceeded."""
         return (self.value > self.limit) & self.counts
 
-    def outcome(self, measured: Statement | None = None) -> Outcome:
-        """The reason with its numbers, of a single world.
-
-        Args:
-            measured: Where things stood.
+    def at(self, world: int) -> Outcome:
+        """The reason with its numbers in one world, by its row.
 
         Raises:
             TypeError: The reason has other gaps, see ``reason``.
         """
-        return self.reason(measured, value=self.value, limit=self.limit, **self.names)
+        return self.reason(value=self.value, limit=self.limit, **self.names).at(world)

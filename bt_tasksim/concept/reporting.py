@@ -5,8 +5,7 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import FAILED, TEXT, Outcome, Reason, Statement
+from bt_tasksim.core.outcomes import FAILED, TEXT, Outcome, Statement
 
 
 class Reporting(Behaviour):
@@ -56,19 +55,4 @@ def as_statement(said: Statement | str | None) -> Statement | None:
     """What a concept's `explain` gives, which may be a value or words; None for nothing."""
     if isinstance(said, str):
         return TEXT(text=said) if said else None
-    return said
-
-
-def as_outcome(said: Outcome | str | None, otherwise: Reason) -> Outcome | None:
-    """An outcome, or words as an outcome of the reason ``otherwise``, which takes ``text``.
-
-    Raises:
-        InputError: It is neither.
-    """
-    if isinstance(said, str):
-        return otherwise(text=said) if said else None
-    if said is not None and not isinstance(said, Outcome):
-        raise InputError(
-            f"a concept should say None, an Outcome or a sentence about why it cannot go on, found {said!r}"
-        )
     return said

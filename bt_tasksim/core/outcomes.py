@@ -11,6 +11,9 @@ A part that can fail declares its reasons beside its code, each with one sentenc
 Whoever counts or compares looks at the reason, whoever computes at the numbers. The sentence is made in
 `Statement.sentence` alone, when somebody reads it, and nothing reads it back. Within a process a reason also
 has an integer code, for arrays with one outcome a world; files hold its name.
+
+Numbers may be arrays with one value a world, and names tuples with one text a world: such a statement is
+about a batch, and `Statement.at` is what it says of one world.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite, nan
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 from bt_tasksim.core.errors import (
     BtTasksimError,
@@ -31,6 +34,7 @@ from bt_tasksim.core.errors import (
     UnreachableError,
 )
 from bt_tasksim.core.markup import html_pairs
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import part, register
 from bt_tasksim.core.units import METRES, RADIANS, SECONDS, Measured, Unit, told_apart
 
@@ -74,8 +78,18 @@ class Form:
         declared = (*self.units, *self.names)
         if set(values) != set(declared):
             raise TypeError(f"'{self.template}' takes {', '.join(declared) or 'nothing'}, not {list(values)}")
-        numbers = {name: float(values[name]) for name in self.units}
-        return numbers, {name: str(values[name]) for name in self.names}
+        numbers = {name: _number(values[name]) for name in self.units}
+        return numbers, {name: _text(values[name]) for name in self.names}
+
+
+def _number(value: Any) -> Any:
+    """A number, or one for each world."""
+    return value if getattr(value, "ndim", 0) else float(value)
+
+
+def _text(value: Any) -> Any:
+    """A text, or one for each world."""
+    return tuple(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 @dataclass(frozen=True)
@@ -93,6 +107,14 @@ class Statement:
     numbers: Mapping[str, float]
     names: Mapping[str, str]
     detail: Statement | None = None
+
+    def at(self, world: int) -> Self:
+        """What a statement about a batch says of one world, by its row."""
+        numbers = {n: float(v[world]) if getattr(v, "ndim", 0) else v for n, v in self.numbers.items()}
+        names = {n: v[world] if isinstance(v, tuple) else v for n, v in self.names.items()}
+        return replace(
+            self, numbers=numbers, names=names, detail=None if self.detail is None else self.detail.at(world)
+        )
 
     @property
     def own_sentence(self) -> str:
@@ -146,6 +168,18 @@ class Reason(Form):
         """The outcome with these numbers and names, see `Form`."""
         return Outcome(self, *self._split(values), detail)
 
+    def where(self, applies: Array, /, **values: Any) -> Possible:
+        """What is said of those worlds of a batch in which ``applies (N,)`` is true.
+
+        Args:
+            applies: Boolean.
+            values: Numbers and names as of a call, each one for all worlds or ``(N,)``.
+
+        Raises:
+            TypeError: A number or a name is missing, or is not declared.
+        """
+        return Possible(applies, Outcome(self, *self._split(values)))
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Reason) and other.name == self.name
 
@@ -198,6 +232,22 @@ class Outcome(Statement):
     def to_data(self) -> dict[str, Any]:
         """As plain data, with the reason's name."""
         return {"reason": self.form.name, **super().to_data()}
+
+
+class Possible(NamedTuple):
+    """An outcome of those worlds of a batch in which it applies.
+
+    Attributes:
+        applies: Boolean ``(N,)``.
+        outcome: What it is, its numbers ``(N,)``.
+    """
+
+    applies: Array
+    outcome: Outcome
+
+    def at(self, world: int) -> Outcome:
+        """The outcome of one world, by its row."""
+        return self.outcome.at(world)
 
 
 class _Gap:

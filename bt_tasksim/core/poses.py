@@ -1,9 +1,9 @@
 """Rigid-body poses and rotations as pure, batched functions.
 
 A pose is ``(..., 7)``: position in metres and a unit quaternion ``w x y z``. Every function accepts any
-array of the Python array API standard (NumPy, torch, ...) with any leading batch dimensions. A single
-unbatched NumPy pose, which is what a tree in execution works with, takes a path in plain floats that
-computes the same numbers several times faster.
+array of the Python array API standard (NumPy, torch, ...) with any leading batch dimensions, and what it
+gives for one row does not depend on the others, to the last bit: products of small matrices are stacked
+(`numpy.matmul` takes them one by one), and nothing is summed over a batch.
 
 Formulas: J. Sola, "Quaternion kinematics for the error-state Kalman filter", arXiv 1711.02508.
 """
@@ -40,10 +40,6 @@ def array_namespace(*arrays: Array) -> Any:
 _NUMPY = (np.ndarray, np.generic)
 
 
-def _single(a: Array) -> bool:
-    return type(a) is np.ndarray and a.ndim == 1
-
-
 def _mul(a: list[float], b: list[float]) -> list[float]:
     aw, ax, ay, az = a
     bw, bx, by, bz = b
@@ -75,52 +71,33 @@ def constant(value: Any, like: Array) -> Array:
 
 def clip(x: Array, low: Any, high: Any) -> Array:
     """``x (...)`` between bounds that broadcast against it."""
-    if isinstance(x, _NUMPY):
-        return np.minimum(np.maximum(x, low), high)
-    return array_namespace(x).clip(x, constant(low, x), constant(high, x))
+    xp = array_namespace(x)
+    return xp.minimum(xp.maximum(x, constant(low, x)), constant(high, x))
+
+
+def apply(matrices: Array, vectors: Array) -> Array:
+    """Matrices ``(..., m, n)`` times vectors ``(..., n)``; batch dimensions broadcast."""
+    return array_namespace(matrices, vectors).matmul(matrices, vectors[..., None])[..., 0]
 
 
 def quat_multiply(a: Array, b: Array) -> Array:
     """Hamilton product ``a * b`` of quaternions ``(..., 4)``."""
-    if _single(a) and _single(b):
-        return np.array(_mul(a.tolist(), b.tolist()))
-    xp = array_namespace(a, b)
-    aw, ax, ay, az = (a[..., i] for i in range(4))
-    bw, bx, by, bz = (b[..., i] for i in range(4))
-    return xp.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        axis=-1,
-    )
+    return apply(_gathered(a, _LEFT, _LEFT_SIGNS), b)
 
 
 def quat_conjugate(q: Array) -> Array:
     """Inverse of unit quaternions ``(..., 4)``."""
-    if _single(q):
-        w, x, y, z = q.tolist()
-        return np.array([w, -x, -y, -z])
-    xp = array_namespace(q)
-    return xp.concat([q[..., :1], -q[..., 1:]], axis=-1)
+    return q * constant(_CONJUGATE, q)
 
 
 def norm(v: Array) -> Array:
     """Length ``(...)`` of vectors ``(..., n)``."""
-    if _single(v):
-        return np.float64(math.sqrt(v @ v))
-    xp = array_namespace(v)
-    return xp.sqrt(xp.sum(v * v, axis=-1))
+    return array_namespace(v).sqrt(dot(v, v))
 
 
 def dot(a: Array, b: Array) -> Array:
     """Inner product ``(...)`` of vectors ``(..., n)``."""
-    if _single(a) and _single(b):
-        return np.float64(a @ b)
-    xp = array_namespace(a, b)
-    return xp.sum(a * b, axis=-1)
+    return array_namespace(a, b).matmul(a[..., None, :], b[..., None])[..., 0, 0]
 
 
 def composed(a: list[float], b: list[float]) -> list[float]:
@@ -144,50 +121,51 @@ def point(pose: list[float], local: Sequence[float]) -> list[float]:
 
 def rotate(q: Array, v: Array) -> Array:
     """Vectors ``v (..., 3)`` rotated by unit quaternions ``q (..., 4)``; batch dimensions broadcast."""
-    if _single(q) and _single(v):
-        return np.array(_rot(q.tolist(), v.tolist()))
     xp = array_namespace(q, v)
-    w, x, y, z = (q[..., i] for i in range(4))
-    vx, vy, vz = (v[..., i] for i in range(3))
-    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
-    return xp.stack(
-        [vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx],
-        axis=-1,
-    )
+    cross_matrix = _gathered(q, _CROSS, _CROSS_SIGNS)
+    once = xp.matmul(cross_matrix, v[..., None])
+    twice = q[..., :1] * once[..., 0] + xp.matmul(cross_matrix, once)[..., 0]
+    return v + (twice + twice)
 
 
 def multiply(a: Array, b: Array) -> Array:
     """Composition ``a * b`` of poses ``(..., 7)``: the frame ``b``, given in ``a``, in ``a``'s parent."""
-    if _single(a) and _single(b):
-        return np.array(composed(a.tolist(), b.tolist()))
-    xp = array_namespace(a, b)
     position = a[..., :3] + rotate(a[..., 3:], b[..., :3])
     rotation = quat_multiply(a[..., 3:], b[..., 3:])
-    return xp.concat([position, rotation], axis=-1)
+    return array_namespace(a, b).concat([position, rotation], axis=-1)
 
 
 def inverse(pose: Array) -> Array:
     """Inverse of poses ``(..., 7)``."""
-    if _single(pose):
-        return np.array(inverted(pose.tolist()))
-    xp = array_namespace(pose)
     q = quat_conjugate(pose[..., 3:])
-    return xp.concat([-rotate(q, pose[..., :3]), q], axis=-1)
+    return array_namespace(pose).concat([-rotate(q, pose[..., :3]), q], axis=-1)
+
+
+def relative(frame: Array, pose: Array) -> Array:
+    """Poses ``(..., 7)``, given in the parent of ``frame (..., 7)``, as seen from that frame."""
+    back = quat_conjugate(frame[..., 3:])
+    position = rotate(back, pose[..., :3] - frame[..., :3])
+    return array_namespace(frame, pose).concat([position, quat_multiply(back, pose[..., 3:])], axis=-1)
 
 
 def transform(pose: Array, point: Array) -> Array:
     """Points ``(..., 3)`` given in the frame ``pose (..., 7)``, in its parent."""
-    if _single(pose) and _single(point):
-        p = pose.tolist()
-        r = _rot(p[3:], point.tolist())
-        return np.array([p[0] + r[0], p[1] + r[1], p[2] + r[2]])
     return pose[..., :3] + rotate(pose[..., 3:], point)
+
+
+def localise(pose: Array, point: Array) -> Array:
+    """Points ``(..., 3)`` given in the parent of the frame ``pose (..., 7)``, as seen from that frame."""
+    return rotate(quat_conjugate(pose[..., 3:]), point - pose[..., :3])
 
 
 def normalise(q: Array) -> Array:
     """Quaternions ``(..., 4)`` scaled to unit length."""
-    xp = array_namespace(q)
-    return q / xp.sqrt(xp.sum(q * q, axis=-1, keepdims=True))
+    return q / norm(q)[..., None]
+
+
+def unit(v: Array) -> Array:
+    """Vectors ``(..., n)``, none of them zero, scaled to unit length."""
+    return v / norm(v)[..., None]
 
 
 def unit_pose(pose: Any) -> Array:
@@ -199,7 +177,7 @@ def unit_pose(pose: Any) -> Array:
 
 def z_axis(q: Array) -> Array:
     """Where the z axis points: unit vectors ``(..., 3)`` of rotations ``(..., 4)``."""
-    return rotate(q, constant([0.0, 0.0, 1.0], q))
+    return rotate(q, constant(_UP, q))
 
 
 def tilt(q: Array, before: Array | None = None) -> Array:
@@ -209,9 +187,6 @@ def tilt(q: Array, before: Array | None = None) -> Array:
         q: The rotations.
         before: Other ones, whose z axes count instead of the vertical.
     """
-    if _single(q) and (before is None or _single(before)):
-        a, b = _rot(q.tolist(), _UP), _UP if before is None else _rot(before.tolist(), _UP)
-        return np.float64(math.acos(min(max(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], -1.0), 1.0)))
     up = z_axis(q)
     cosine = up[..., 2] if before is None else dot(z_axis(before), up)
     return array_namespace(q).acos(clip(cosine, -1.0, 1.0))
@@ -219,45 +194,29 @@ def tilt(q: Array, before: Array | None = None) -> Array:
 
 def rotation_vector(q: Array) -> Array:
     """Rotation vector ``(..., 3)`` in radians, of length at most pi, of unit quaternions ``(..., 4)``."""
-    if _single(q):
-        w, x, y, z = q.tolist()
-        if w < 0:
-            w, x, y, z = -w, -x, -y, -z
-        s = math.sqrt(x * x + y * y + z * z)
-        k = 2 * math.atan2(s, w) / s if s > _EPS else 2.0
-        return np.array([k * x, k * y, k * z])
     xp = array_namespace(q)
-    q = xp.where(q[..., :1] < 0, -q, q)
-    s = xp.sqrt(xp.sum(q[..., 1:] ** 2, axis=-1, keepdims=True))
-    small = s < _EPS
-    k = xp.where(
-        small, xp.full_like(s, 2.0), 2 * xp.atan2(s, q[..., :1]) / xp.where(small, xp.ones_like(s), s)
-    )
-    return k * q[..., 1:]
+    sine = norm(q[..., 1:])
+    flipped, small = q[..., 0] < 0.0, sine < _EPS
+    angle = 2.0 * xp.atan2(sine, xp.abs(q[..., 0]))
+    factor = xp.where(small, xp.full_like(sine, 2.0), angle / xp.where(small, xp.ones_like(sine), sine))
+    return xp.where(flipped, -factor, factor)[..., None] * q[..., 1:]
 
 
 def from_rotation_vector(v: Array) -> Array:
     """Unit quaternions ``(..., 4)`` of rotation vectors ``(..., 3)`` in radians."""
-    if _single(v):
-        x, y, z = v.tolist()
-        a = math.sqrt(x * x + y * y + z * z)
-        k = math.sin(a / 2) / a if a > _EPS else 0.5
-        return np.array([math.cos(a / 2), k * x, k * y, k * z])
     xp = array_namespace(v)
-    a = xp.sqrt(xp.sum(v * v, axis=-1, keepdims=True))
-    small = a < _EPS
-    k = xp.where(small, xp.full_like(a, 0.5), xp.sin(a / 2) / xp.where(small, xp.ones_like(a), a))
-    return xp.concat([xp.cos(a / 2), k * v], axis=-1)
+    angle = norm(v)
+    small = angle < _EPS
+    half = xp.sin(angle / 2) / xp.where(small, xp.ones_like(angle), angle)
+    factor = xp.where(small, xp.full_like(angle, 0.5), half)
+    return xp.concat([xp.cos(angle / 2)[..., None], factor[..., None] * v], axis=-1)
 
 
 def angle_between(a: Array, b: Array) -> Array:
     """Smallest rotation angle ``(...)`` in radians between unit quaternions ``(..., 4)``."""
-    v = rotation_vector(quat_multiply(quat_conjugate(a), b))
-    if _single(v):
-        x, y, z = v.tolist()
-        return np.float64(math.sqrt(x * x + y * y + z * z))
-    xp = array_namespace(v)
-    return xp.sqrt(xp.sum(v * v, axis=-1))
+    between = quat_multiply(quat_conjugate(a), b)
+    xp = array_namespace(between)
+    return 2.0 * xp.atan2(norm(between[..., 1:]), xp.abs(between[..., 0]))
 
 
 def interpolate(a: Array, b: Array, fraction: Array) -> Array:
@@ -268,23 +227,12 @@ def interpolate(a: Array, b: Array, fraction: Array) -> Array:
         b: Poses ``(..., 7)`` at fraction 1.
         fraction: ``(...)``, usually in [0, 1].
     """
-    if _single(a) and _single(b) and np.ndim(fraction) == 0:
-        f = float(fraction)
-        al, bl = a.tolist(), b.tolist()
-        qa = al[3:]
-        d = _mul([qa[0], -qa[1], -qa[2], -qa[3]], bl[3:])
-        if d[0] < 0:
-            d = [-c for c in d]
-        s = math.sqrt(d[1] * d[1] + d[2] * d[2] + d[3] * d[3])
-        h = f * math.atan2(s, d[0])
-        k = math.sin(h) / s if s > _EPS else 0.0
-        q = _mul(qa, [math.cos(h), k * d[1], k * d[2], k * d[3]])
-        return np.array([al[i] + f * (bl[i] - al[i]) for i in range(3)] + q)
     xp = array_namespace(a, b)
-    f = xp.asarray(fraction)[..., None]
-    d = quat_multiply(quat_conjugate(a[..., 3:]), b[..., 3:])
-    q = quat_multiply(a[..., 3:], from_rotation_vector(f * rotation_vector(d)))
-    return xp.concat([a[..., :3] + f * (b[..., :3] - a[..., :3]), q], axis=-1)
+    share = xp.asarray(fraction, dtype=a.dtype)[..., None]
+    turn = rotation_vector(quat_multiply(quat_conjugate(a[..., 3:]), b[..., 3:]))
+    rotation = quat_multiply(a[..., 3:], from_rotation_vector(share * turn))
+    position = a[..., :3] + share * (b[..., :3] - a[..., :3])
+    return xp.concat([position, rotation], axis=-1)
 
 
 def frame_from_axes(z: Array, y: Array) -> Array:
@@ -294,19 +242,13 @@ def frame_from_axes(z: Array, y: Array) -> Array:
         z: Vectors ``(..., 3)``, not zero.
         y: Vectors ``(..., 3)``, not parallel to ``z``.
     """
-    xp = array_namespace(z, y)
-    z = z / xp.sqrt(xp.sum(z * z, axis=-1, keepdims=True))
-    y = y - z * xp.sum(y * z, axis=-1, keepdims=True)
-    y = y / xp.sqrt(xp.sum(y * y, axis=-1, keepdims=True))
-    x = cross(y, z)
-    return from_matrix(xp.stack([x, y, z], axis=-1))
+    z = unit(z)
+    y = unit(y - z * dot(y, z)[..., None])
+    return from_matrix(array_namespace(z, y).stack([cross(y, z), y, z], axis=-1))
 
 
 def cross(a: Array, b: Array) -> Array:
     """Cross product of vectors ``(..., 3)``."""
-    if _single(a) and _single(b):
-        (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-        return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
     xp = array_namespace(a, b)
     return xp.stack(
         [
@@ -343,19 +285,15 @@ def from_matrix(m: Array) -> Array:
 
 def to_matrix(q: Array) -> Array:
     """Rotation matrices ``(..., 3, 3)`` of unit quaternions ``(..., 4)``."""
-    if _single(q):
-        w, x, y, z = q.tolist()
-        return np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
     xp = array_namespace(q)
-    eye = xp.eye(3, dtype=q.dtype)
-    shape = (*q.shape[:-1], 3)
-    return xp.stack([rotate(q, xp.broadcast_to(eye[i], shape)) for i in range(3)], axis=-1)
+    axes = constant(_AXES, q)
+    return xp.stack([rotate(q, axes[i]) for i in range(3)], axis=-1)
+
+
+def shifted(pose: Array, by: Array) -> Array:
+    """Poses ``(..., 7)``, displaced by ``by (..., 3)`` metres along the axes of their parent."""
+    xp = array_namespace(pose)
+    return xp.concat([pose[..., :3] + by, pose[..., 3:]], axis=-1)
 
 
 def yaw(angle: float) -> Array:
@@ -367,3 +305,22 @@ def pose(position: Array, rotation: Array | None = None) -> Array:
     """A NumPy pose ``(7,)`` of a position ``(3,)`` and a quaternion ``(4,)``, by default the identity."""
     q = np.array([1.0, 0.0, 0.0, 0.0]) if rotation is None else np.asarray(rotation, float)
     return np.concatenate([np.asarray(position, float), q])
+
+
+def _gathered(q: Array, index: Array, signs: Array) -> Array:
+    """Matrices ``(..., m, n)`` that are made of the numbers of quaternions ``(..., 4)`` with signs."""
+    if isinstance(q, np.ndarray):
+        return q[..., index] * signs.astype(q.dtype, copy=False)
+    xp = array_namespace(q)
+    flat = xp.take(q, xp.asarray(index.reshape(-1), device=q.device), axis=-1)
+    return xp.reshape(flat, (*q.shape[:-1], *index.shape)) * constant(signs, q)
+
+
+_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+_AXES = np.eye(3)
+_LEFT = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
+_LEFT_SIGNS = np.array([[1.0, -1, -1, -1], [1, 1, -1, 1], [1, 1, 1, -1], [1, -1, 1, 1]])
+"""The matrix of the product with a quaternion on the left."""
+_CROSS = np.array([[0, 3, 2], [3, 0, 1], [2, 1, 0]])
+_CROSS_SIGNS = np.array([[0.0, -1, 1], [1, 0, -1], [-1, 1, 0]])
+"""The matrix of the cross product with a quaternion's vector on the left."""

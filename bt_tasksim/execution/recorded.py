@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.json_text import parse_json
 from bt_tasksim.core.registry import parts
@@ -147,10 +147,10 @@ def take_policies(
     statuses = recorded.demonstration.extra["tree/status"]
     other = trusted and statuses.shape[1:] != (len(nodes),)
     for number in had:
-        other = other or not 0 <= number < len(nodes) or not isinstance(nodes[number], ConceptModel)
+        other = other or not 0 <= number < len(nodes) or not isinstance(nodes[number], ConceptNode)
     if other:
         raise InputError(f"{where} was recorded with another tree; give that one")
-    concepts = {concept_name(type(leaf)) for leaf in nodes if isinstance(leaf, ConceptModel)}
+    concepts = {concept_name(type(leaf.model)) for leaf in nodes if isinstance(leaf, ConceptNode)}
     for concept in named:
         if concept not in concepts:
             raise InputError(
@@ -158,9 +158,9 @@ def take_policies(
                 f"{nearest(concept, concepts)}"
             )
     for number, leaf in enumerate(nodes):
-        if not isinstance(leaf, ConceptModel):
+        if not isinstance(leaf, ConceptNode):
             continue
-        concept, source = concept_name(type(leaf)), had.get(number, "")
+        concept, source = concept_name(type(leaf.model)), had.get(number, "")
         if concept in named:
             leaf.policy = named[concept]
         elif trusted and leaf.policy and not is_bundled(source):

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.concept.leaf import ONE, ConceptNode
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.world import Observation, WorldModel
 from bt_tasksim.demos_decomp.log import Demonstration, Log, Surface, Track, Video
@@ -316,8 +316,7 @@ def hand_opening(tips: NDArray[np.float64], robot: RobotDescription) -> NDArray[
 
 
 def _necessary_cost(leaf: ConceptNode) -> float:
-    seen = leaf.context.seen(leaf.context.now - leaf._started)
-    return float(leaf._model.necessary_cost(seen, leaf.memory))
+    return float(leaf.model.necessary_cost(leaf.activation.seen(ONE), leaf.memory)[0])
 
 
 def _places(world: WorldModel) -> dict[str, Surface]:

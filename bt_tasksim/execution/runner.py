@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.context import Context, Refusal, one_world
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.reporting import as_statement, speaker, whole_outcome
 from bt_tasksim.core.errors import BtTasksimError, LeafError, UnreachableError
@@ -29,7 +29,7 @@ from bt_tasksim.core.outcomes import (
     register_reason,
 )
 from bt_tasksim.core.units import SECONDS
-from bt_tasksim.core.world import Command, Observation, WorldModel
+from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
 from bt_tasksim.execution.leaf_errors import end_all, ticking
 from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
@@ -104,9 +104,20 @@ class Runner:
         self.configuration, self._began = configuration, time.perf_counter()
         world = configuration.world_model([tip.name for tip in self.robot.tips], self.robot.opening)
         self.tree.stop(Status.INVALID)
-        self.context.hidden = self.pipeline.hidden
-        self.context.begin(world, self.pipeline.reset(configuration, world))
+        self.context.hidden = self._hidden
+        self.context.begin([world])
+        self._observed(self.pipeline.reset(configuration, world))
         return world
+
+    def _observed(self, observation: Observation) -> None:
+        """Go on to the next tick with what is seen now."""
+        self.observation = observation
+        self.context.advance(one_world(observation))
+
+    def _hidden(self) -> Hidden | None:
+        """What only a simulator knows, ``(1, ...)``."""
+        hidden = self.pipeline.hidden()
+        return None if hidden is None else one_world(hidden)
 
     def run(
         self, seed: int, stream: str = "evaluation", record: Callable[[Step], None] | None = None
@@ -219,7 +230,7 @@ class Runner:
         while True:
             command = self.tick()
             if record is not None:
-                record(Step(context.observation, command, tree.status, pipeline))
+                record(Step(self.observation, command, tree.status, pipeline))
             if tree.status != Status.RUNNING:
                 return steps, None, None
             if steps >= limit:
@@ -228,7 +239,7 @@ class Runner:
             try:
                 self.step(command)
             except SafetyStop as stop:
-                leaf = context.tool_writer or tree.tip() or tree
+                leaf = context.tool_writer() or tree.tip() or tree
                 end_all(tree)
                 return steps, SAFETY_STOP(stop.outcome, arm=_holding(pipeline)), leaf
             steps += 1
@@ -240,12 +251,12 @@ class Runner:
         """
         context, pipeline = self.context, self.pipeline
         try:
-            context.advance(pipeline.step(command))
+            self._observed(pipeline.step(command))
         except UnreachableError as error:
-            writer = context.tool_writer
-            context.advance(pipeline.step(Command()))
+            writer = context.tool_writer()
+            self._observed(pipeline.step(Command()))
             miss = OUT_OF_REACH(what=error, distance=error.distance, angle=error.angle)
-            context.refused = (writer, miss)
+            context.refused[0] = Refusal(writer, miss)
 
     def tick(self) -> Command:
         """Tick the tree once; returns the command that its leaves have written.
@@ -284,13 +295,13 @@ class Runner:
             if quiet >= 4:
                 break
             try:
-                self.context.advance(pipeline.step(Command()))
+                self._observed(pipeline.step(Command()))
             except UnreachableError:
                 break
             except SafetyStop:  # the guard brakes from the next step on
                 continue
             if record is not None:
-                record(Step(self.context.observation, Command(), self.tree.status, pipeline))
+                record(Step(self.observation, Command(), self.tree.status, pipeline))
             hidden = pipeline.hidden()
             assert hidden is not None
         return evaluate_success(configuration, world, hidden)

@@ -1,21 +1,20 @@
 """Reference motions: smooth tool paths through waypoints, as tables that are cheap to sample.
 
-A path is planned once, when a concept becomes active, and then only looked up at every tick.
+A path is planned once, when a concept becomes active, and then only looked up at every tick. All arrays
+have a leading axis of worlds.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from bt_tasksim.core import poses
+from bt_tasksim.core.facts import take_rows
 from bt_tasksim.core.poses import Array, array_namespace
 
-SHARP = np.cos(np.radians(100.0))
+SHARP = math.cos(math.radians(100.0))
 """Cosine of the angle between two segments from which on a path turns back. The way round such a corner has
 next to no length, and an even speed along it would be a jerk; it is taken at even acceleration."""
 TURN_BACK = 2.5
@@ -24,11 +23,11 @@ _SAMPLES = 33
 
 
 class Path(NamedTuple):
-    """A tool path in time; batch dimensions ``(...)``.
+    """A tool path in time, in ``N`` worlds.
 
     Attributes:
-        table: Poses ``(..., n, 7)`` at equal steps of the path's own parameter in [0, 1].
-        duration: ``(...)`` seconds.
+        table: Poses ``(N, n, 7)`` at equal steps of the path's own parameter in [0, 1].
+        duration: ``(N,)`` seconds.
     """
 
     table: Array
@@ -43,6 +42,21 @@ def minimum_jerk(fraction: Array) -> Array:
     return fraction * fraction * fraction * (10.0 - 15.0 * fraction + 6.0 * fraction * fraction)
 
 
+def minimum_jerk_time(position: Array) -> Array:
+    """The fraction ``(...)`` of its duration at which a minimum-jerk motion has come to a position in [0, 1].
+
+    To 1e-4, by straight lines between a hundred points of `minimum_jerk`.
+    """
+    xp = array_namespace(position)
+    fractions = xp.linspace(0.0, 1.0, 101, dtype=position.dtype, device=position.device)
+    places = minimum_jerk(fractions)
+    passed = xp.sum(xp.astype(places <= position[..., None], xp.int64), axis=-1)
+    before = xp.clip(passed - 1, 0, 99)
+    low, high = (xp.take(places, xp.reshape(index, (-1,))) for index in (before, before + 1))
+    low, high = (xp.reshape(values, position.shape) for values in (low, high))
+    return (xp.astype(before, position.dtype) + (position - low) / (high - low)) / 100
+
+
 def plan(
     waypoints: Sequence[Array],
     speed: float,
@@ -52,10 +66,10 @@ def plan(
     acceleration: float = math.inf,
     samples: int = _SAMPLES,
 ) -> Path:
-    """A path through waypoints whose corners are rounded and whose peak speeds are bounded.
+    """Paths through waypoints whose corners are rounded and whose peak speeds are bounded.
 
     Args:
-        waypoints: Poses ``(7,)``, at least one.
+        waypoints: Poses ``(N, 7)``, at least one. Where worlds have unlike many, the last one is repeated.
         speed: Peak speed, m/s.
         turn: Peak turning rate, rad/s.
         blend: A corner is rounded from this distance before to this distance after it, metres; never more
@@ -65,73 +79,104 @@ def plan(
         samples: Rows of the table; two are exact for a straight path.
 
     Returns:
-        A path whose time law is minimum jerk over the path's length.
+        Paths whose time law is minimum jerk over the path's length.
     """
     line, ways, reversal = _rounded(waypoints, blend)
-    fastest = min(speed, math.sqrt(TURN_BACK * reversal))
-    lengths = [
-        max(way, float(poses.angle_between(a[3:], b[3:])) * speed / turn)
-        for way, (a, b) in zip(ways, itertools.pairwise(line), strict=True)
-    ]
-    along = np.concatenate([[0.0], np.cumsum(lengths)])
-    total = float(along[-1])
+    xp = array_namespace(line)
+    zero = xp.zeros_like(reversal)
+    fastest = xp.minimum(zero + speed, xp.sqrt(TURN_BACK * reversal))
+    if line.shape[1] == 1:
+        return Path(line + xp.zeros((1, samples, 1), dtype=line.dtype, device=line.device), zero + shortest)
+    turned = poses.angle_between(line[:, :-1, 3:], line[:, 1:, 3:])
+    along = _summed(xp.maximum(ways, turned * (speed / turn)))
+    total = along[:, -1]
     peak = 1.875  # of a minimum-jerk motion, over its mean speed
     hardest = 10.0 / math.sqrt(3.0)  # peak acceleration of a minimum-jerk motion, over length by time squared
-    duration = max(shortest, peak * total / fastest, math.sqrt(hardest * total / acceleration))
-    table = np.empty((samples, 7))
-    for i, s in enumerate(np.linspace(0.0, total, samples)):
-        k = min(int(np.searchsorted(along, s, side="right")) - 1, len(line) - 2) if total > 0 else 0
-        if len(line) == 1 or lengths[k] == 0.0:
-            table[i] = line[min(k, len(line) - 1)]
-        else:
-            table[i] = poses.interpolate(line[k], line[k + 1], (s - along[k]) / lengths[k])
-    return Path(table, np.float64(duration))
+    duration = xp.maximum(zero + shortest, peak * total / fastest)
+    duration = xp.maximum(duration, xp.sqrt(hardest / acceleration * total))
+    return Path(_spaced(line, along, samples), duration)
 
 
 def sample(path: Path, time: Array) -> Array:
-    """Poses ``(..., 7)`` of a path at ``time (...)`` seconds since its begin; it stays at its end."""
+    """Poses ``(N, 7)`` of paths at ``time (N,)`` seconds since their begin; they stay at their ends."""
     table = path.table
-    if type(table) is np.ndarray and table.ndim == 2:
-        f = min(max(float(time) / float(path.duration), 0.0), 1.0)
-        s = float(minimum_jerk(f)) * (table.shape[0] - 1)
-        i = min(int(s), table.shape[0] - 2)
-        return poses.interpolate(table[i], table[i + 1], s - i)
     xp = array_namespace(table)
-    n = table.shape[-2]
-    s = minimum_jerk(xp.clip(time / path.duration, 0.0, 1.0)) * (n - 1)
-    i = xp.clip(xp.astype(xp.floor(s), xp.int64), 0, n - 2)
-    index = xp.broadcast_to(i[..., None, None], (*i.shape, 1, 7))
-    a = xp.take_along_axis(table, index, axis=-2)[..., 0, :]
-    b = xp.take_along_axis(table, index + 1, axis=-2)[..., 0, :]
-    return poses.interpolate(a, b, s - xp.astype(i, s.dtype))
+    n = table.shape[1]
+    place = minimum_jerk(poses.clip(time / path.duration, 0.0, 1.0)) * (n - 1)
+    before = poses.clip(xp.floor(place), 0.0, n - 2.0)
+    index = xp.astype(before, xp.int64)
+    return poses.interpolate(take_rows(table, index), take_rows(table, index + 1), place - before)
 
 
-def _rounded(
-    waypoints: Sequence[Array], blend: float, pieces: int = 6
-) -> tuple[list[Array], list[float], float]:
-    """A line with rounded corners, the metres that each piece counts for, and those before a reversal."""
-    line, ways, reversal = [np.asarray(waypoints[0], float)], [], math.inf
+def _summed(steps: Array) -> Array:
+    """``(N, n)`` numbers as sums ``(N, n + 1)`` from zero on, each row for itself."""
+    xp = array_namespace(steps)
+    sums = [xp.zeros_like(steps[:, 0])]
+    for k in range(steps.shape[1]):
+        sums.append(sums[-1] + steps[:, k])
+    return xp.stack(sums, axis=1)
 
-    def go(pose: Array, way: float | None = None) -> None:
-        ways.append(float(np.linalg.norm(pose[:3] - line[-1][:3])) if way is None else way)
+
+def _spaced(line: Array, along: Array, samples: int) -> Array:
+    """Poses ``(N, samples, 7)`` at equal distances of lines ``(N, n, 7)`` with places ``(N, n)``."""
+    xp = array_namespace(line)
+    shares = xp.linspace(0.0, 1.0, samples, dtype=line.dtype, device=line.device)
+    wanted = shares[None, :] * along[:, -1:]
+    passed = xp.sum(xp.astype(along[:, None, :] <= wanted[:, :, None], xp.int64), axis=-1)
+    k = xp.clip(passed - 1, 0, line.shape[1] - 2)
+    begins = xp.take_along_axis(along, k, axis=1)
+    length = xp.take_along_axis(along, k + 1, axis=1) - begins
+    there = length > 0.0
+    share = xp.where(there, (wanted - begins) / xp.where(there, length, xp.ones_like(length)), 0.0 * length)
+    spread = xp.broadcast_to(k[..., None], (*k.shape, 7))
+    first, last = (xp.take_along_axis(line, index, axis=1) for index in (spread, spread + 1))
+    return poses.interpolate(first, last, share)
+
+
+def _rounded(waypoints: Sequence[Array], blend: float, pieces: int = 6) -> tuple[Array, Array, Array]:
+    """Lines with rounded corners.
+
+    Returns:
+        Poses ``(N, n, 7)``, the metres ``(N, n - 1)`` that each piece counts for, and those ``(N,)`` before
+        a reversal.
+
+    A corner that follows on another waypoint without a way between them is not rounded.
+    """
+    xp = array_namespace(waypoints[0])
+    line, ways = [waypoints[0]], []
+    reversal = xp.full_like(waypoints[0][:, 0], math.inf)
+    straight = xp.ones_like(reversal) > 0.0  # no corner has been rounded so far
+
+    def go(pose: Array, way: Array | None = None) -> None:
+        ways.append(poses.norm(pose[:, :3] - line[-1][:, :3]) if way is None else way)
         line.append(pose)
 
     for k in range(1, len(waypoints) - 1):
-        before, corner, after = line[-1], np.asarray(waypoints[k], float), np.asarray(waypoints[k + 1], float)
-        into = float(np.linalg.norm(corner[:3] - before[:3]))
-        out = float(np.linalg.norm(after[:3] - corner[:3]))
-        if min(into, out) < 1e-6:
-            go(corner)
-            continue
-        first, last, way = min(blend, into / 2), min(blend, out / 2), None
-        if (corner[:3] - before[:3]) @ (after[:3] - corner[:3]) < SHARP * into * out:
-            first = last = min(2 * blend, into if k == 1 else into / 2, out / 2)
-            reversal = min(reversal, first)
-            way = 2 * first / (pieces - 1)  # even steps of a Bezier curve's parameter: even acceleration
-        a = poses.interpolate(before, corner, 1.0 - first / into)
-        b = poses.interpolate(corner, after, last / out)
+        tip, corner, after = line[-1], waypoints[k], waypoints[k + 1]
+        coming, going = corner[:, :3] - tip[:, :3], after[:, :3] - corner[:, :3]
+        into, out = poses.norm(coming), poses.norm(going)
+        rounds = xp.minimum(into, out) >= 1e-6
+        back = rounds & (poses.dot(coming, going) < SHARP * into * out)
+        room = xp.where(straight, into, into / 2)
+        turned = xp.minimum(xp.minimum(0.0 * into + 2 * blend, room), out / 2)
+        first = xp.where(back, turned, xp.minimum(0.0 * into + blend, into / 2))
+        last = xp.where(back, turned, xp.minimum(0.0 * into + blend, out / 2))
+        reversal = xp.where(back, xp.minimum(reversal, first), reversal)
+        share_in = xp.where(rounds, first / xp.where(rounds, into, xp.ones_like(into)), 0.0 * into)
+        share_out = xp.where(rounds, last / xp.where(rounds, out, xp.ones_like(out)), 0.0 * out)
+        a = xp.where(rounds[:, None], poses.interpolate(tip, corner, 1.0 - share_in), corner)
+        b = xp.where(rounds[:, None], poses.interpolate(corner, after, share_out), corner)
         go(a)
-        for t in np.linspace(0.0, 1.0, pieces)[1:]:  # quadratic Bezier curve (de Casteljau)
-            go(poses.interpolate(poses.interpolate(a, corner, t), poses.interpolate(corner, b, t), t), way)
-    go(np.asarray(waypoints[-1], float))
-    return line, ways, reversal
+        for j in range(1, pieces):  # quadratic Bezier curve (de Casteljau)
+            t = 0.0 * into + j / (pieces - 1)
+            curve = poses.interpolate(poses.interpolate(a, corner, t), poses.interpolate(corner, b, t), t)
+            curve = xp.where(rounds[:, None], curve, corner)
+            way = poses.norm(curve[:, :3] - line[-1][:, :3])
+            # Even steps of a Bezier curve's parameter: even acceleration.
+            go(curve, xp.where(back, 2 * first / (pieces - 1), way))
+        straight = straight & ~rounds
+    if len(waypoints) > 1:
+        go(waypoints[-1])
+    if not ways:
+        return waypoints[0][:, None, :], xp.zeros_like(reversal)[:, None], reversal
+    return xp.stack(line, axis=1), xp.stack(ways, axis=1), reversal

@@ -9,7 +9,6 @@ minimum cost paths", 1968, by networkx). Everything is deterministic.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -91,44 +90,51 @@ def _between(start: Array, middle: list[Array], goal: Array) -> list[list[Array]
 
 
 class _Checker:
+    """Says whether the hand and what it holds touch an obstacle.
+
+    Which boxes are so far from an obstacle that they cannot touch it is seen for many tool poses at once;
+    coal is asked about the others.
+    """
+
     def __init__(self, carried: Carried, obstacles: Sequence[Obstacle]) -> None:
         import coal
 
         self._coal = coal
         boxes = [*carried.hand, (carried.grip, carried.extent)]
-        self._moving = [(poses.pose(p[:3], p[3:]), coal.Box(*(float(s) for s in size))) for p, size in boxes]
+        self._local = np.array([poses.unit_pose(pose) for pose, _ in boxes])
+        self._moving = [coal.Box(*(float(s) for s in size)) for _, size in boxes]
+        self._radius = np.array([np.linalg.norm(size) / 2 for _, size in boxes])
+        sizes = [np.asarray(o.size, float) + 2 * MARGIN for o in obstacles]
         self._fixed = [
-            (
-                coal.Box(*(float(s) + 2 * MARGIN for s in o.size)),
-                coal.Transform3s(poses.to_matrix(o.pose[3:]), o.pose[:3]),
-                o.pose[:3].tolist(),
-                float(np.linalg.norm(o.size)) / 2 + MARGIN,
-            )
-            for o in obstacles
+            (coal.Box(*size.tolist()), coal.Transform3s(poses.to_matrix(o.pose[3:]), o.pose[:3]))
+            for size, o in zip(sizes, obstacles, strict=True)
         ]
-        self._radius = [float(np.linalg.norm(size)) / 2 for _, size in boxes]
+        self._half = np.array(sizes).reshape(-1, 3) / 2
+        self._at = np.array([o.pose for o in obstacles]).reshape(-1, 7)
         self._request, self._result = coal.CollisionRequest(), coal.CollisionResult()
 
-    def free(self, tool: Array) -> bool:
+    def free(self, tools: Array) -> Array:
+        """Boolean ``(n,)``: nothing is touched at tool poses ``(n, 7)``."""
         coal = self._coal
-        for (local, box), radius in zip(self._moving, self._radius, strict=True):
-            p = poses.multiply(tool, local)
-            frame, at_point = None, p[:3].tolist()
-            for other, at, centre, reach in self._fixed:
-                if math.dist(at_point, centre) > radius + reach:
-                    continue
-                if frame is None:
-                    frame = coal.Transform3s(poses.to_matrix(p[3:]), p[:3])
+        boxes = poses.multiply(tools[:, None], self._local)
+        local = np.abs(poses.localise(self._at[:, None, None], boxes[None, ..., :3]))
+        beyond = np.maximum(local - self._half[:, None, None], 0.0)
+        near = poses.norm(beyond) <= self._radius
+        free = np.ones(len(tools), bool)
+        for k, i, j in zip(*(index.tolist() for index in np.nonzero(near)), strict=True):
+            if free[i]:
+                frame = coal.Transform3s(poses.to_matrix(boxes[i, j, 3:]), boxes[i, j, :3])
                 self._result.clear()
-                if coal.collide(box, frame, other, at, self._request, self._result):
-                    return False
-        return True
+                free[i] = not coal.collide(
+                    self._moving[j], frame, *self._fixed[k], self._request, self._result
+                )
+        return free
 
     def clear(self, a: Array, b: Array) -> bool:
         length = float(np.linalg.norm(b[:3] - a[:3])) + 0.1 * float(poses.angle_between(a[3:], b[3:]))
         n = max(2, int(np.ceil(length / _STEP)) + 1)
         # The ends are where the object is lifted from and put down: there it may be near its support.
-        return all(self.free(poses.interpolate(a, b, f)) for f in np.linspace(0.0, 1.0, n))
+        return bool(self.free(poses.interpolate(a[None], b[None], np.linspace(0.0, 1.0, n))).all())
 
     def clear_way(self, way: Sequence[Array]) -> bool:
         return all(self.clear(a, b) for a, b in itertools.pairwise(way))
@@ -141,12 +147,17 @@ def _lattice(start: Array, goal: Array, checker: _Checker) -> list[Array]:
     counts = np.ceil((high - low) / _CELL).astype(int) + 1
     span = max(float(np.linalg.norm(goal[:3] - start[:3])), 1e-6)
 
-    def pose_at(cell: tuple[int, ...]) -> Array:
-        p = low + _CELL * np.array(cell)
-        f = float(np.clip((p - start[:3]) @ (goal[:3] - start[:3]) / span**2, 0.0, 1.0))
-        return poses.pose(p, poses.interpolate(start, goal, f)[3:])
+    def poses_at(cells: Array) -> Array:
+        p = low + _CELL * cells
+        f = np.clip((p - start[:3]) @ (goal[:3] - start[:3]) / span**2, 0.0, 1.0)
+        return np.concatenate([p, poses.interpolate(start[None], goal[None], f)[:, 3:]], axis=-1)
 
-    free = {c for c in itertools.product(*(range(n) for n in counts)) if checker.free(pose_at(c))}
+    def pose_at(cell: tuple[int, ...]) -> Array:
+        found: Array = poses_at(np.array([cell]))[0]
+        return found
+
+    cells = list(itertools.product(*(range(n) for n in counts)))
+    free = {c for c, is_free in zip(cells, checker.free(poses_at(np.array(cells))), strict=True) if is_free}
     graph: nx.Graph[Any] = nx.Graph()
     moves = [m for m in itertools.product((-1, 0, 1), repeat=3) if m > (0, 0, 0)]
     for cell in sorted(free):

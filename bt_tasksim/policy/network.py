@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.core.poses import Array, apply, array_namespace, clip, constant
 
 CLIP = 10.0
 """Standard deviations beyond which a normalised feature is cut off."""
@@ -57,26 +57,20 @@ class Network:
 
     def normalise(self, features: Array) -> Array:
         """Features ``(..., n)`` as the first layer sees them."""
-        if isinstance(features, np.ndarray):
-            x = (features.astype(np.float32) - self.mean) * self._scale
-            return np.minimum(np.maximum(x, -CLIP), CLIP)  # `np.clip` takes thrice as long for so few
         xp = array_namespace(features)
         x = xp.astype(features, xp.float32)
-        return xp.clip((x - constant(self.mean, x)) * constant(self._scale, x), -CLIP, CLIP)
+        return clip((x - constant(self.mean, x)) * constant(self._scale, x), -CLIP, CLIP)
 
     def __call__(self, features: Array) -> Array:
-        """Outputs ``(..., m)`` for features ``(..., n)``, in the library of the features."""
+        """Outputs ``(..., m)`` for features ``(..., n)``, in the library of the features.
+
+        Each row is multiplied for itself, so that what it comes to does not depend on the others.
+        """
         x = self.normalise(features)
-        last = len(self.layers) - 1
-        if isinstance(x, np.ndarray):
-            for k, (w, b) in enumerate(self.layers):
-                x = x @ w.T + b
-                if k < last:
-                    x = np.tanh(x)
-            return x
         xp = array_namespace(x)
+        last = len(self.layers) - 1
         for k, (w, b) in enumerate(self.layers):
-            x = x @ xp.matrix_transpose(constant(w, x)) + constant(b, x)
+            x = apply(constant(w, x), x) + constant(b, x)
             if k < last:
                 x = xp.tanh(x)
         return x

@@ -17,11 +17,11 @@ TERMINATE = 0.5
 
 
 class Action(NamedTuple):
-    """What a policy decides; batch dimensions ``(...)``.
+    """What a policy decides in ``N`` worlds.
 
     Attributes:
-        motion: ``(..., n)`` offsets on the concept's reference motion, in [-1, 1] of the concept's scale.
-        terminate: ``(...)`` how much nearer to done this decision brings the task, from 0 to 1: the task is
+        motion: ``(N, n)`` offsets on the concept's reference motion, in [-1, 1] of the concept's scale.
+        terminate: ``(N,)`` how much nearer to done this decision brings the task, from 0 to 1: the task is
             done when its decisions come to 1. A boolean is all or nothing. The motion of the decision that
             ends it counts for nothing.
     """
@@ -100,18 +100,16 @@ class LearnedPolicy:
 
     def act(self, model: Decidable[ViewT], seen: ViewT, memory: Any) -> Action:
         """See `Policy.act`; where the concept takes no decision, its reference motion goes on."""
-        decides = model.decides(seen, memory)
         xp = array_namespace(seen.tool)
-        if seen.tool.ndim == 1 and not bool(decides):
-            return Action(xp.zeros(model.actions), xp.asarray(False))
+        decides = xp.asarray(model.decides(seen, memory))
+        if not bool(xp.any(decides)):
+            still = xp.zeros_like(seen.tool[..., 0])
+            return Action(xp.broadcast_to(still[..., None], (*still.shape, model.actions)), still)
         out = xp.astype(self.network(model.features(seen, memory)), seen.tool.dtype)
         motion, terminate = split_action(out, self.network.signal_std)
-        if seen.tool.ndim == 1:
-            return Action(motion, terminate)
-        free = xp.asarray(decides)
-        none = xp.zeros_like(terminate)
         return Action(
-            xp.where(free[..., None], motion, xp.zeros_like(motion)), xp.where(free, terminate, none)
+            xp.where(decides[..., None], motion, xp.zeros_like(motion)),
+            xp.where(decides, terminate, xp.zeros_like(terminate)),
         )
 
 

@@ -9,8 +9,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.composites import Composite
 from py_trees.decorators import Decorator
 
-from bt_tasksim.concept.condition import Condition
-from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.leaf import ConceptNode, ModelLeaf
 from bt_tasksim.concept.parameters import Parameter
 from bt_tasksim.core.plain import printable
 from bt_tasksim.trees.nodes.base import NodeKind
@@ -44,7 +43,7 @@ def label_of(node: Behaviour) -> Label:
         return _kind_label(node, kind)
     if isinstance(node, SubTree):
         return Label("subtree", "", node.name, ("subtree",))
-    if isinstance(node, ConceptModel | Condition):
+    if isinstance(node, ModelLeaf):
         return _leaf_label(node)
     shape = (
         "decorator" if isinstance(node, Decorator) else "control" if isinstance(node, Composite) else "other"
@@ -83,16 +82,16 @@ def _kind_label(node: Behaviour, kind: NodeKind[Any]) -> Label:
     return Label(kind.category.lower(), kind.symbol, node.name if named else words, (words,) if named else ())
 
 
-def _leaf_label(node: ConceptModel | Condition) -> Label:
-    shape = "concept" if isinstance(node, ConceptModel) else "condition"
+def _leaf_label(node: ModelLeaf) -> Label:
+    shape = "concept" if isinstance(node, ConceptNode) else "condition"
     arguments: dict[str, Any] = node.arguments()
-    declared = node.parameters()
+    declared = node.model.parameters()
     name = arguments.pop("name", None)
     first = next(iter(declared), None)
     subject = (
         str(arguments.pop(first)) if first in arguments and declared[first].quantity.kind == "object" else ""
     )
-    plain = f"{type(node).__name__} {subject}".strip()
+    plain = f"{type(node.model).__name__} {subject}".strip()
     details = [plain] if name else []
     for key, value in arguments.items():
         if key in declared:
@@ -104,7 +103,7 @@ def _leaf_label(node: ConceptModel | Condition) -> Label:
         else:
             shown = f"{value:g}" if isinstance(value, int | float) else str(value)
             details.append(f"{key} {shown} {SETTING_UNITS[key]}".rstrip())
-    symbol = node.presentation.symbol if isinstance(node, ConceptModel) else ""
+    symbol = node.model.presentation.symbol if isinstance(node, ConceptNode) else ""
     return Label(shape, symbol, name or plain, tuple(details))
 
 

@@ -10,8 +10,7 @@ import gymnasium
 import numpy as np
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept.leaf import Decision
-from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.leaf import ConceptNode, Decision
 from bt_tasksim.concept.reporting import speaker
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
@@ -94,7 +93,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         self.reward = reward or Reward()
         self.stream, self.stage, self.render_mode = stream, stage, render_mode
         self.layout = shared_layout(self.train, self.learners, self.runner.robot)
-        n, m = sum(self.layout.values()), self.learners[0].actions
+        n, m = sum(self.layout.values()), self.learners[0].model.actions
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (n,), np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (m + 1,), np.float32)
         self._action_shape = (m + 1,)
@@ -153,7 +152,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         action = np.asarray(action, np.float64)
         if action.shape != self._action_shape or not isfinite(action @ action):
             raise InputError(f"an action should be {self._action_shape[0]} finite numbers, found {action}")
-        return self.act(split_action(action))
+        return self.act(split_action(action[None]))
 
     def act(self, action: Action) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """`step` with what a policy decides: a programmed one may ask for more than an action's bounds allow.
@@ -165,7 +164,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         if episode is None or transitions is None or decision is None:
             raise RuntimeError("step() without an episode: call reset() first")
         decision.leaf.decide(action)
-        transitions.decided(action.motion)
+        transitions.decided(action.motion[0])
         found = episode.next_decision()
         if found is None:
             return self._end(episode, transitions)
@@ -224,7 +223,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
     def _features(self, decision: Decision) -> Array:
         """What the leaf sees."""
         model = decision.leaf.model
-        found = np.asarray(model.features(decision.seen, decision.memory), np.float32)
+        found = np.asarray(model.features(decision.seen, decision.memory)[0], np.float32)
         if found.shape != self.observation_space.shape:
             raise InputError(
                 f"'{decision.leaf.name}': features() gives {found.shape}, layout() says "
@@ -248,16 +247,16 @@ def find_train(tree: Behaviour, name: str | None = None) -> Train:
     raise InputError(f"no Train node '{name}' in the tree; there is {', '.join(repr(n.name) for n in found)}")
 
 
-def shared_layout(train: Train, learners: list[ConceptModel], robot: RobotDescription) -> dict[str, int]:
+def shared_layout(train: Train, learners: list[ConceptNode], robot: RobotDescription) -> dict[str, int]:
     """What all leaves that learn under one Train see.
 
     Raises:
         InputError: Two of them differ in what they see or do.
     """
     first = learners[0]
-    layout = dict(first.layout(robot))
+    layout = dict(first.model.layout(robot))
     for leaf in learners[1:]:
-        if dict(leaf.layout(robot)) != layout or leaf.actions != first.actions:
+        if dict(leaf.model.layout(robot)) != layout or leaf.model.actions != first.model.actions:
             raise InputError(
                 f"'{first.name}' and '{leaf.name}' below '{train.name}' see or do different things: "
                 f"give each its own Train(...)"

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.context import Context, Known
-from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.reporting import outcome_of
+from bt_tasksim.concept.seen import Known
 from bt_tasksim.core.outcomes import OUT_OF_REACH, Outcome, register_reason
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.core.world import Hidden
@@ -58,8 +59,8 @@ class Judgement:
         self.scope: Behaviour | None = found[1] if found else None
         self._train, self._context, self.tolerance = train, context, tolerance
         self._judged = set(concepts_in(self.follower if self.follower is not None else train))
-        self._began: dict[ConceptModel, tuple[int, Hidden | None]] = {}
-        self._activations: dict[ConceptModel, int] = {}
+        self._began: dict[ConceptNode, tuple[int, Hidden | None]] = {}
+        self._activations: dict[ConceptNode, int] = {}
         self.reset()
 
     def reset(self) -> None:
@@ -70,7 +71,7 @@ class Judgement:
 
     def saw(self, node: Behaviour | None) -> None:
         """Take note of a node that a tick has visited."""
-        if not isinstance(node, ConceptModel) or node not in self._judged:
+        if not isinstance(node, ConceptNode) or node not in self._judged:
             return
         began = self._began.get(node)
         if began is None and node.activations == self._activations[node]:
@@ -82,7 +83,7 @@ class Judgement:
             if hidden is None:
                 return
             known = Known(hidden, self._context.world, began[1])
-            cost = float(node.sufficient_cost(known, node.memory))
+            cost = float(node.model.sufficient_cost(known, node.memory)[0])
             if cost >= self._cost and cost > 0.0:
                 self._cost, self._missed = cost, GOAL_MISSED(leaf=node.name, cost=cost)
 
@@ -111,8 +112,8 @@ class Judgement:
             return SignalOutcome(False, name, outcome, discarded=outcome.is_a(OUT_OF_REACH))
         if self._cost >= self.tolerance:
             return SignalOutcome(False, name, self._missed, cost=self._cost)
-        if hidden is not None and float(hidden.penetration) > DEEPEST:
-            return SignalOutcome(False, name, PENETRATION(depth=hidden.penetration), cost=self._cost)
+        if hidden is not None and float(hidden.penetration[0]) > DEEPEST:
+            return SignalOutcome(False, name, PENETRATION(depth=hidden.penetration[0]), cost=self._cost)
         return SignalOutcome(True, name, FOLLOWED(node=node.name), cost=self._cost)
 
 

@@ -137,7 +137,7 @@ class NodeTraining:
         config = self.config
         leaves = self.node.learners()
         layout = shared_layout(self.node, leaves, load_robot(self.task.scene.robot))
-        n, m = sum(layout.values()), leaves[0].actions + 1
+        n, m = sum(layout.values()), leaves[0].model.actions + 1
         kept = self._kept() if resume else None
         if self.folder is not None:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -293,7 +293,7 @@ class NodeTraining:
         """What this is a training of, see `bt_tasksim.training.checkpoint.subject`."""
         robot = load_robot(self.task.scene.robot)
         layouts = {
-            leaf.name: [list(shared_layout(self.node, [leaf], robot).items()), leaf.actions]
+            leaf.name: [list(shared_layout(self.node, [leaf], robot).items()), leaf.model.actions]
             for leaf in self.node.learners()
         }
         return subject(self.task.tree, self.task.scene, layouts, self.node.name, self.task.options)
@@ -330,7 +330,7 @@ class NodeTraining:
 
     def _finish(self, network: Network, layout: Mapping[str, int], actions: int) -> LearnedPolicy:
         leaf, task, scene = self.node.learners()[0], self.task, self.task.scene
-        concept = type(leaf).__name__.lower()
+        concept = type(leaf.model).__name__.lower()
         if self.out is None:
             return LearnedPolicy(network, f"{concept} learned in {task.name}")
         stages = [dataclasses.asdict(stage) for stage in scene.stages]

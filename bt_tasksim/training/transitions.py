@@ -59,4 +59,4 @@ class Transitions:
 
 
 def _cost(decision: Decision) -> float:
-    return float(decision.leaf.model.necessary_cost(decision.seen, decision.memory))
+    return float(decision.leaf.model.necessary_cost(decision.seen, decision.memory)[0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bt_tasksim.checking.bundles import stacked
-from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Grasp, grasp_features
 from bt_tasksim.concept_nodes.grasp_features import (
     ACROSS,

@@ -52,7 +52,7 @@ def test_it_must_be_near(seen, gap, held):
 
 @pytest.mark.parametrize("robot", ["panda", "xarm7_ability"])
 def test_opposition_is_any_of_each_group(robot):
-    from bt_tasksim.concept.context import Seen
+    from bt_tasksim.concept.seen import Seen
     from bt_tasksim.core.world import Observation
     from bt_tasksim.robot.description import load_robot
 

@@ -51,7 +51,7 @@ def test_without_the_object_in_the_hand_it_cannot_start(toy):
 
 
 def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
-    from bt_tasksim.concept.context import Known
+    from bt_tasksim.concept.seen import Known
 
     decisions = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick]
     cost = [float(d.leaf.sufficient_cost(Known(d.hidden, d.seen.world), d.memory)) for d in decisions]
@@ -59,7 +59,7 @@ def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
 
 
 def test_what_may_not_be_squeezed_costs_the_hands_force(recorded_run):
-    from bt_tasksim.concept.context import Known
+    from bt_tasksim.concept.seen import Known
 
     decision = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick][-1]
     now = Known(decision.hidden, decision.seen.world)
@@ -75,7 +75,7 @@ def test_what_may_not_be_squeezed_costs_the_hands_force(recorded_run):
 def test_the_squeeze_counts_at_the_beginning_too(recorded_run):
     import dataclasses
 
-    from bt_tasksim.concept.context import Known
+    from bt_tasksim.concept.seen import Known
 
     decision = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick][-1]
     hidden = decision.hidden

@@ -9,6 +9,8 @@ from py_trees.common import Status
 from py_trees.composites import Sequence
 from py_trees.decorators import Decorator
 
+from bt_tasksim.concept.functions import ConceptFunctions
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.registry import register
@@ -50,11 +52,11 @@ class Train(Decorator):
         """The child's status."""
         return self.decorated.status
 
-    def concepts(self) -> list[ConceptModel]:
+    def concepts(self) -> list[ConceptNode]:
         """All concepts of the subtree."""
         return concepts_in(self)
 
-    def learners(self) -> list[ConceptModel]:
+    def learners(self) -> list[ConceptNode]:
         """The concepts that learn: those with something unknown, whose policy is not named ``programmed``.
 
         Raises:
@@ -63,7 +65,9 @@ class Train(Decorator):
         below = [node for node in self.iterate() if isinstance(node, Train) and node is not self]
         if below:
             raise InputError(f"'{below[0].name}' stands below '{self.name}': one Train inside another")
-        found = [leaf for leaf in self.concepts() if not leaf.is_task_model and leaf.policy != "programmed"]
+        found = [
+            leaf for leaf in self.concepts() if not leaf.model.is_task_model and leaf.policy != "programmed"
+        ]
         if not found:
             names = ", ".join(f"'{leaf.name}'" for leaf in self.concepts()) or "no concept at all"
             raise InputError(
@@ -71,10 +75,11 @@ class Train(Decorator):
                 f'is_task_model = False, and its leaf does not say policy="programmed"'
             )
         for leaf in found:
-            if type(leaf).features is ConceptModel.features or _inherits_layout(type(leaf)):
+            concept = type(leaf.model)
+            if concept.features is ConceptModel.features or _inherits_layout(concept):
                 raise InputError(
                     f"'{leaf.name}' below '{self.name}' cannot learn: "
-                    f"{type(leaf).__name__} has no features() with its layout()"
+                    f"{concept.__name__} has no features() with its layout()"
                 )
         return found
 
@@ -94,13 +99,13 @@ class TrainKind(NodeKind[Train]):
         return Train(children[0], name)
 
 
-def _inherits_layout(cls: type[ConceptModel]) -> bool:
+def _inherits_layout(cls: type[ConceptFunctions]) -> bool:
     return not any("layout" in vars(base) for base in cls.__mro__[: cls.__mro__.index(ConceptModel)])
 
 
-def concepts_in(root: Behaviour) -> list[ConceptModel]:
+def concepts_in(root: Behaviour) -> list[ConceptNode]:
     """The concepts of a tree, in its order from left to right."""
-    return [node for node in nodes_of(root) if isinstance(node, ConceptModel)]
+    return [node for node in nodes_of(root) if isinstance(node, ConceptNode)]
 
 
 def train_nodes(root: Behaviour) -> list[Train]:
@@ -108,9 +113,9 @@ def train_nodes(root: Behaviour) -> list[Train]:
     return [node for node in nodes_of(root) if isinstance(node, Train)]
 
 
-def judges(leaf: ConceptModel) -> bool:
+def judges(leaf: ConceptNode) -> bool:
     """The concept says what must be true when it has succeeded."""
-    return type(leaf).sufficient_cost is not ConceptModel.sufficient_cost
+    return type(leaf.model).sufficient_cost is not ConceptModel.sufficient_cost
 
 
 def follower_of(train: Behaviour) -> tuple[Behaviour, Sequence] | None:

@@ -10,7 +10,7 @@ import pytest
 from bt_tasksim.checking.concept_file import check_concept
 from bt_tasksim.checking.recording import Recording
 from bt_tasksim.checking.situations import RecordedDecision
-from bt_tasksim.concept.context import Seen
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import poses
 from bt_tasksim.core.world import Hidden
 

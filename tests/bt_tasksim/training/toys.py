@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim.concept.condition import Condition
-from bt_tasksim.concept.context import Known, Seen
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Flag, Metres, ObjectName, Ratio
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.core.world import Command, Hidden
 
 _spec = importlib.util.spec_from_file_location("toy_world", Path(__file__).parents[2] / "conftest.py")

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim.concept.contact import ContactChange, ContactState
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.demonstrated import Shown
 from bt_tasksim.concept.parameters import Direction, MetresPerSecond, Newtons, ObjectName, Radians
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.core import poses
 from bt_tasksim.core.registry import register

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import ObjectName
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import poses
 from bt_tasksim.core.observables import Observable
 from bt_tasksim.core.poses import Array, array_namespace

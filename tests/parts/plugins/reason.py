@@ -1,7 +1,7 @@
 """A reason from outside, beside the condition that gives it: an object stands too far away."""
 
-from bt_tasksim.concept.context import Seen
 from bt_tasksim.concept.parameters import Metres
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.outcomes import Outcome, register_reason
 from bt_tasksim.core.poses import norm
 from bt_tasksim.core.units import METRES

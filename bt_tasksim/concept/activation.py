@@ -1,0 +1,265 @@
+"""What becomes of a concept from its begin to its end, in as many worlds as its tree is ticked in.
+
+`Activation` holds the arrays that a running concept has besides its values: when it began, what it remembers,
+how near to done its policy says it is. One tick is two steps: `Activation.judge` says in which worlds the
+concept can go on, and `Activation.act` carries out what was decided there. A leaf of py_trees has one for a
+single world, a batch of trees one for all of its worlds.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.functions import ConceptFunctions, any_of, booleans, first_of, sequence_of
+from bt_tasksim.concept.reporting import as_statement
+from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept.status import FAILURE, RUNNING, SUCCESS
+from bt_tasksim.core.bundles import merged, taken
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.outcomes import (
+    CANNOT_START,
+    DONE,
+    GOAL_LOST,
+    LIMIT_VIOLATED,
+    NO_WAY,
+    TIMED_OUT,
+    Outcome,
+    Statement,
+)
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.policy.policy import Action
+
+LOST_TICKS = 3
+"""Ticks in a row without a maintained goal after which it counts as lost (contacts flicker)."""
+
+
+class Judged(NamedTuple):
+    """In which worlds a concept goes on at this tick, and what is seen there.
+
+    Attributes:
+        statuses: Of all worlds that were judged ``(k,)``: RUNNING where it goes on, else FAILURE.
+        going: Positions ``(m,)`` among them of those that go on.
+        rows: Numbers ``(m,)`` of these worlds.
+        seen: What is seen in them.
+        memory: What is remembered in them.
+    """
+
+    statuses: Array
+    going: Array
+    rows: Array
+    seen: Seen
+    memory: Any
+
+    def at(self, positions: Array) -> Judged:
+        """Some of the worlds that go on, by their position among them."""
+        if len(positions) == len(self.going):
+            return self
+        return self._replace(
+            going=self.going[positions],
+            rows=self.rows[positions],
+            seen=self.seen.at(positions),
+            memory=taken(self.memory, positions),
+        )
+
+
+class Activation:
+    """A concept as it runs in the worlds of a tree.
+
+    Args:
+        leaf: The leaf that stands for it in the tree; by it commands are told apart.
+        model: What it does.
+        context: The tree's.
+    """
+
+    def __init__(self, leaf: Behaviour, model: ConceptFunctions, context: Context) -> None:
+        self._leaf, self._model, self._context = leaf, model, context
+        worlds = context.worlds
+        self.activations: Array = np.zeros(worlds, np.int64)
+        """How often it has begun ``(N,)``."""
+        self.memory: Any = None
+        """What it remembers ``(N, ...)``; None before it first began."""
+        self.outcomes: dict[int, Outcome] = {}
+        """How it ended when it was last active, by world."""
+        self._started: Array = np.zeros(worlds)
+        self._nearer: Array = np.zeros(worlds)
+        self._lost: Array = np.zeros(worlds, np.int64)
+
+    def elapsed(self, rows: Array) -> Array:
+        """Seconds ``(k,)`` since it began."""
+        return self._context.times[rows] - self._started[rows]
+
+    def seen(self, rows: Array) -> Seen:
+        """What is seen now."""
+        return self._context.seen(rows, self.elapsed(rows))
+
+    def judge(self, rows: Array, fresh: Array) -> Judged:
+        """Begin where it begins, and see where it can go on.
+
+        Args:
+            rows: The worlds ``(k,)`` in which it is ticked, ascending.
+            fresh: Boolean ``(k,)``: it begins there.
+        """
+        statuses = np.full(len(rows), RUNNING, np.int8)
+        if self.outcomes:
+            for row in rows.tolist():
+                self.outcomes.pop(row, None)
+        if fresh.any():
+            begins = rows[fresh]
+            self.activations[begins] += 1
+            self._lost[begins], self._nearer[begins] = 0, 0.0
+        for row, refusal in self._context.refused.items():
+            if refusal.leaf is self._leaf and row in rows:
+                position = int(np.searchsorted(rows, row))
+                self._fail(statuses, position, row, refusal.outcome)
+        if fresh.any():
+            self._begin(rows, fresh & (statuses == RUNNING), statuses)
+        judged = self._going(rows, statuses)
+        if not len(judged.rows):
+            return judged
+        return self._kept(rows, judged)
+
+    def act(self, judged: Judged, action: Action) -> Array:
+        """Carry decisions out; the statuses ``(k,)`` of the worlds that were judged.
+
+        Args:
+            judged: What `judge` has found.
+            action: One for each of the worlds in which it goes on.
+        """
+        model, context, statuses = self._model, self._context, judged.statuses
+        if not len(judged.rows):
+            return statuses
+        nearer = self._nearer[judged.rows] + np.asarray(action.terminate)
+        self._nearer[judged.rows] = nearer
+        done = nearer >= 1.0
+        late = ~done & (np.asarray(judged.seen.elapsed) > model.timeout)
+        ended = done | late
+        if ended.any():
+            positions = np.flatnonzero(ended)
+            ends = judged.at(positions)
+            statuses[ends.going] = np.where(done[positions], SUCCESS, FAILURE)
+            finished = judged.rows[done]
+            for goal in model.ends:
+                context.end(goal, model.actor, finished)
+            for goal in model.reaches:
+                context.reach(goal, model.actor, finished)
+            self._say_end(ends, done[positions])
+            positions = np.flatnonzero(~ended)
+            judged, motion = judged.at(positions), action.motion[positions]
+            if not len(positions):
+                return statuses
+        else:
+            motion = action.motion
+        command, after = model.carry_out(motion, judged.seen, judged.memory)
+        context.write(command, judged.rows, self._leaf)
+        if after is not judged.memory:
+            self.memory = merged(self.memory, judged.rows, after, context.worlds)
+        return statuses
+
+    # ---- judging ----------------------------------------------------------------------------------------
+
+    def _begin(self, rows: Array, fresh: Array, statuses: Array) -> None:
+        """Begin in the worlds where it can."""
+        positions = np.flatnonzero(fresh)
+        if not len(positions):
+            return
+        context, model = self._context, self._model
+        begins = rows[positions]
+        self._started[begins] = context.times[begins]
+        seen = self.seen(begins)
+        unmet = sequence_of(model.initial_state(seen), type(model).__name__)
+        cannot = np.asarray(any_of(seen.tool, unmet))
+        if cannot.any():
+            for k in np.flatnonzero(cannot).tolist():
+                why = first_of(unmet, k)
+                self._fail(statuses, int(positions[k]), int(begins[k]), CANNOT_START(why))
+            can = np.flatnonzero(~cannot)
+            if not len(can):
+                return
+            begins, positions, seen = begins[can], positions[can], seen.at(can)
+        try:
+            self.memory = merged(self.memory, begins, model.begin(seen), context.worlds)
+        except NoWayError:
+            self._begin_each(begins, positions, seen, statuses)
+
+    def _begin_each(self, begins: Array, positions: Array, seen: Seen, statuses: Array) -> None:
+        """Begin world by world: in one of them at least there is no way."""
+        for k, (row, position) in enumerate(zip(begins.tolist(), positions.tolist(), strict=True)):
+            try:
+                memory = self._model.begin(seen.at(np.array([k])))
+                self.memory = merged(self.memory, np.array([row]), memory, self._context.worlds)
+            except NoWayError as error:
+                self._fail(statuses, position, row, CANNOT_START(NO_WAY(what=error)))
+
+    def _going(self, rows: Array, statuses: Array) -> Judged:
+        """The worlds in which nothing has failed so far."""
+        going = np.flatnonzero(statuses == RUNNING)
+        on = rows[going]
+        memory = self.memory
+        if memory is not None and len(on) < self._context.worlds:
+            memory = taken(memory, on)
+        return Judged(statuses, going, on, self.seen(on), memory)
+
+    def _kept(self, rows: Array, judged: Judged) -> Judged:
+        """Those of them in which no limit is exceeded and no goal lost."""
+        model, context, seen = self._model, self._context, judged.seen
+        broken = np.asarray(model.violated(seen, judged.memory))
+        lost = np.zeros(len(judged.rows), bool)
+        missing = np.zeros(len(judged.rows), bool)
+        for goal in model.maintains:
+            held = context.reached(goal, model.actor, judged.rows)
+            if not held.any():
+                continue
+            gone = held & ~np.asarray(model.maintained(goal, seen, judged.memory)) & ~missing & ~broken
+            missing |= gone
+            over = gone & (self._lost[judged.rows] + 1 >= LOST_TICKS)
+            for k in np.flatnonzero(over).tolist():
+                measured = self._measured(judged, k)
+                outcome = GOAL_LOST(measured, object=model.actor, goal=goal)
+                self._fail(judged.statuses, int(judged.going[k]), int(judged.rows[k]), outcome)
+            context.end(goal, model.actor, judged.rows[over])
+            lost |= over
+        self._lost[judged.rows] = np.where(missing, self._lost[judged.rows] + 1, 0)
+        if broken.any():
+            limits = model.limits(seen, judged.memory)
+            for k in np.flatnonzero(broken).tolist():
+                measured = self._measured(judged, k)
+                exceeded = first_of(limits, k)
+                outcome = LIMIT_VIOLATED(measured if exceeded is None else exceeded.with_detail(measured))
+                self._fail(judged.statuses, int(judged.going[k]), int(judged.rows[k]), outcome)
+        failed = broken | lost
+        return judged.at(np.flatnonzero(~failed)) if failed.any() else judged
+
+    # ---- saying -----------------------------------------------------------------------------------------
+
+    def _measured(self, judged: Judged, position: int) -> Statement | None:
+        """Where things stand in one world, by its position among those that go on."""
+        one = judged.at(np.array([position]))
+        said = as_statement(self._model.explain(one.seen, one.memory))
+        return None if said is None else said.at(0)
+
+    def _say_end(self, ends: Judged, done: Array) -> None:
+        """How it ended where it was done, or late."""
+        said = as_statement(self._model.explain(ends.seen, ends.memory))
+        elapsed = np.asarray(ends.seen.elapsed).tolist()
+        for k, row in enumerate(ends.rows.tolist()):
+            measured = None if said is None else said.at(k)
+            if done[k]:
+                self.outcomes[row] = DONE(measured, elapsed=elapsed[k])
+            else:
+                self.outcomes[row] = TIMED_OUT(measured, limit=self._model.timeout)
+
+    def _fail(self, statuses: Array, position: int, row: int, why: Outcome) -> None:
+        statuses[position] = FAILURE
+        self.outcomes[row] = why
+
+
+def no_action(judged: Judged, size: int) -> Action:
+    """The middle of an action ``(m, size)``, and not done, for the worlds that go on."""
+    tool = judged.seen.tool
+    xp = array_namespace(tool)
+    motion = xp.zeros((len(judged.rows), size), dtype=tool.dtype, device=tool.device)
+    return Action(motion, booleans(tool, False))

@@ -1,0 +1,137 @@
+"""The views through which the pure functions of concepts look at an observation and at the hidden state.
+
+They resolve names to columns. All arrays have a leading axis of worlds ``(N, ...)``, N = 1 included.
+"""
+
+from __future__ import annotations
+
+from bt_tasksim.core.bundles import Rows
+from bt_tasksim.core.facts import ObjectFacts, PlaceFacts, WorldFacts
+from bt_tasksim.core.observables import observable
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.world import Hidden, Observation
+from bt_tasksim.robot.description import RobotDescription
+
+
+class Seen:
+    """An observation of ``N`` worlds, with names resolved.
+
+    Args:
+        observation: What was observed ``(N, ...)``.
+        world: What is known beforehand of these worlds.
+        robot: The robot.
+        elapsed: ``(N,)`` seconds since the concept became active.
+    """
+
+    __slots__ = ("_derived", "elapsed", "observation", "robot", "world")
+
+    def __init__(
+        self, observation: Observation, world: WorldFacts, robot: RobotDescription, elapsed: Array
+    ) -> None:
+        self.observation = observation
+        self.world = world
+        self.robot = robot
+        self.elapsed = elapsed
+        self._derived: dict[str, Array] | None = None
+
+    def at(self, rows: Array) -> Seen:
+        """The view of some of these worlds.
+
+        Args:
+            rows: Their numbers ``(k,)``, ascending.
+        """
+        picked: Observation = Rows(self.observation, lambda values: values[rows])  # type: ignore[assignment]
+        return Seen(picked, self.world.map(lambda values: values[rows]), self.robot, self.elapsed[rows])
+
+    def observable(self, name: str) -> Array:
+        """An observable by its name, computed when it is first asked for.
+
+        Raises:
+            InputError: There is none of this name.
+        """
+        if self._derived is None:
+            self._derived = {}
+        if name not in self._derived:
+            self._derived[name] = observable(name).read(self.observation, self.world)
+        return self._derived[name]
+
+    @property
+    def tool(self) -> Array:
+        """Tool pose ``(N, 7)``."""
+        return self.observation.tool_pose
+
+    @property
+    def closure(self) -> Array:
+        """Closure of the hand ``(N,)``."""
+        return self.observation.closure
+
+    @property
+    def contacts(self) -> Array:
+        """Fingertip contacts ``(N, n_tips)``."""
+        return self.observation.contacts
+
+    @property
+    def wrench(self) -> Array:
+        """External wrench at the tool ``(N, 6)``."""
+        return self.observation.wrench
+
+    def object(self, name: str) -> Array:
+        """Estimated pose ``(N, 7)`` of an object; NaN where it was never seen."""
+        return self.observation.objects[:, self.world.column(name), :]
+
+    def model(self, name: str) -> ObjectFacts:
+        """What is known beforehand of an object."""
+        return self.world.object(name)
+
+    def place(self, name: str) -> PlaceFacts:
+        """A place of the scene."""
+        return self.world.place(name)
+
+    def opposed(self) -> Array:
+        """Boolean ``(N,)``: at least one fingertip of each opposing group touches something."""
+        contacts, out = self.observation.contacts, None
+        for group in self.robot.opposition:
+            touched = contacts[:, group[0]]
+            for i in group[1:]:
+                touched = touched | contacts[:, i]
+            out = touched if out is None else out & touched
+        assert out is not None, "a robot has opposing groups"
+        return out
+
+
+class Known:
+    """The hidden state of ``N`` worlds, with names resolved.
+
+    Args:
+        hidden: The state now ``(N, ...)``.
+        world: What is known beforehand of these worlds.
+        began: The state when the concept became active; None where nobody kept it.
+    """
+
+    __slots__ = ("began", "hidden", "world")
+
+    def __init__(self, hidden: Hidden, world: WorldFacts, began: Hidden | None = None) -> None:
+        self.hidden = hidden
+        self.world = world
+        self.began = began
+
+    def object(self, name: str) -> Array:
+        """True pose ``(N, 7)`` of an object."""
+        return self.hidden.objects[:, self.world.column(name), :]
+
+    def velocity(self, name: str) -> Array:
+        """Linear and angular velocity ``(N, 6)`` of an object."""
+        return self.hidden.velocities[:, self.world.column(name), :]
+
+    def hand_force(self, name: str) -> Array:
+        """Sum ``(N,)`` of the hand's contact forces on an object, N."""
+        return self.hidden.hand_force[:, self.world.column(name)]
+
+    def supported(self, name: str) -> Array:
+        """Boolean ``(N,)``: an object touches something besides the hand."""
+        rows = self.hidden.support[:, self.world.column(name), :]
+        return array_namespace(rows).any(rows, axis=-1)
+
+    def place(self, name: str) -> PlaceFacts:
+        """A place of the scene."""
+        return self.world.place(name)

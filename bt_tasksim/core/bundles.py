@@ -1,0 +1,105 @@
+"""Bundles of arrays with a leading axis of worlds: what a concept remembers, taken apart and put together.
+
+A bundle is an array, or a named tuple, dataclass, tuple, list or mapping of bundles; None and text stand for
+themselves.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array, array_namespace
+
+
+def parts(bundle: Any) -> dict[str, Any] | None:
+    """The parts of a bundle, by name; None for an array or anything else that has none."""
+    if isinstance(bundle, tuple) and hasattr(bundle, "_asdict"):
+        return dict(bundle._asdict())
+    if dataclasses.is_dataclass(bundle) and not isinstance(bundle, type):
+        return {f.name: getattr(bundle, f.name) for f in dataclasses.fields(bundle) if f.init}
+    if isinstance(bundle, Mapping):
+        return {str(k): v for k, v in bundle.items()}
+    if isinstance(bundle, tuple | list):
+        return {str(k): v for k, v in enumerate(bundle)}
+    return None
+
+
+def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
+    """A bundle like the first one, whose arrays are made by ``function`` from those of all of them."""
+    first = bundles[0]
+    inner = parts(first)
+    if first is None or isinstance(first, str):
+        return first
+    if inner is None:
+        return function(*bundles)
+    others = [parts(b) or {} for b in bundles]
+    made = {k: mapped(function, *(o[k] for o in others)) for k in inner}
+    if isinstance(first, Mapping):
+        return dict(zip(first, made.values(), strict=True))
+    if isinstance(first, tuple | list) and not hasattr(first, "_asdict"):
+        return type(first)(made.values())
+    return type(first)(**made)
+
+
+def taken(bundle: Any, rows: Array) -> Any:
+    """The worlds ``rows (k,)`` of a bundle."""
+    return mapped(lambda values: values[rows], bundle)
+
+
+def merged(whole: Any, rows: Array, new: Any, worlds: int) -> Any:
+    """A bundle of ``worlds`` worlds in which those at ``rows (k,)`` are ``new``; nothing given is changed.
+
+    Args:
+        whole: The bundle before; None where there was none: the other worlds are filled with zeros.
+        rows: Which worlds.
+        new: Of these worlds.
+        worlds: How many there are in all.
+
+    Raises:
+        InputError: The worlds do not fit together, since their arrays have unlike shapes.
+    """
+    if len(rows) == worlds:
+        return new
+    if whole is None:
+        return mapped(lambda values: _spread(values, rows, worlds), new)
+    return mapped(lambda before, values: _replaced(before, rows, values), whole, new)
+
+
+def _spread(values: Array, rows: Array, worlds: int) -> Array:
+    xp = array_namespace(values)
+    out = xp.zeros((worlds, *values.shape[1:]), dtype=values.dtype, device=values.device)
+    out[rows] = values
+    return out
+
+
+def _replaced(before: Array, rows: Array, values: Array) -> Array:
+    if before.shape[1:] != values.shape[1:]:
+        raise InputError(
+            f"the memories of unlike worlds do not fit together: {tuple(before.shape[1:])} and "
+            f"{tuple(values.shape[1:])}; pad what is of unlike length"
+        )
+    out = array_namespace(before).asarray(before, copy=True)
+    out[rows] = values
+    return out
+
+
+class Rows:
+    """Some rows of a bundle's arrays, each taken when it is first looked at.
+
+    Args:
+        bundle: Something with arrays as attributes.
+        change: What is done to each, such as taking rows.
+    """
+
+    def __init__(self, bundle: Any, change: Callable[[Array], Array]) -> None:
+        self._bundle, self._change = bundle, change
+
+    def __getattr__(self, name: str) -> Array:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        found = self._change(getattr(self._bundle, name))
+        self.__dict__[name] = found
+        return found

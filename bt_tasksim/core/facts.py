@@ -1,0 +1,448 @@
+"""What is known beforehand of the worlds of a batch, as arrays with a leading axis of worlds.
+
+`WorldModel` says it of one world, with names. Here names are columns, the same for all worlds: a world that
+lacks an object has a column for it all the same, in which `ObjectFacts.present` is false. Symmetries and
+grasp axes, of which objects have unlike many, are padded, with masks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
+
+import numpy as np
+
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.world import ObjectModel, PlaceModel, WorldModel
+
+_T = TypeVar("_T", bound="Facts")
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A bundle of arrays with the same leading dimensions."""
+
+    def map(self: _T, change: Callable[[Array], Array]) -> _T:
+        """The same facts, each array changed."""
+        return type(self)(**{f.name: change(getattr(self, f.name)) for f in fields(self)})
+
+
+@dataclass(frozen=True)
+class ObjectFacts(Facts):
+    """What is known beforehand of objects; leading dimensions ``(...)``, see `ObjectModel`.
+
+    Attributes:
+        present: Boolean ``(...)``: the world has it; else the numbers are of no meaning.
+        extent: Full nominal bounding-box size ``(..., 3)``, metres.
+        revolved: Boolean ``(...)``: a body of revolution about z.
+        cubic: Boolean ``(...)``: it looks the same on each of its faces.
+        rotations: Rotations ``(..., most, 4)`` that bring it onto itself, in its own frame; the first one is
+            the identity. Of a body of revolution only that.
+        rotation_counts: Boolean ``(..., most)``: there is such a rotation.
+        grasp_axes: Directions ``(..., most, 3)`` along which two fingers may close on it, best first.
+        grasp_widths: Widths ``(..., most)`` along these, metres; infinite where there is no further axis.
+    """
+
+    present: Array
+    extent: Array
+    revolved: Array
+    cubic: Array
+    rotations: Array
+    rotation_counts: Array
+    grasp_axes: Array
+    grasp_widths: Array
+
+    @property
+    def standing_height(self) -> Array:
+        """Height ``(...)`` of its centre above what it stands on: a cube may stand on any face, metres."""
+        xp = array_namespace(self.extent)
+        return xp.where(self.cubic, xp.max(self.extent, axis=-1), self.extent[..., 2]) / 2
+
+
+@dataclass(frozen=True)
+class PlaceFacts(Facts):
+    """Calibrated places; leading dimensions ``(...)``, see `PlaceModel`.
+
+    Attributes:
+        present: Boolean ``(...)``: the world has it; else the numbers are of no meaning.
+        pose: Poses ``(..., 7)``.
+        extent: Full size ``(..., 2)``, metres.
+        centre: Centre ``(..., 2)`` in the place's frame, metres.
+        height: Free height ``(...)``, metres.
+        access: Unit vectors ``(..., 3)``.
+        exit: Unit vectors ``(..., 3)``.
+        clearance: ``(...)`` metres.
+        container: Boolean ``(...)``: it is one, such as a bin, and ``height`` is that of its walls.
+    """
+
+    present: Array
+    pose: Array
+    extent: Array
+    centre: Array
+    height: Array
+    access: Array
+    exit: Array
+    clearance: Array
+    container: Array
+
+    @property
+    def rim(self) -> Array:
+        """Height ``(...)`` above the place's origin that a thing has to be lifted over, metres."""
+        xp = array_namespace(self.height)
+        return xp.where(self.container, self.height, xp.zeros_like(self.height))
+
+
+@dataclass(frozen=True)
+class ObstacleFacts(Facts):
+    """Boxes to keep clear of; leading dimensions ``(N, most)``.
+
+    Attributes:
+        present: Boolean: there is one.
+        pose: Poses ``(..., 7)``.
+        size: Full sizes ``(..., 3)``, metres.
+    """
+
+    present: Array
+    pose: Array
+    size: Array
+
+
+@dataclass(frozen=True)
+class WorldFacts:
+    """What is known beforehand of ``N`` worlds.
+
+    Attributes:
+        columns: Column of each object's name in all arrays of objects; `Observation` and `Hidden` have the
+            same ones.
+        places: Column of each place's name.
+        tips: Names of the fingertips.
+        opening: Widest distance between opposing fingertips, metres.
+        control_period: Seconds from one tick to the next, the same in all worlds.
+        object_facts: ``(N, n_objects)``.
+        place_facts: ``(N, n_places)``.
+        obstacle_facts: ``(N, most)``.
+    """
+
+    columns: Mapping[str, int]
+    place_columns: Mapping[str, int]
+    tips: tuple[str, ...]
+    opening: float
+    control_period: float
+    object_facts: ObjectFacts
+    place_facts: PlaceFacts
+    obstacle_facts: ObstacleFacts
+
+    @classmethod
+    def of(
+        cls,
+        worlds: Sequence[WorldModel],
+        names: Sequence[str] | None = None,
+        places: Sequence[str] | None = None,
+    ) -> WorldFacts:
+        """The facts of worlds, one row each.
+
+        Args:
+            worlds: What is known of each.
+            names: The objects' names in the order of the columns; by default all that there are.
+            places: The places' names, likewise.
+
+        Raises:
+            InputError: They have unlike control rates or hands, or there is none.
+        """
+        if not worlds:
+            raise InputError("a batch needs at least one world")
+        first = worlds[0]
+        for world in worlds:
+            if (world.control_period, world.opening, world.tips) != (
+                first.control_period,
+                first.opening,
+                first.tips,
+            ):
+                raise InputError("the worlds of a batch should have one robot and one control rate")
+        if names is None:
+            names = list(dict.fromkeys(model.name for world in worlds for model in world.objects))
+        if places is None:
+            places = list(dict.fromkeys(name for world in worlds for name in world.places))
+        return cls(
+            columns={name: k for k, name in enumerate(names)},
+            place_columns={name: k for k, name in enumerate(places)},
+            tips=first.tips,
+            opening=first.opening,
+            control_period=first.control_period,
+            object_facts=_object_facts(
+                [[w.objects[w.index[n]] if n in w.index else None for n in names] for w in worlds]
+            ),
+            place_facts=_place_facts([[w.places.get(name) for name in places] for w in worlds]),
+            obstacle_facts=_obstacle_facts(worlds),
+        )
+
+    @property
+    def worlds(self) -> int:
+        """How many there are."""
+        return int(self.object_facts.present.shape[0])
+
+    def map(self, change: Callable[[Array], Array]) -> WorldFacts:
+        """The same facts, each array changed: taken by rows, or brought to another library or device."""
+        return WorldFacts(
+            self.columns,
+            self.place_columns,
+            self.tips,
+            self.opening,
+            self.control_period,
+            self.object_facts.map(change),
+            self.place_facts.map(change),
+            self.obstacle_facts.map(change),
+        )
+
+    def column(self, name: str) -> int:
+        """Column of an object.
+
+        Raises:
+            InputError: No world has such an object.
+        """
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise InputError(f"no object '{name}' in the scene{nearest(name, self.columns)}") from None
+
+    def place_column(self, name: str) -> int:
+        """Column of a place.
+
+        Raises:
+            InputError: No world has such a place.
+        """
+        try:
+            return self.place_columns[name]
+        except KeyError:
+            raise InputError(f"no place '{name}' in the scene{nearest(name, self.place_columns)}") from None
+
+    def object(self, name: str) -> ObjectFacts:
+        """What is known of an object: leading dimension ``(N,)``.
+
+        Raises:
+            InputError: No world has such an object.
+        """
+        column = self.column(name)
+        return self.object_facts.map(lambda values: values[:, column, ...])
+
+    def place(self, name: str) -> PlaceFacts:
+        """A place: leading dimension ``(N,)``.
+
+        Raises:
+            InputError: No world has such a place.
+        """
+        column = self.place_column(name)
+        return self.place_facts.map(lambda values: values[:, column, ...])
+
+    def place_at(self, index: Array) -> PlaceFacts:
+        """The places of columns ``(N,)``, one in each world."""
+        return self.place_facts.map(lambda values: take_rows(values, index))
+
+
+def take_rows(values: Array, index: Array) -> Array:
+    """Of ``values (N, n, ...)`` the entry ``index (N,)`` of each row: ``(N, ...)``."""
+    xp = array_namespace(values)
+    if values.ndim == 2:
+        return xp.take_along_axis(values, index[:, None], axis=1)[:, 0]
+    shape = (values.shape[0], 1, *values.shape[2:])
+    spread = xp.broadcast_to(xp.reshape(index, (-1, *(1,) * (values.ndim - 1))), shape)
+    return xp.take_along_axis(values, spread, axis=1)[:, 0, ...]
+
+
+def _object_facts(rows: Sequence[Sequence[ObjectModel | None]]) -> ObjectFacts:
+    models = [model for row in rows for model in row]
+    turns = [_IDENTITY if model is None else rotations(model) for model in models]
+    axes = [((0.0, 1.0, 0.0),) if model is None else model.grasp_axes for model in models]
+    widths = [(np.inf,) if model is None else model.grasp_widths for model in models]
+    shape = (len(rows), len(rows[0]))
+    turned, counts = _padded(turns, shape, 0.0)
+    counts[..., 0] = True
+    turned[~counts] = _IDENTITY[0]
+    return ObjectFacts(
+        present=np.array([model is not None for model in models], bool).reshape(shape),
+        extent=np.array([(1.0,) * 3 if m is None else m.extent for m in models], float).reshape(*shape, 3),
+        revolved=np.array([m is not None and m.symmetry == 0 and not m.cubic for m in models], bool).reshape(
+            shape
+        ),
+        cubic=np.array([m is not None and m.cubic for m in models], bool).reshape(shape),
+        rotations=turned,
+        rotation_counts=counts,
+        grasp_axes=_padded(axes, shape, 0.0)[0],
+        grasp_widths=_padded(widths, shape, np.inf)[0],
+    )
+
+
+def _place_facts(rows: Sequence[Sequence[PlaceModel | None]]) -> PlaceFacts:
+    shape = (len(rows), len(rows[0]))
+    places = [place for row in rows for place in row]
+
+    def each(value: Callable[[PlaceModel], Any], nothing: Any) -> Array:
+        found = [nothing if place is None else value(place) for place in places]
+        return np.array(found, bool if isinstance(nothing, bool) else float).reshape(
+            *shape, *np.shape(nothing)
+        )
+
+    up = (0.0, 0.0, 1.0)
+    return PlaceFacts(
+        present=each(lambda place: True, False),
+        pose=each(lambda place: place.pose, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)),
+        extent=each(lambda place: place.extent, (0.0, 0.0)),
+        centre=each(lambda place: place.centre, (0.0, 0.0)),
+        height=each(lambda place: place.height, 0.0),
+        access=each(lambda place: place.access, up),
+        exit=each(lambda place: place.exit, up),
+        clearance=each(lambda place: place.clearance, 0.0),
+        container=each(lambda place: place.kind == "bin", False),
+    )
+
+
+def _obstacle_facts(worlds: Sequence[WorldModel]) -> ObstacleFacts:
+    most = max(len(world.obstacles) for world in worlds)
+    shape = (len(worlds), most)
+    present, pose, size = np.zeros(shape, bool), np.zeros((*shape, 7)), np.zeros((*shape, 3))
+    pose[..., 3] = 1.0
+    for i, world in enumerate(worlds):
+        for k, box in enumerate(world.obstacles):
+            present[i, k], pose[i, k], size[i, k] = True, box.pose, box.size
+    return ObstacleFacts(present, pose, size)
+
+
+def _padded(rows: Sequence[Any], shape: tuple[int, int], nothing: float) -> tuple[Array, Array]:
+    """Lists of unlike lengths as one array ``(*shape, most, ...)``, and which entries are there."""
+    most = max((len(row) for row in rows), default=1)
+    inner = np.shape(rows[0][0]) if rows else ()
+    out, there = np.full((len(rows), most, *inner), nothing), np.zeros((len(rows), most), bool)
+    for i, row in enumerate(rows):
+        out[i, : len(row)] = row
+        there[i, : len(row)] = True
+    return out.reshape(*shape, most, *inner), there.reshape(*shape, most)
+
+
+def rotations(model: ObjectModel) -> Array:
+    """Rotations ``(k, 4)`` that bring an object onto itself, in its own frame."""
+    if model.cubic:
+        return _CUBE
+    if model.symmetry == 0:
+        return _IDENTITY
+    return np.array([poses.yaw(2 * np.pi * k / model.symmetry) for k in range(model.symmetry)])
+
+
+def _cube_rotations() -> Array:
+    quarter = np.array([poses.yaw(k * np.pi / 2) for k in range(4)])
+    turns = [(0.0, 0, 0), (1.0, 0, 0), (2.0, 0, 0), (-1.0, 0, 0), (0.0, 1, 0), (0.0, -1, 0)]
+    tips = poses.from_rotation_vector(np.array(turns) * np.pi / 2)
+    return poses.quat_multiply(quarter[None], tips[:, None]).reshape(-1, 4)
+
+
+_IDENTITY = np.array([[1.0, 0.0, 0.0, 0.0]])
+_CUBE = _cube_rotations()
+
+
+class FactsTable:
+    """The facts of a batch whose worlds begin anew one by one.
+
+    Args:
+        worlds: How many there are.
+    """
+
+    def __init__(self, worlds: int) -> None:
+        self._models: list[WorldModel | None] = [None] * worlds
+        self._single: list[WorldFacts | None] = [None] * worlds
+        self._facts: WorldFacts | None = None
+        self._taken: dict[bytes, WorldFacts] = {}
+
+    def replace(self, rows: Array, models: Sequence[WorldModel]) -> None:
+        """Other worlds begin at ``rows (k,)``.
+
+        Raises:
+            InputError: See `WorldFacts.of`.
+        """
+        for row, model in zip(rows.tolist(), models, strict=True):
+            self._models[row], self._single[row] = model, None
+        self._facts = None
+        self._taken.clear()
+
+    @property
+    def facts(self) -> WorldFacts | None:
+        """The facts of all worlds; those that never began have the facts of one that did. None before any.
+
+        Raises:
+            InputError: See `WorldFacts.of`.
+        """
+        if self._facts is None:
+            first = next((model for model in self._models if model is not None), None)
+            if first is None:
+                return None
+            models = [first if model is None else model for model in self._models]
+            names = list(dict.fromkeys(m.name for model in models for m in model.objects))
+            places = list(dict.fromkeys(name for model in models for name in model.places))
+            for row, model in enumerate(models):
+                known = self._single[row]
+                if known is None or list(known.columns) != names or list(known.place_columns) != places:
+                    self._single[row] = WorldFacts.of([model], names, places)
+            self._facts = joined([facts for facts in self._single if facts is not None])
+        return self._facts
+
+    def taken(self, rows: Array) -> WorldFacts:
+        """The facts of some worlds ``rows (k,)``."""
+        key = rows.tobytes() if isinstance(rows, np.ndarray) else bytes(np.asarray(rows))
+        if key not in self._taken:
+            facts = self.facts
+            assert facts is not None, "worlds have begun"
+            if len(self._taken) > 64:
+                self._taken.clear()
+            self._taken[key] = facts.map(lambda values: values[rows])
+        return self._taken[key]
+
+
+def joined(worlds: Sequence[WorldFacts]) -> WorldFacts:
+    """The facts of several batches as those of one; names are those of the first one.
+
+    Raises:
+        InputError: They have unlike control rates or hands.
+    """
+    first = worlds[0]
+    for other in worlds:
+        if (other.control_period, other.opening, other.tips) != (
+            first.control_period,
+            first.opening,
+            first.tips,
+        ):
+            raise InputError("the worlds of a batch should have one robot and one control rate")
+
+    def join(kind: str) -> Any:
+        bundles = [getattr(facts, kind) for facts in worlds]
+        return type(bundles[0])(
+            **{
+                f.name: _concatenated([getattr(b, f.name) for b in bundles], f.name == "grasp_widths")
+                for f in fields(bundles[0])
+            }
+        )
+
+    return WorldFacts(
+        first.columns,
+        first.place_columns,
+        first.tips,
+        first.opening,
+        first.control_period,
+        join("object_facts"),
+        join("place_facts"),
+        join("obstacle_facts"),
+    )
+
+
+def _concatenated(arrays: Sequence[Array], infinite: bool) -> Array:
+    """Arrays ``(n, ...)`` one below the other; what is shorter is filled with zeros, or infinity."""
+    shapes = {array.shape[1:] for array in arrays}
+    if len(shapes) > 1:
+        most = tuple(np.max(list(shapes), axis=0).tolist())
+        filled = []
+        for array in arrays:
+            out = np.full((array.shape[0], *most), np.inf if infinite else 0, array.dtype)
+            out[(slice(None), *(slice(0, n) for n in array.shape[1:]))] = array
+            filled.append(out)
+        arrays = filled
+    return np.concatenate(arrays)
