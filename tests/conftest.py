@@ -15,6 +15,8 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_tasksim.concept.context import one_world
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import plugins, poses
@@ -152,7 +154,7 @@ class Toy:
 
     def look(self) -> None:
         """Have the leaves see the world as it now is, without a step."""
-        self.context.advance(self.world.now)
+        self.context.advance(one_world(self.world.now))
 
     def tick(self, n: int = 1) -> Status:
         """Tick and step, n times or until the tree ends."""
@@ -160,7 +162,7 @@ class Toy:
             self.runner.tick()
             if self.tree.status != Status.RUNNING:
                 break
-            self.context.advance(self.world.step(self.context.command))
+            self.context.advance(one_world(self.world.step(self.context.command)))
         return self.tree.status
 
 
@@ -170,36 +172,40 @@ def toy() -> type[Toy]:
     return Toy
 
 
-class Act(ConceptModel):
-    """A concept for tests: commands the parts it is told to, and is done after some time."""
-
-    actions = 0
+class ActLeaf(ConceptNode):
+    """A leaf for tests, which keeps how it ended."""
 
     def __init__(self, name, parts="tool", ticks=3, height=0.4, **settings):
         super().__init__(name=name, **settings)
-        self.parts, self.ticks, self.height = parts.split(), ticks, height
+        self.model.parts, self.model.ticks, self.model.height = parts.split(), ticks, height
         self.ended: list[Status] = []
 
+    def terminate(self, new_status: Status) -> None:
+        self.ended.append(new_status)
+        super().terminate(new_status)
+
+
+class Act(ConceptModel):
+    """A concept for tests: commands the parts it is told to, and is done after some time."""
+
+    leaf_base = ActLeaf
+
     def begin(self, seen: Seen) -> Any:
-        return 0
+        return np.zeros(len(seen.tool), int)
 
     def advance(self, action: Any, seen: Seen, memory: Any) -> Any:
         return memory + 1
 
     def command(self, action: Any, seen: Seen, memory: Any) -> Command:
         tool = seen.tool.copy()
-        tool[2] = self.height
+        tool[:, 2] = self.height
         return Command(
             tool=tool if "tool" in self.parts else None,
-            hand=np.array([0.5]) if "hand" in self.parts else None,
+            hand=np.full((len(tool), 1), 0.5) if "hand" in self.parts else None,
         )
 
     def done(self, seen: Seen, memory: Any) -> Any:
-        return np.bool_(memory >= self.ticks)
-
-    def terminate(self, new_status: Status) -> None:
-        self.ended.append(new_status)
-        super().terminate(new_status)
+        return memory >= self.ticks
 
 
 @pytest.fixture

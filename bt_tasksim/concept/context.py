@@ -261,7 +261,8 @@ class _Part:
         rows_of = len(shape) == 2 and shape[0] == worlds and shape[1] > 0
         if rows_of and (self._name == "hand" or shape[1] == 7):
             return found
-        place = place_of(getattr(type(leaf), "command", type(leaf)))
+        writer = type(getattr(leaf, "model", leaf))
+        place = place_of(getattr(writer, "command", writer))
         where = f" ({place})" if place else ""
         raise LeafError(
             f"leaf '{leaf.name}'{where} commands {self._name}={shown(repr(values))}: {WANTED[self._name]}"

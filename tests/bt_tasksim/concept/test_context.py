@@ -6,6 +6,7 @@ from py_trees.behaviours import Failure
 from py_trees.common import Status
 
 from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp, TimePassed
 from bt_tasksim.core.errors import CommandConflictError, InputError, LeafError
 from bt_tasksim.core.outcomes import INTERRUPTED, TIMED_OUT
@@ -13,20 +14,23 @@ from bt_tasksim.core.world import Command
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.trees import fallback, parallel, reactive_fallback, sequence
 
-TOOL, HAND = Command(tool=np.arange(7.0)), Command(hand=np.array([0.3]))
+TOOL, HAND = Command(tool=np.arange(7.0)[None]), Command(hand=np.array([[0.3]]))
 
 
 def test_parts_are_written_apart(toy, act):
     a, b = act("a"), act("b")
     stage = toy(sequence("root", a, b))
     context = stage.context
-    context.write(TOOL, a)
-    context.write(HAND, b)
-    assert context.command.tool is TOOL.tool and context.command.hand is HAND.hand
-    context.withdraw(a)
-    assert context.command.tool is None and context.command.hand is HAND.hand
-    context.write(TOOL, b)
-    assert context.command.tool is TOOL.tool
+    context.write(TOOL, ONE, a)
+    context.write(HAND, ONE, b)
+    assert np.array_equal(context.command.tool, TOOL.tool[0])
+    assert np.array_equal(context.command.hand, HAND.hand[0])
+    assert context.tool_writer() is a
+    context.withdraw(a, ONE)
+    assert context.command.tool is None and np.array_equal(context.command.hand, HAND.hand[0])
+    assert context.tool_writer() is None
+    context.write(TOOL, ONE, b)
+    assert np.array_equal(context.command.tool, TOOL.tool[0])
     stage.look()
     assert context.command == Command()
 
@@ -104,17 +108,17 @@ def test_a_reactive_node_that_switches_leaves_one_command(toy, act):
 
 def test_goals_are_reached_ended_and_forgotten_with_the_episode(toy, act):
     stage = toy(act("move"))
-    stage.context.reach("holding", "cup")
-    assert stage.context.reached("holding", "cup") and not stage.context.reached("holding", "box")
-    stage.context.end("holding", "box")
-    assert stage.context.reached("holding", "cup")
+    stage.context.reach("holding", "cup", ONE)
+    assert stage.context.reached("holding", "cup", ONE) and not stage.context.reached("holding", "box", ONE)
+    stage.context.end("holding", "box", ONE)
+    assert stage.context.reached("holding", "cup", ONE)
     stage.runner.begin(1)
-    assert not stage.context.reached("holding", "cup")
+    assert not stage.context.reached("holding", "cup", ONE)
 
 
 def test_outside_an_episode_nothing_can_be_read():
     context = Context(load_robot("panda"))
-    for read in (lambda: context.world, lambda: context.observation, lambda: context.seen(0.0)):
+    for read in (lambda: context.world, lambda: context.observation, lambda: context.seen(ONE, np.zeros(1))):
         with pytest.raises(RuntimeError, match="no episode has begun"):
             read()
 
@@ -130,8 +134,8 @@ def test_a_leaf_without_a_context_says_what_to_do():
 
 def test_names_are_resolved_or_refused_with_the_nearest(toy, act):
     stage = toy(act("move"))
-    seen = stage.context.seen(0.0)
-    assert np.array_equal(seen.object("box"), stage.world.now.objects[1])
+    seen = stage.context.seen(ONE, np.zeros(1))
+    assert np.array_equal(seen.object("box"), stage.world.now.objects[None, 1])
     with pytest.raises(InputError, match="no object 'bax' in the scene; did you mean 'box'"):
         seen.object("bax")
     with pytest.raises(InputError, match="no place 'gaol' in the scene; did you mean 'goal'"):

@@ -38,4 +38,4 @@ def test_a_concept_without_one_is_a_concept_all_the_same():
         def done(self, seen, memory):
             raise NotImplementedError
 
-    assert Hum().begin(None) is None and Hum.parameters() == {}
+    assert Hum.value().begin(None) is None and Hum.parameters() == {}

@@ -1,13 +1,15 @@
 """The life of a leaf: it acts, it completes, it fails with a reason, it is interrupted."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from py_trees.common import Status
 
+from bt_tasksim.concept.activation import LOST_TICKS
 from bt_tasksim.concept.condition import Condition
-from bt_tasksim.concept.leaf import LOST_TICKS
+from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Metres, ObjectName
@@ -19,9 +21,8 @@ from bt_tasksim.core.outcomes import (
     GOAL_LOST,
     INTERRUPTED,
     LIMIT_VIOLATED,
-    PRECONDITION_UNMET,
-    TEXT,
     TIMED_OUT,
+    Form,
     register_reason,
 )
 from bt_tasksim.core.units import METRES, SECONDS
@@ -71,7 +72,7 @@ class BitByBit:
     name = "bit by bit"
 
     def act(self, model, seen, memory):
-        return Action(model.programmed_motion(seen, memory), np.float64(1.0 / 3.0 + 1e-12))
+        return Action(model.programmed_motion(seen, memory), np.full(len(seen.tool), 1.0 / 3.0 + 1e-12))
 
 
 def test_shares_of_done_add_up_within_an_activation_and_no_further(toy, act):
@@ -86,6 +87,8 @@ def test_shares_of_done_add_up_within_an_activation_and_no_further(toy, act):
 
 
 TOO_LOW = register_reason("test_too_low", "{what} lower than {value}: {limit}", value=METRES, limit=METRES)
+TOO_HIGH = register_reason("test_too_high", "the tool is {value} high", value=METRES)
+GONE = Form("{time:.2f} gone", {"time": SECONDS})
 TOO_LATE = register_reason("test_too_late", "{value} are more than {limit}", value=SECONDS, limit=SECONDS)
 
 
@@ -98,22 +101,23 @@ class Careful(ConceptModel):
     held = True
 
     def initial_state(self, seen):
-        return "" if seen.tool[2] < 0.6 else f"the tool is {seen.tool[2]:.2f} m high"
+        height = seen.tool[:, 2]
+        return TOO_HIGH.where(height >= 0.6, value=height)
 
     def command(self, action, seen, memory):
         return Command(tool=seen.tool)
 
     def done(self, seen, memory):
-        return np.False_
+        return np.zeros(len(seen.tool), bool)
 
     def violated(self, seen, memory):
         return seen.elapsed > self.limit
 
     def maintained(self, goal, seen, memory):
-        return np.bool_(type(self).held)
+        return np.full(len(seen.tool), type(self).held)
 
     def explain(self, seen, memory):
-        return f"{float(seen.elapsed):.2f} s gone"
+        return GONE(time=seen.elapsed)
 
 
 @pytest.fixture
@@ -127,15 +131,16 @@ def test_an_unmet_precondition_is_a_failure_without_a_command(toy, careful):
     stage.world.put(tool_pose=stage.world.now.tool_pose + np.array([0, 0, 0.3, 0, 0, 0, 0]))
     stage.look()
     assert stage.tick() == Status.FAILURE
-    assert careful.outcome == CANNOT_START(PRECONDITION_UNMET(text="the tool is 0.65 m high"))
-    assert careful.feedback_message == careful.outcome.sentence
+    assert careful.outcome == CANNOT_START(TOO_HIGH(value=stage.world.now.tool_pose[2]))
+    assert careful.feedback_message == careful.outcome.sentence == "cannot start: the tool is 650 mm high"
     assert stage.context.command == Command()
 
 
 def test_a_violated_limit_is_a_failure_with_numbers(toy):
     leaf = Careful("cup", limit=0.12)
     assert toy(leaf).tick(100) == Status.FAILURE
-    assert leaf.outcome == LIMIT_VIOLATED(TEXT(text="0.15 s gone"))
+    assert leaf.outcome.is_a(LIMIT_VIOLATED) and leaf.outcome.detail.form is GONE
+    assert leaf.outcome.detail.numbers == pytest.approx({"time": 0.15})
 
 
 class Heights(Careful):
@@ -143,8 +148,8 @@ class Heights(Careful):
 
     def limits(self, seen, memory):
         return (
-            Limit(TOO_LOW, 0.1, seen.tool[..., 2], {"what": "tool"}),
-            Limit(TOO_LATE, seen.elapsed, self.limit, counts=seen.tool[..., 2] > 0.0),
+            Limit(TOO_LOW, np.full(len(seen.tool), 0.1), seen.tool[:, 2], {"what": "tool"}),
+            Limit(TOO_LATE, seen.elapsed, self.limit, counts=seen.tool[:, 2] > 0.0),
         )
 
     def violated(self, seen, memory):
@@ -158,20 +163,24 @@ def test_a_limit_that_is_data_is_the_cause_with_its_numbers_and_units(toy):
     assert leaf.outcome.is_a(LIMIT_VIOLATED) and cause.reason == TOO_LATE
     assert cause.numbers == pytest.approx({"value": 0.15, "limit": 0.12})
     assert cause.to_data()["units"] == {"value": "s", "limit": "s"}
-    assert cause.detail == TEXT(text="0.15 s gone"), "where things stood is kept"
+    assert cause.detail.form is GONE and cause.detail.numbers == pytest.approx({"time": 0.15}), "where things stood is kept"
 
 
 def test_limits_are_batched(toy):
-    leaf, tool = Heights("cup", limit=0.12), np.zeros((2, 3, 7))
-    tool[..., 2] = [[0.05, 0.2, 0.3], [0.4, 0.0, 0.6]]
-    elapsed = np.array([[0.0, 0.0, 0.2], [0.1, 0.2, 0.3]])
+    model, tool = Heights.value("cup", limit=0.12), np.zeros((6, 7))
+    tool[:, 2] = [0.05, 0.2, 0.3, 0.4, 0.0, 0.6]
+    elapsed = np.array([0.0, 0.0, 0.2, 0.1, 0.2, 0.3])
     seen = SimpleNamespace(tool=tool, elapsed=elapsed)
-    assert np.array_equal(leaf.violated(seen, None), [[True, False, True], [False, True, True]])
+    assert np.array_equal(model.violated(seen, None), [True, False, True, False, True, True])
+    low, late = model.limits(seen, None)
+    assert low.applies.tolist() == [True, False, False, False, True, False]
+    assert low.at(0) == TOO_LOW(value=0.1, limit=0.05, what="tool")
+    assert late.at(5) == TOO_LATE(value=0.3, limit=0.12)
 
 
 def test_a_goal_that_flickers_is_not_lost_and_one_that_stays_away_is(toy, careful):
     stage = toy(careful)
-    stage.context.reach("holding", "cup")
+    stage.context.reach("holding", "cup", ONE)
     stage.tick(2)
     for _ in range(4):
         Careful.held = False
@@ -183,13 +192,13 @@ def test_a_goal_that_flickers_is_not_lost_and_one_that_stays_away_is(toy, carefu
     assert stage.tick(1) == Status.FAILURE
     assert careful.outcome.is_a(GOAL_LOST)
     assert careful.outcome.names == {"object": "cup", "goal": "holding"}
-    assert not stage.context.reached("holding", "cup")
+    assert not stage.context.reached("holding", "cup", ONE)
 
 
 def test_ticks_without_a_goal_are_counted_anew_at_each_activation(toy, careful):
     stage = toy(careful)
     for _ in range(2):
-        stage.context.reach("holding", "cup")
+        stage.context.reach("holding", "cup", ONE)
         Careful.held = False
         assert stage.tick(LOST_TICKS - 1) == Status.RUNNING
         stage.runner.begin(0)
@@ -198,7 +207,7 @@ def test_ticks_without_a_goal_are_counted_anew_at_each_activation(toy, careful):
 def test_a_goal_that_nobody_reached_is_not_maintained(toy, careful):
     Careful.held = False
     stage = toy(careful)
-    stage.context.reach("holding", "box")
+    stage.context.reach("holding", "box", ONE)
     assert stage.tick(10) == Status.RUNNING
 
 
@@ -213,11 +222,11 @@ def test_success_reaches_and_ends_goals(toy, act):
 
     stage = toy(sequence("root", Take("take", ticks=1), Drop("drop", ticks=2)))
     stage.tick(1)
-    assert not stage.context.reached("holding", "cup")
+    assert not stage.context.reached("holding", "cup", ONE)
     stage.tick(1)
-    assert stage.context.reached("holding", "cup")
+    assert stage.context.reached("holding", "cup", ONE)
     stage.tick(5)
-    assert not stage.context.reached("holding", "cup")
+    assert not stage.context.reached("holding", "cup", ONE)
 
 
 def test_an_interrupted_leaf_is_ended_and_begins_anew(toy, act):
@@ -225,11 +234,11 @@ def test_an_interrupted_leaf_is_ended_and_begins_anew(toy, act):
     stage = toy(sequence("root", reactive_fallback("until", TimePassed(0.1), leaf), act("then", ticks=50)))
     stage.tick(3)
     assert leaf.status == Status.INVALID and leaf.outcome.is_a(INTERRUPTED)
-    assert leaf.ended[-1] == Status.INVALID and leaf.memory == 2
-    leaf.memory = "old"
+    assert leaf.ended[-1] == Status.INVALID and leaf.memory.tolist() == [2]
+    leaf.activation.memory = np.array([50])
     stage.runner.begin(0)
     stage.tick(1)
-    assert leaf.memory == 1 and leaf.activations == 2
+    assert leaf.memory.tolist() == [1] and leaf.activations == 2
 
 
 def test_a_retried_leaf_begins_anew(toy, act):
@@ -244,7 +253,7 @@ def test_a_retried_leaf_begins_anew(toy, act):
 def test_a_concept_must_say_what_it_commands_and_when_it_is_done():
     class Half(ConceptModel):
         def done(self, seen, memory):
-            return np.True_
+            return seen.elapsed > 0.0
 
     with pytest.raises(TypeError, match="command"):
         Half()
@@ -287,23 +296,29 @@ def test_defaults_of_the_pure_functions_have_the_batchs_shape():
             return Command()
 
         def done(self, seen, memory):
-            return np.False_
+            return seen.tool[:, 0] > 0.0
 
-    class View:
-        def __init__(self, tool):
-            self.tool = tool
-
-    leaf = Plain()
-    for tool in (np.zeros(7), np.zeros((4, 7)), torch.zeros((4, 7))):
-        assert tuple(leaf.programmed_motion(View(tool), None).shape) == (*tool.shape[:-1], 2)
-        assert tuple(leaf.necessary_cost(View(tool), None).shape) == tuple(tool.shape[:-1])
-        assert type(leaf.programmed_motion(View(tool), None)) is type(tool)
+    model = Plain.value()
+    for tool in (np.zeros((1, 7)), np.zeros((4, 7)), torch.zeros((4, 7))):
+        seen, worlds = SimpleNamespace(tool=tool), len(tool)
+        known = SimpleNamespace(hidden=SimpleNamespace(tool_pose=tool))
+        answers = {
+            "programmed_motion": model.programmed_motion(seen, None),
+            "necessary_cost": model.necessary_cost(seen, None),
+            "sufficient_cost": model.sufficient_cost(known, None),
+            "decides": model.decides(seen, None),
+            "violated": model.violated(seen, None),
+            "maintained": model.maintained("holding", seen, None),
+        }
+        for name, answer in answers.items():
+            shape = (worlds, 2) if name == "programmed_motion" else (worlds,)
+            assert tuple(answer.shape) == shape and type(answer) is type(tool), name
 
 
 class Closing(Careful):
     """Commands the hand."""
 
-    hand = 1.0
+    hand: Any = np.array([1.0])
 
     def command(self, action, seen, memory):
         return Command(hand=type(self).hand)
@@ -311,7 +326,7 @@ class Closing(Careful):
 
 def test_a_hand_target_that_is_no_row_of_numbers_is_said_with_its_line(toy, monkeypatch):
     monkeypatch.setattr(Closing, "violated", ConceptModel.violated)
-    with pytest.raises(LeafError, match=r"'closing cup' \(test_model.py:\d+\) commands hand=1.0: "):
+    with pytest.raises(LeafError, match=r"'closing cup' \(test_model.py:\d+\) commands hand=array\(\[1\.\]\): "):
         toy(Closing("cup")).tick()
-    monkeypatch.setattr(Closing, "hand", [0.5])
+    monkeypatch.setattr(Closing, "hand", [[0.5]])
     assert toy(Closing("cup")).runner.tick().hand.tolist() == [0.5], "a list will do"

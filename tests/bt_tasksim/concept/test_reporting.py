@@ -1,21 +1,12 @@
-"""What a concept says about why it cannot go on becomes an outcome, or is refused."""
+"""What a concept says about where things stand becomes a statement."""
 
-import pytest
-
-from bt_tasksim.concept.reporting import as_outcome
-from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import DONE, PRECONDITION_UNMET
+from bt_tasksim.concept.reporting import as_statement
+from bt_tasksim.core.outcomes import DONE, TEXT
 
 
-def test_outcomes_stay_and_words_become_one():
+def test_statements_stay_and_words_become_one():
     said = DONE(elapsed=1.0)
-    assert as_outcome(said, PRECONDITION_UNMET) is said
-    assert as_outcome("no cup", PRECONDITION_UNMET).reason is PRECONDITION_UNMET
-    assert as_outcome("", PRECONDITION_UNMET) is None
-    assert as_outcome(None, PRECONDITION_UNMET) is None
-
-
-@pytest.mark.parametrize("said", [False, True, 3])
-def test_anything_else_is_refused(said):
-    with pytest.raises(InputError, match=repr(said)):
-        as_outcome(said, PRECONDITION_UNMET)
+    assert as_statement(said) is said
+    assert as_statement("no cup") == TEXT(text="no cup")
+    assert as_statement("") is None
+    assert as_statement(None) is None

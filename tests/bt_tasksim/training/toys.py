@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Flag, Metres, ObjectName, Ratio
 from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.core.outcomes import Form
+from bt_tasksim.core.units import METRES
 from bt_tasksim.core.world import Command, Hidden
 
 _spec = importlib.util.spec_from_file_location("toy_world", Path(__file__).parents[2] / "conftest.py")
@@ -57,8 +60,18 @@ class World(_shared.ToyWorld):
         self.closed += 1
 
 
+HIGH = Form("the tool is {height:.0f} high", {"height": METRES})
 STEP = 0.02
 """Metres that a toy leaf moves the tool at a decision, at most."""
+
+
+class RaiseLeaf(ConceptNode):
+    """Keeps what became of it in its `log`."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.log: list[str] = []
+        self.model.log = self.log
 
 
 class Raise(ConceptModel):
@@ -69,14 +82,11 @@ class Raise(ConceptModel):
     is_task_model = False
     actions = 1
     default_timeout = 1.5
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self.log: list[str] = []
+    leaf_base = RaiseLeaf
 
     def begin(self, seen: Seen) -> Any:
         self.log.append("begin")
-        return 0
+        return np.zeros(len(seen.tool), int)
 
     def advance(self, action, seen: Seen, memory: Any) -> Any:
         return memory + 1
@@ -86,31 +96,32 @@ class Raise(ConceptModel):
         return {"missing": 1, "cup": 2}
 
     def features(self, seen: Seen, memory: Any):
-        return np.concatenate([[(self.height - seen.tool[2]) / 0.1], seen.object("cup")[:2] / 0.01])
+        missing = (self.height - seen.tool[:, 2:3]) / 0.1
+        return np.concatenate([missing, seen.object("cup")[:, :2] / 0.01], axis=-1)
 
     def command(self, action, seen: Seen, memory: Any) -> Command:
-        self.log.append(f"command {float(action[0]):g}")
+        self.log.append(f"command {float(action[0, 0]):g}")
         tool = seen.tool.copy()
-        tool[2] += STEP * action[0]
+        tool[:, 2] += STEP * action[:, 0]
         return Command(tool=tool)
 
     def programmed_motion(self, seen: Seen, memory: Any):
-        return np.array([np.clip((self.height - seen.tool[2]) / STEP, -1.0, 1.0)])
+        return np.clip((self.height - seen.tool[:, 2:3]) / STEP, -1.0, 1.0)
 
     def done(self, seen: Seen, memory: Any):
-        return np.abs(self.height - seen.tool[2]) < 0.005
+        return np.abs(self.height - seen.tool[:, 2]) < 0.005
 
     def violated(self, seen: Seen, memory: Any):
-        return seen.tool[2] > self.limit
+        return seen.tool[:, 2] > self.limit
 
     def necessary_cost(self, seen: Seen, memory: Any):
-        return np.abs(self.height - seen.tool[2]) / 0.1
+        return np.abs(self.height - seen.tool[:, 2]) / 0.1
 
     def sufficient_cost(self, known: Known, memory: Any):
-        return np.abs(self.height - known.hidden.tool_pose[2]) / 0.01
+        return np.abs(self.height - known.hidden.tool_pose[:, 2]) / 0.01
 
-    def explain(self, seen: Seen, memory: Any) -> str:
-        return f"the tool is {1000 * float(seen.tool[2]):.0f} mm high"
+    def explain(self, seen: Seen, memory: Any) -> Any:
+        return HIGH(height=seen.tool[:, 2])
 
 
 class Unprogrammed(Raise):
@@ -127,7 +138,7 @@ class Turn(Raise):
         return {"missing": 1}
 
     def features(self, seen: Seen, memory: Any):
-        return super().features(seen, memory)[:1]
+        return super().features(seen, memory)[:, :1]
 
 
 class Check(ConceptModel):
@@ -139,7 +150,7 @@ class Check(ConceptModel):
     """It does not see that the tool is at the wrong height."""
 
     def begin(self, seen: Seen) -> Any:
-        return 0
+        return np.zeros(len(seen.tool), int)
 
     def advance(self, action, seen: Seen, memory: Any) -> Any:
         return memory + 1
@@ -148,16 +159,16 @@ class Check(ConceptModel):
         return Command(tool=seen.tool)
 
     def violated(self, seen: Seen, memory: Any):
-        return (not self.blind) and abs(self.height - seen.tool[2]) > 0.01
+        return (abs(self.height - seen.tool[:, 2]) > 0.01) & (not self.blind)
 
     def done(self, seen: Seen, memory: Any):
-        return np.bool_(memory >= round(10 * self.ticks))
+        return memory >= round(10 * self.ticks)
 
     def sufficient_cost(self, known: Known, memory: Any):
-        return np.abs(self.height - known.hidden.tool_pose[2]) / 0.01
+        return np.abs(self.height - known.hidden.tool_pose[:, 2]) / 0.01
 
-    def explain(self, seen: Seen, memory: Any) -> str:
-        return f"the tool is {1000 * float(seen.tool[2]):.0f} mm high"
+    def explain(self, seen: Seen, memory: Any) -> Any:
+        return HIGH(height=seen.tool[:, 2])
 
 
 class Move(ConceptModel):
@@ -166,18 +177,18 @@ class Move(ConceptModel):
     height: Metres = 0.3
 
     def begin(self, seen: Seen) -> Any:
-        return 0
+        return np.zeros(len(seen.tool), int)
 
     def advance(self, action, seen: Seen, memory: Any) -> Any:
         return memory + 1
 
     def command(self, action, seen: Seen, memory: Any) -> Command:
         tool = seen.tool.copy()
-        tool[2] = self.height
+        tool[:, 2] = self.height
         return Command(tool=tool)
 
     def done(self, seen: Seen, memory: Any):
-        return np.bool_(memory >= 2)
+        return memory >= 2
 
 
 class Below(Condition):
@@ -186,10 +197,10 @@ class Below(Condition):
     height: Metres = 0.5
 
     def holds(self, seen: Seen):
-        return seen.tool[2] < self.height
+        return seen.tool[:, 2] < self.height
 
-    def explain(self, seen: Seen) -> str:
-        return f"the tool is {1000 * float(seen.tool[2]):.0f} mm high"
+    def explain(self, seen: Seen) -> Any:
+        return HIGH(height=seen.tool[:, 2])
 
 
 class Even(Condition):
@@ -198,7 +209,7 @@ class Even(Condition):
     target: ObjectName = "cup"
 
     def holds(self, seen: Seen):
-        return seen.object(self.target)[0] > 0.5
+        return seen.object(self.target)[:, 0] > 0.5
 
 
 UP, DOWN, STILL, DONE = ([1.0, 0.0], [-1.0, 0.0], [0.0, 0.0], [0.0, 1.0])
