@@ -3,7 +3,7 @@
 A pose is ``(..., 7)``: position in metres and a unit quaternion ``w x y z``. Every function accepts any
 array of the Python array API standard (NumPy, torch, ...) with any leading batch dimensions, and what it
 gives for one row does not depend on the others, to the last bit: products of small matrices are stacked
-(`numpy.matmul` takes them one by one), and nothing is summed over a batch.
+(`numpy.matmul` takes them one by one) and packed, and nothing is summed over a batch.
 
 Formulas: J. Sola, "Quaternion kinematics for the error-state Kalman filter", arXiv 1711.02508.
 """
@@ -77,7 +77,7 @@ def clip(x: Array, low: Any, high: Any) -> Array:
 
 def apply(matrices: Array, vectors: Array) -> Array:
     """Matrices ``(..., m, n)`` times vectors ``(..., n)``; batch dimensions broadcast."""
-    return array_namespace(matrices, vectors).matmul(matrices, vectors[..., None])[..., 0]
+    return array_namespace(matrices, vectors).matmul(_packed(matrices, 2), _packed(vectors, 1)[..., None])[..., 0]
 
 
 def quat_multiply(a: Array, b: Array) -> Array:
@@ -97,7 +97,11 @@ def norm(v: Array) -> Array:
 
 def dot(a: Array, b: Array) -> Array:
     """Inner product ``(...)`` of vectors ``(..., n)``."""
-    return array_namespace(a, b).matmul(a[..., None, :], b[..., None])[..., 0, 0]
+    products = a * b
+    total = products[..., 0]
+    for k in range(1, products.shape[-1]):
+        total = total + products[..., k]
+    return total
 
 
 def composed(a: list[float], b: list[float]) -> list[float]:
@@ -123,7 +127,7 @@ def rotate(q: Array, v: Array) -> Array:
     """Vectors ``v (..., 3)`` rotated by unit quaternions ``q (..., 4)``; batch dimensions broadcast."""
     xp = array_namespace(q, v)
     cross_matrix = _gathered(q, _CROSS, _CROSS_SIGNS)
-    once = xp.matmul(cross_matrix, v[..., None])
+    once = xp.matmul(cross_matrix, _packed(v, 1)[..., None])
     twice = q[..., :1] * once[..., 0] + xp.matmul(cross_matrix, once)[..., 0]
     return v + (twice + twice)
 
@@ -310,10 +314,25 @@ def pose(position: Array, rotation: Array | None = None) -> Array:
 def _gathered(q: Array, index: Array, signs: Array) -> Array:
     """Matrices ``(..., m, n)`` that are made of the numbers of quaternions ``(..., 4)`` with signs."""
     if isinstance(q, np.ndarray):
-        return q[..., index] * signs.astype(q.dtype, copy=False)
+        return q.take(index, axis=-1) * signs.astype(q.dtype, copy=False)
     xp = array_namespace(q)
     flat = xp.take(q, xp.asarray(index.reshape(-1), device=q.device), axis=-1)
     return xp.reshape(flat, (*q.shape[:-1], *index.shape)) * constant(signs, q)
+
+
+def _packed(values: Array, axes: int) -> Array:
+    """The same numbers, the last axes of which lie side by side in memory.
+
+    `numpy.matmul` adds up in another order where they do not, and how an array of one world lies may differ
+    from how one of many does.
+    """
+    if isinstance(values, np.ndarray):
+        step = values.itemsize
+        for axis in range(1, axes + 1):
+            if values.strides[-axis] != step:
+                return np.ascontiguousarray(values)
+            step *= values.shape[-axis]
+    return values
 
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
