@@ -6,7 +6,7 @@ import dataclasses
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import plugins, poses
+from bt_tasksim.core.bundles import parts, taken
 from bt_tasksim.core.world import Command, Hidden, Observation
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
@@ -212,6 +213,34 @@ class Act(ConceptModel):
 def act() -> type[Act]:
     """A concept for tests: ``act(name, parts="tool hand", ticks=3, height=0.4)``."""
     return Act
+
+
+def same_bits(first: Any, second: Any) -> bool:
+    """Two bundles hold the same arrays, to the last bit; NaN is like NaN."""
+    inner = parts(first)
+    if inner is not None:
+        others = parts(second) or {}
+        return inner.keys() == others.keys() and all(same_bits(inner[k], others[k]) for k in inner)
+    if first is None or isinstance(first, str):
+        return bool(first == second)
+    a, b = np.asarray(first), np.asarray(second)
+    return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+
+
+@pytest.fixture(scope="session")
+def rows_alike():
+    """``rows_alike(function, n)``: what a function of rows ``(k,)`` of a batch gives for a row is the same
+    bits in all of ``n`` rows, alone, in any order and in any company; gives what it says of all."""
+
+    def check(function: Callable[[Any], Any], n: int) -> Any:
+        whole = function(np.arange(n))
+        mixed = np.random.default_rng(n).permutation(n)
+        for rows in (*np.arange(n)[:, None], mixed, mixed[: n // 2], np.arange(n)[::-1], mixed[n // 3 :]):
+            if len(rows):
+                assert same_bits(function(rows), taken(whole, rows)), f"rows {rows} differ in company"
+        return whole
+
+    return check
 
 
 @pytest.fixture(scope="session")

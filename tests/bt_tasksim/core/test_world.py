@@ -16,7 +16,7 @@ def test_a_command_over_another_one_keeps_what_it_lacks():
 
 
 def test_names_and_their_places_in_the_arrays(toy, act):
-    model = toy(act("move")).context.world
+    model = toy(act("move")).world.model
     assert [model.object_index(o.name) for o in model.objects] == [0, 1]
     assert model.object("box").kind == "box" and model.place("goal").kind == "spot"
     assert model.control_period == 0.05 and len(model.tips) == 2

@@ -9,7 +9,7 @@ import pytest
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import BtTasksimError, NoWayError
 from bt_tasksim.core.world import Obstacle
-from bt_tasksim.planning.ways import MARGIN, Carried, clear_path
+from bt_tasksim.planning.ways import MARGIN, Carried, _Checker, clear_path
 from bt_tasksim.robot.description import load_robot
 
 DOWN = poses.frame_from_axes(np.array([0.0, 0, -1]), np.array([0.0, 1, 0]))
@@ -108,6 +108,36 @@ def test_no_way_is_one_sentence_with_both_ends():
     sentence = str(error.value)
     assert "no way for the hand from [0.45, -0.3, 0.25] to [0.45, 0.3, 0.25] m" in sentence
     assert "12 mm clear" in sentence and "via-points" in sentence and "\n" not in sentence
+
+
+def touches(tool, obstacles):
+    """coal about each box and each obstacle, without looking first how far away they are."""
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    return any(
+        coal.collide(
+            coal.Box(*size), transform(poses.multiply(tool, local)),
+            coal.Box(*(np.array(o.size) + 2 * MARGIN)), transform(o.pose), request, result,
+        )
+        for local, size in (*HAND, (CARRIED.grip, CARRIED.extent))
+        for o in obstacles
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_many_tool_poses_are_checked_at_once_as_one_by_one(rows_alike, name):
+    rng = np.random.default_rng(5)
+    turned = poses.pose([0.1, 0.2, 0.3], poses.normalise(np.array([0.9, 0.1, -0.3, 0.2])))
+    obstacles = [*WALLS[name], Obstacle(turned, (0.1, 0.3, 0.2), "slanted")]
+    tools = np.concatenate([rng.uniform([0.0, -0.4, 0.0], [0.9, 0.4, 0.8], (400, 3)), rng.normal(size=(400, 4))], 1)
+    tools[:, 3:] = poses.normalise(tools[:, 3:])
+    checker = _Checker(CARRIED, obstacles)
+    free = rows_alike(lambda rows: checker.free(tools[rows]), len(tools))
+    assert free.any() and not free.all()
+    assert free.tolist() == [not touches(tool, obstacles) for tool in tools]
+
+
+def test_where_there_are_no_obstacles_everything_is_free():
+    assert _Checker(CARRIED, []).free(np.stack([START, GOAL])).all()
 
 
 def test_the_bundled_hands_have_an_envelope():
