@@ -54,9 +54,6 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             ) from error
         super().__init__(robot, worlds, threads)
         self._builder = RobotBuilder(robot)
-        self._stiffness = robot.drive_array("stiffness")
-        self._damping = robot.drive_array("damping")
-        self._limit = robot.drive_array("force_limit")
         self._tip_points = np.array([tip.point for tip in robot.tips])
         self._lever, self._to_tool = np.zeros((worlds, 3)), np.zeros((worlds, 1, 4))
 
@@ -68,11 +65,10 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
         return SapienWorld(world, robot, configuration, len(self.robot.tips))
 
     def _read(self, rows: Array, worlds: list[SapienWorld], layout: Layout) -> tuple[WorldState, Hidden]:
-        """See `ThreadedBatch`. SAPIEN reports no effort of drives, so theirs is the drives' own law."""
+        """See `ThreadedBatch`."""
         k, readings, robot = len(rows), [world.reading for world in worlds], worlds[0].robot
         q = np.concatenate([r.position for r in readings]).reshape(k, -1)[:, robot.index].astype(float)
         v = np.concatenate([r.velocity for r in readings]).reshape(k, -1)[:, robot.index].astype(float)
-        effort = self._stiffness * (self._position[rows] - q) + self._damping * (self._velocity[rows] - v)
         frames = np.array([r.frames for r in readings])
         tool = poses.multiply(frames[:, 0], robot.tool_pose)
         incoming = np.concatenate([r.incoming for r in readings]).reshape(k, -1, 6)[:, robot.wrist]
@@ -84,7 +80,7 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             time=time,
             joint_position=q,
             joint_velocity=v,
-            joint_effort=np.minimum(np.maximum(effort, -self._limit), self._limit),
+            joint_effort=self._effort(rows, q, v),
             tip_force=np.array([touch.tip_force for touch in touches]).reshape(k, -1, 3),
             wrench=self._wrench(rows, incoming.astype(float)),
             tool_pose=tool,
