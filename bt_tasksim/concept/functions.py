@@ -226,7 +226,7 @@ def any_of(like: Array, possibles: Sequence[Applying]) -> Array:
     return reduce(operator.or_, (possible.applies for possible in possibles))
 
 
-def sequence_of(possibles: Possible | Sequence[Possible] | None, owner: str) -> Sequence[Possible]:
+def sequence_of(possibles: Any, owner: str) -> Sequence[Possible]:
     """What `ConceptFunctions.initial_state` gives, which may be one or several.
 
     Args:
@@ -240,12 +240,12 @@ def sequence_of(possibles: Possible | Sequence[Possible] | None, owner: str) -> 
         return (possibles,)
     if possibles is None:
         return ()
-    if isinstance(possibles, str) or not all(isinstance(possible, Possible) for possible in possibles):
-        raise InputError(
-            f"{owner}: initial_state should give what REASON.where(...) gives, or several of them, "
-            f"found {possibles!r}"
-        )
-    return possibles
+    if isinstance(possibles, tuple | list) and all(isinstance(each, Possible) for each in possibles):
+        return possibles
+    raise InputError(
+        f"{owner}: initial_state should give what REASON.where(...) gives, or several of them, "
+        f"found {possibles!r}"
+    )
 
 
 def first_of(possibles: Sequence[Applying], world: int) -> Outcome | None:

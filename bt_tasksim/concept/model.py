@@ -67,7 +67,7 @@ class LeafModel(metaclass=ModelType):
         return {k: v for k, v in self.values.items() if (p := declared[k]).required or v != p.default}
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and other.arguments() == self.arguments()  # type: ignore[attr-defined]
+        return type(other) is type(self) and other.arguments() == self.arguments()
 
     def __hash__(self) -> int:
         return hash((type(self), tuple(self.values.items())))

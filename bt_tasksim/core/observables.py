@@ -12,9 +12,10 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar, Literal
 
+from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import part, parts, register
-from bt_tasksim.core.world import Observation, WorldModel
+from bt_tasksim.core.world import Observation
 
 FIELDS = tuple(field.name for field in dataclasses.fields(Observation))
 """Observables that every `Observation` holds; the others are computed from it when they are asked for."""
@@ -41,7 +42,7 @@ class Observable:
     def __init__(self, name: str) -> None:
         self.name = name
 
-    def read(self, observation: Observation, world: WorldModel) -> Array:
+    def read(self, observation: Observation, world: WorldFacts) -> Array:
         """Its value; pure and batched. By default the observation's field of its name."""
         value: Array = getattr(observation, self.name)
         return value

@@ -92,6 +92,14 @@ def _text(value: Any) -> Any:
     return tuple(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
+def _number_at(value: Any, world: int) -> float:
+    return float(value[world]) if getattr(value, "ndim", 0) else float(value)
+
+
+def _text_at(value: Any, world: int) -> str:
+    return str(value[world]) if isinstance(value, tuple) else str(value)
+
+
 @dataclass(frozen=True)
 class Statement:
     """What is to be said, as a value.
@@ -110,8 +118,8 @@ class Statement:
 
     def at(self, world: int) -> Self:
         """What a statement about a batch says of one world, by its row."""
-        numbers = {n: float(v[world]) if getattr(v, "ndim", 0) else v for n, v in self.numbers.items()}
-        names = {n: v[world] if isinstance(v, tuple) else v for n, v in self.names.items()}
+        numbers = {name: _number_at(value, world) for name, value in self.numbers.items()}
+        names = {name: _text_at(value, world) for name, value in self.names.items()}
         return replace(
             self, numbers=numbers, names=names, detail=None if self.detail is None else self.detail.at(world)
         )

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import array_api_compat
-import array_api_compat.numpy
 import numpy as np
 
 Array = Any
@@ -26,7 +25,7 @@ _UP = [0.0, 0.0, 1.0]
 
 
 def array_namespace(*arrays: Array) -> Any:
-    """The functions that arrays come with, as `array_api_compat.array_namespace`; quick for NumPy's.
+    """The functions that arrays come with: NumPy's own, or what `array_api_compat.array_namespace` gives.
 
     Raises:
         TypeError: The arrays are of different libraries, or one is none.
@@ -34,7 +33,7 @@ def array_namespace(*arrays: Array) -> Any:
     for array in arrays:
         if not isinstance(array, _NUMPY):
             return array_api_compat.array_namespace(*arrays)
-    return array_api_compat.numpy
+    return np
 
 
 _NUMPY = (np.ndarray, np.generic)
