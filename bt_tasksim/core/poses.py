@@ -76,7 +76,9 @@ def clip(x: Array, low: Any, high: Any) -> Array:
 
 def apply(matrices: Array, vectors: Array) -> Array:
     """Matrices ``(..., m, n)`` times vectors ``(..., n)``; batch dimensions broadcast."""
-    return array_namespace(matrices, vectors).matmul(_packed(matrices, 2), _packed(vectors, 1)[..., None])[..., 0]
+    return array_namespace(matrices, vectors).matmul(_packed(matrices, 2), _packed(vectors, 1)[..., None])[
+        ..., 0
+    ]
 
 
 def quat_multiply(a: Array, b: Array) -> Array:

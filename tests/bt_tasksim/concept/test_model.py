@@ -163,7 +163,9 @@ def test_a_limit_that_is_data_is_the_cause_with_its_numbers_and_units(toy):
     assert leaf.outcome.is_a(LIMIT_VIOLATED) and cause.reason == TOO_LATE
     assert cause.numbers == pytest.approx({"value": 0.15, "limit": 0.12})
     assert cause.to_data()["units"] == {"value": "s", "limit": "s"}
-    assert cause.detail.form is GONE and cause.detail.numbers == pytest.approx({"time": 0.15}), "where things stood is kept"
+    assert cause.detail.form is GONE and cause.detail.numbers == pytest.approx({"time": 0.15}), (
+        "where things stood is kept"
+    )
 
 
 def test_limits_are_batched(toy):
@@ -326,7 +328,9 @@ class Closing(Careful):
 
 def test_a_hand_target_that_is_no_row_of_numbers_is_said_with_its_line(toy, monkeypatch):
     monkeypatch.setattr(Closing, "violated", ConceptModel.violated)
-    with pytest.raises(LeafError, match=r"'closing cup' \(test_model.py:\d+\) commands hand=array\(\[1\.\]\): "):
+    with pytest.raises(
+        LeafError, match=r"'closing cup' \(test_model.py:\d+\) commands hand=array\(\[1\.\]\): "
+    ):
         toy(Closing("cup")).tick()
     monkeypatch.setattr(Closing, "hand", [[0.5]])
     assert toy(Closing("cup")).runner.tick().hand.tolist() == [0.5], "a list will do"

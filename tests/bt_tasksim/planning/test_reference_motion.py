@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bt_tasksim.core import poses
-from bt_tasksim.planning.reference_motion import TURN_BACK, Path, minimum_jerk, minimum_jerk_time, plan, sample
+from bt_tasksim.planning.reference_motion import (
+    TURN_BACK,
+    Path,
+    minimum_jerk,
+    minimum_jerk_time,
+    plan,
+    sample,
+)
 
 torch = pytest.importorskip("torch")
 

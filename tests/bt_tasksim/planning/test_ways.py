@@ -128,7 +128,9 @@ def test_many_tool_poses_are_checked_at_once_as_one_by_one(rows_alike, name):
     rng = np.random.default_rng(5)
     turned = poses.pose([0.1, 0.2, 0.3], poses.normalise(np.array([0.9, 0.1, -0.3, 0.2])))
     obstacles = [*WALLS[name], Obstacle(turned, (0.1, 0.3, 0.2), "slanted")]
-    tools = np.concatenate([rng.uniform([0.0, -0.4, 0.0], [0.9, 0.4, 0.8], (400, 3)), rng.normal(size=(400, 4))], 1)
+    tools = np.concatenate(
+        [rng.uniform([0.0, -0.4, 0.0], [0.9, 0.4, 0.8], (400, 3)), rng.normal(size=(400, 4))], 1
+    )
     tools[:, 3:] = poses.normalise(tools[:, 3:])
     checker = _Checker(CARRIED, obstacles)
     free = rows_alike(lambda rows: checker.free(tools[rows]), len(tools))
