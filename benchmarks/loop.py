@@ -28,8 +28,8 @@ def measure(minutes: float, rate: int, domain: int) -> tuple[str, str, Timing, f
     so the delay is known: latencies count from when a state was stamped.
     """
     with bench_of(domain) as bench:
-        runner, leaf = sweeping(bench.twin.port)
-        leaf.lasts = 60.0 * minutes
+        runner, sweep = sweeping(bench.twin.port)
+        sweep.lasts = 60.0 * minutes
         configuration = dataclasses.replace(SCENE.sample(0), control_frequency=rate)
         bench.evaluation.load(configuration)
         try:

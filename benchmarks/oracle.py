@@ -81,14 +81,14 @@ class Change:
     across: float = 0.0
 
     def moved(self, goal: Array, centre: Array) -> Array:
-        """The grasp pose ``(7,)``: turned about the object's centre ``(3,)``, then shifted."""
+        """The grasp poses ``(N, 7)``: turned about the object's centre ``(N, 3)``, then shifted."""
         radians = [math.radians(v) for v in (self.lean, self.tilt, self.turn)]
         lean, tilt, turn = (
             poses.from_rotation_vector(np.eye(3)[i] * angle) for i, angle in enumerate(radians)
         )
         rotation = poses.quat_multiply(turn, poses.quat_multiply(tilt, lean))
-        about = poses.pose(centre, goal[3:])
-        local = poses.multiply(poses.inverse(about), goal)
+        about = np.concatenate([centre, goal[:, 3:]], axis=-1)
+        local = poses.relative(about, goal)
         turned = poses.multiply(poses.multiply(about, poses.pose([0, 0, 0], rotation)), local)
         return poses.multiply(turned, poses.pose([self.aside, self.across, self.deeper], [1, 0, 0, 0]))
 
@@ -111,9 +111,8 @@ class GivenGrasp(Grasp):
         memory = super().begin(seen)
         if self.change == Change(grip=self.change.grip):
             return memory
-        goal = self.change.moved(memory.goal, seen.object(self.target)[:3])
-        back = goal.copy()
-        back[:3] -= self.standoff * poses.rotate(goal[3:], np.array([0.0, 0.0, 1.0]))
+        goal = self.change.moved(memory.goal, seen.object(self.target)[:, :3])
+        back = poses.shifted(goal, -self.standoff * poses.z_axis(goal[:, 3:]))
         path = plan([*_way_out(seen, back), back, goal], self.speed, blend=0.03)
         return memory._replace(path=path, begins=_approach_begins(path, self.standoff), goal=goal)
 
@@ -131,8 +130,9 @@ class Oracle:
     """
 
     def __init__(self, robot: str) -> None:
-        self.leaf = GivenGrasp("target", timeout=6.0, policy="programmed")
-        tree = sequence("given grasp", self.leaf, Pick("target", distance=grasp_then_pick.LIFT, speed=0.5))
+        leaf = GivenGrasp("target", timeout=6.0, policy="programmed")
+        self.grasp: GivenGrasp = leaf.model
+        tree = sequence("given grasp", leaf, Pick("target", distance=grasp_then_pick.LIFT, speed=0.5))
         self.runner = Runner(tree, grasp_then_pick.scene(robot), EngineOptions(noise="none"))
         self.changes = changes()
 
@@ -165,7 +165,7 @@ class Oracle:
 
     def _try(self, configuration: ActorConfiguration, change: Change) -> str:
         """Why a grasp does not hold; empty when it does."""
-        self.leaf.take(change)
+        self.grasp.take(change)
         try:
             result = self.runner.finish(configuration, self.runner.reset(configuration))
         except InputError:

@@ -23,7 +23,7 @@ import numpy as np
 import py_trees
 from py_trees.common import Status
 
-from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.concept.leaf import ONE, ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.files import write_text
 from bt_tasksim.core.world import Command
@@ -216,7 +216,7 @@ class _Idle(ConceptModel):
 
     def done(self, seen: Any, memory: Any) -> Any:
         """Never."""
-        return np.False_
+        return _ACTION.terminate
 
 
 class _Decided:
@@ -226,8 +226,8 @@ class _Decided:
         return _ACTION
 
 
-_COMMAND = Command(np.array([0.4, 0.0, 0.3, 0.0, 1.0, 0.0, 0.0]), np.array([0.0]))
-_ACTION = Action(np.zeros(0), np.False_)
+_COMMAND = Command(np.array([[0.4, 0.0, 0.3, 0.0, 1.0, 0.0, 0.0]]), np.array([[0.0]]))
+_ACTION = Action(np.zeros((1, 0)), np.array([False]))
 
 
 class _Noop(py_trees.behaviour.Behaviour):  # type: ignore[misc]
@@ -261,7 +261,7 @@ def tick_overhead(n: int) -> dict[str, Any]:
         tick(tree)
 
     ours()
-    seen, motion = context.seen(0.0), _ACTION.motion
+    seen, motion = context.seen(ONE, np.zeros(1)), _ACTION.motion
 
     def functions() -> None:
         first.model.violated(seen, None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -40,16 +39,16 @@ class Sweep(ConceptModel):
     def command(self, action: Any, seen: Any, memory: Any) -> Command:
         """The next point of the way."""
         tool = memory.copy()
-        tool[1] += AMPLITUDE / 2.0 * (1.0 - math.cos(RATE * float(seen.elapsed)))
+        tool[:, 1] += AMPLITUDE / 2.0 * (1.0 - np.cos(RATE * seen.elapsed))
         return Command(tool=self.trouble(tool))
 
     def done(self, seen: Any, memory: Any) -> Any:
         """It has lasted long enough."""
-        return np.bool_(seen.elapsed >= self.lasts)
+        return seen.elapsed >= self.lasts
 
 
 def sweeping(port: int, ros: str = "") -> tuple[Runner, Sweep]:
-    """A runner of a sweep on the twin behind a rosbridge of this machine.
+    """A runner of a sweep, and the sweep, on the twin behind a rosbridge of this machine.
 
     Args:
         port: Of rosbridge.
@@ -58,4 +57,5 @@ def sweeping(port: int, ros: str = "") -> tuple[Runner, Sweep]:
     leaf = Sweep(name="sweep")
     runner = Runner(sequence("root", leaf), SCENE, EngineOptions(engines=f"ros:127.0.0.1:{port}", ros=ros))
     runner.longest = 10_000.0
-    return runner, leaf
+    sweep: Sweep = leaf.model
+    return runner, sweep

@@ -20,6 +20,8 @@ from py_trees.common import Status
 from benchmarks.experiments import judged, pictures
 from benchmarks.experiments.common import Request, share
 from benchmarks.experiments.training import POLICIES, finished, history, learn
+from bt_tasksim.concept.activation import Judged
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.parameters import Seconds
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Grasp, Pick
@@ -45,6 +47,14 @@ WINDOW = 600
 """Episodes of each stage but the last: the same for all variants, whatever they succeed in."""
 
 
+class FixedTimeLeaf(ConceptNode):
+    """A leaf that says itself when its grasp is done."""
+
+    def _act(self, judged: Judged, action: Action) -> Status:
+        hold = self.model.values["hold"]
+        return super()._act(judged, Action(action.motion, judged.memory.closing > hold))
+
+
 class FixedTimeGrasp(Grasp):
     """A grasp that is done a fixed time after the hand began to close, whatever its policy says.
 
@@ -53,13 +63,11 @@ class FixedTimeGrasp(Grasp):
     """
 
     hold: Seconds = 1.2
+    leaf_base = FixedTimeLeaf
 
     def programmed_motion(self, seen: Seen, memory: GraspMemory) -> Array:
         """The middle of a learned action, careful and slow, from which training begins."""
-        return np.zeros((*np.shape(memory.closing), self.actions))
-
-    def _act(self, action: Action, seen: Seen) -> Status:
-        return super()._act(Action(action.motion, np.bool_(self.memory.closing > self.hold)), seen)
+        return np.zeros((len(memory.closing), self.actions))
 
 
 def tree(variant: str, hold: float = 1.2) -> Behaviour:

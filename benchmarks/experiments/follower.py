@@ -16,6 +16,7 @@ from py_trees.behaviour import Behaviour
 from benchmarks.experiments import judged, pictures
 from benchmarks.experiments.common import Request, policy_of, share
 from benchmarks.experiments.training import POLICIES, learn
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.policy.policy import PROGRAMMED
 from bt_tasksim.training.config import TrainConfig
@@ -31,8 +32,8 @@ def tree(follower: str, grip: float) -> Behaviour:
     """A follower's tree, with a grasp that closes to ``grip``."""
     root = FOLLOWERS[follower].build()
     for leaf in root.iterate():
-        if isinstance(leaf, Grasp):
-            leaf.grip = grip
+        if isinstance(leaf, ConceptNode) and isinstance(leaf.model, Grasp):
+            leaf.model.grip = grip
     return root
 
 

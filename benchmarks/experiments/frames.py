@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from py_trees.common import Status
 
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.runner import Runner, Step
@@ -60,7 +61,11 @@ def film(job: Job, seed: int, caption: str, count: int = 4, part: tuple[int, int
 
 def _moments(runner: Runner, seed: int, count: int) -> list[int]:
     """Numbers of the ticks that are drawn."""
-    grasp = next(leaf for leaf in runner.tree.iterate() if isinstance(leaf, Grasp))
+    grasp = next(
+        leaf
+        for leaf in runner.tree.iterate()
+        if isinstance(leaf, ConceptNode) and isinstance(leaf.model, Grasp)
+    )
     closing: int | None = None
     held: int | None = None
     ended: int | None = None
@@ -68,7 +73,7 @@ def _moments(runner: Runner, seed: int, count: int) -> list[int]:
 
     def watch(step: Step) -> None:
         nonlocal closing, held, ended, tick
-        if closing is None and grasp.memory is not None and float(grasp.memory.closing) >= 0.0:
+        if closing is None and grasp.memory is not None and float(grasp.memory.closing[0]) >= 0.0:
             closing = tick
         if held is None and grasp.status != Status.RUNNING and tick > 0:
             held = tick

@@ -114,13 +114,13 @@ def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
         decision = env.decision
         assert decision is not None
         action = policy.act(decision.leaf.model, decision.seen, decision.memory)
-        nearer += float(action.terminate)
+        nearer += float(action.terminate[0])
         motion = np.asarray(action.motion, np.float64)
-        _, _, terminated, truncated, info = env.act(Action(motion, np.bool_(nearer >= 1.0)))
+        _, _, terminated, truncated, info = env.act(Action(motion, np.array([nearer >= 1.0])))
         decisions += 1
         if terminated or truncated:
             hidden = env.runner.context.hidden()
-            force = 0.0 if hidden is None else float(hidden.hand_force[0])
+            force = 0.0 if hidden is None else float(hidden.hand_force[0, 0])
             done = info["status"] == "SUCCESS"
             return Draw(seed, bool(info["is_success"]), done, _kind(info), info["why"], decisions, force)
 

@@ -4,6 +4,7 @@ import functools
 import pickle
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from benchmarks.experiments import ablations, follower, judged, learning, pages, robot, sequences, shapes
 from benchmarks.experiments.__main__ import main
 from benchmarks.experiments.common import EXPERIMENTS, Request, share
-from bt_tasksim.concept_nodes import Grasp, Pick
+from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.concept_nodes import Pick
 from bt_tasksim.policy.policy import Action
 from bt_tasksim.trees.nodes.train import follower_of, train_nodes
 
@@ -110,31 +112,22 @@ def test_counts_of_draws():
     assert share({"draws": 0, "successes": 0, "interval": [0, 1]}).startswith("0 of 0")
 
 
-def test_the_fixed_time_replaces_the_completion_signal():
+def test_the_fixed_time_replaces_the_completion_signal(monkeypatch):
     leaf = ablations.FixedTimeGrasp("target", hold=0.5)
     said = []
-
-    class Memory:
-        closing = 0.0
-
-    def acted(self, action, seen):
-        said.append(bool(action.terminate))
-
-    leaf.memory = Memory()
-    original, Grasp._act = Grasp._act, acted
-    try:
-        for closing, signal in ((-1.0, True), (0.4, True), (0.6, False)):
-            leaf.memory.closing = closing
-            leaf._act(Action(np.zeros(6), np.bool_(signal)), None)
-    finally:
-        Grasp._act = original
-    assert said == [False, False, True]
+    monkeypatch.setattr(
+        ConceptNode, "_act", lambda self, judged, action: said.append(action.terminate.tolist())
+    )
+    for closing, signal in ((-1.0, True), (0.4, True), (0.6, False)):
+        judged_now = SimpleNamespace(memory=SimpleNamespace(closing=np.array([closing])))
+        leaf._act(judged_now, Action(np.zeros((1, 6)), np.array([signal])))
+    assert said == [[False], [False], [True]]
 
 
 def test_variants_differ_in_one_thing():
     full, fixed, alone = (ablations.config(v, 1, 4096) for v in ablations.VARIANTS)
     assert full == fixed and full.reward.sufficient and not alone.reward.sufficient
-    assert [type(train_nodes(ablations.tree(v))[0].decorated).__name__ for v in ablations.VARIANTS] == [
+    assert [type(train_nodes(ablations.tree(v))[0].decorated.model).__name__ for v in ablations.VARIANTS] == [
         "Grasp", "FixedTimeGrasp", "Grasp",
     ]  # fmt: skip
     assert len({out for _, _, out in ablations.runs(Request())}) == 9
@@ -145,9 +138,9 @@ def test_both_picks_judge_the_same_grasp(name):
     tree = follower.tree(name, 0.7)
     (train,) = train_nodes(tree)
     judge = follower_of(train)[0]
-    assert isinstance(judge, Pick) and (judge.squeeze is None) == (name == "fast")
+    assert isinstance(judge.model, Pick) and (judge.model.squeeze is None) == (name == "fast")
     own = follower.FOLLOWERS[name].build().children[0].decorated
-    assert (train.decorated.grip, own.grip) == (0.7, 1.0)
+    assert (train.decorated.model.grip, own.model.grip) == (0.7, 1.0)
     case = judged.Case(functools.partial(follower.tree, name, 0.7), follower.FOLLOWERS[name].scene())
     assert pickle.loads(pickle.dumps(case)).scene == case.scene
 

@@ -14,7 +14,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim import trees
-from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.condition import Condition, ConditionNode
 from bt_tasksim.trees.nodes.train import Train
 
 cpp = pytest.importorskip("behaviortreepy", reason="BehaviorTree.CPP's Python binding is not installed")
@@ -25,10 +25,8 @@ STATUS = {"R": Status.RUNNING, "S": Status.SUCCESS, "F": Status.FAILURE}
 CPP_STATUS = {"R": cpp.NodeStatus.RUNNING, "S": cpp.NodeStatus.SUCCESS, "F": cpp.NodeStatus.FAILURE}
 
 
-class Scripted(Condition):
+class ScriptedLeaf(ConditionNode):
     """A leaf that answers by a script, over and over, and writes down what happens to it."""
-
-    script = "S"
 
     def __init__(self):
         super().__init__()
@@ -38,11 +36,9 @@ class Scripted(Condition):
     def setup(self, **kwargs):
         pass
 
-    def holds(self, seen):
-        raise NotImplementedError
-
     def update(self):
-        answer = self.script[self.asked % len(self.script)]
+        script = self.model.script
+        answer = script[self.asked % len(script)]
         self.asked += 1
         self.log.append(f"{type(self).__name__} {answer}")
         return STATUS[answer]
@@ -50,6 +46,16 @@ class Scripted(Condition):
     def terminate(self, new_status):
         if new_status == Status.INVALID and self.status == Status.RUNNING:
             self.log.append(f"{type(self).__name__} halted")
+
+
+class Scripted(Condition):
+    """What the leaf is a leaf of."""
+
+    script = "S"
+    leaf_base = ScriptedLeaf
+
+    def holds(self, seen):
+        raise NotImplementedError
 
 
 def shapes() -> st.SearchStrategy:
@@ -70,8 +76,8 @@ def shapes() -> st.SearchStrategy:
     return st.recursive(SCRIPTS, extend, max_leaves=8)
 
 
-def build(shape) -> tuple[Behaviour, list[Scripted]]:
-    leaves: list[Scripted] = []
+def build(shape) -> tuple[Behaviour, list[ScriptedLeaf]]:
+    leaves: list[ScriptedLeaf] = []
 
     def node(part) -> Behaviour:
         if isinstance(part, str):
@@ -96,11 +102,11 @@ def build(shape) -> tuple[Behaviour, list[Scripted]]:
     return node(shape), leaves
 
 
-def register(factory, leaf: Scripted, log: list[str]) -> None:
-    name, asked = type(leaf).__name__, [0]
+def register(factory, leaf: ScriptedLeaf, log: list[str]) -> None:
+    name, script, asked = type(leaf).__name__, leaf.model.script, [0]
 
     def answer(node):
-        letter = leaf.script[asked[0] % len(leaf.script)]
+        letter = script[asked[0] % len(script)]
         asked[0] += 1
         log.append(f"{name} {letter}")
         return CPP_STATUS[letter]

@@ -289,7 +289,7 @@ def test_nodes_of_ones_own_come_from_a_file(tmp_path):
     with plugins.scratch():
         load_parts(str(file))
         root = load_source(str(tree)).build()
-        assert type(root).__name__ == "Shiny" and root.target == "cup"
+        assert type(root).__name__ == "Shiny" and root.model.target == "cup"
     file.write_text("from concept_nodes import Grasp\n")
     with pytest.raises(InputError, match="defines no concept and no condition"):
         own_nodes(str(file))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from bt_tasksim import trees
 from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.leaf import ModelLeaf
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Direction, Metres, ObjectName
 from bt_tasksim.core.errors import InputError
@@ -134,10 +135,14 @@ def test_parameters_of_a_subtree_are_put_in_place():
     assert trees.same_tree(tree, expected)
 
 
+def the_poke(tree):
+    return next(n for n in tree.iterate() if isinstance(n, ModelLeaf) and isinstance(n.model, Poke))
+
+
 def test_parameters_go_through_subtrees_of_subtrees():
     outer = '<BehaviorTree ID="outer"><SubTree ID="fetch" what="{thing}" far="{=}"/></BehaviorTree>'
     tree = read('<SubTree ID="outer" thing="cup" far="0.2"/>', outer, SUBTREE)
-    assert next(n for n in tree.iterate() if isinstance(n, Poke)).arguments() == {
+    assert the_poke(tree).arguments() == {
         "target": "cup",
         "distance": 0.2,
     }
@@ -147,7 +152,7 @@ def test_a_subtree_model_gives_defaults():
     port = '<input_port name="far" default="0.4"/>'
     model = f'<TreeNodesModel><SubTree ID="fetch">{port}</SubTree></TreeNodesModel>'
     tree = read('<SubTree ID="fetch" what="cup"/>', SUBTREE, model)
-    assert next(n for n in tree.iterate() if isinstance(n, Poke)).distance == 0.4
+    assert the_poke(tree).model.distance == 0.4
 
 
 @pytest.mark.parametrize(

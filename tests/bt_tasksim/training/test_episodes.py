@@ -10,8 +10,8 @@ from bt_tasksim.training.episodes import Episode
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.nodes.train import Train, train_nodes
 
-STILL = Action(np.zeros(1), np.bool_(False))
-DONE = Action(np.zeros(1), np.bool_(True))
+STILL = Action(np.zeros((1, 1)), np.array([False]))
+DONE = Action(np.zeros((1, 1)), np.array([True]))
 
 
 @pytest.fixture

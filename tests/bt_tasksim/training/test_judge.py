@@ -7,6 +7,7 @@ import pytest
 from py_trees.behaviours import Failure
 from toys import DONE, SCENE, Below, Check, Move, Raise, Unprogrammed, honest, play
 
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept_nodes import Wait
 from bt_tasksim.policy.policy import Action
 from bt_tasksim.scene.scene import CurriculumStage
@@ -85,7 +86,7 @@ def test_it_judges_once_it_has_one(env_of):
         name = "up"
 
         def act(self, model, seen, memory):
-            return Action(np.ones(1), seen.tool[2] > 0.6)
+            return Action(np.ones((1, 1)), seen.tool[:, 2] > 0.6)
 
     later = Unprogrammed(height=0.61, name="later")
     env = env_of(sequence("s", Train(Raise()), later), policies={"later": Up()})
@@ -176,7 +177,7 @@ def test_it_is_known_how_things_were_when_the_follower_began(env_of):
         """Is there when the tool is 0.1 m above where it was."""
 
         def sufficient_cost(self, known, memory):
-            rise = known.hidden.tool_pose[2] - known.began.tool_pose[2]
+            rise = known.hidden.tool_pose[:, 2] - known.began.tool_pose[:, 2]
             return np.abs(rise - 0.1) / 0.01
 
     env = env_of(sequence("s", Train(Raise()), Higher(0.55)))
@@ -185,15 +186,19 @@ def test_it_is_known_how_things_were_when_the_follower_began(env_of):
     assert end_of(env)["is_success"]
 
 
+class MoodyLeaf(ConceptNode):
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, **kwargs)
+        self.model.costs = iter([5.0])
+
+
 class Moody(Move):
     """Misses its goal the first time."""
 
-    def __init__(self, *args, **kwargs):
-        super().__init__(*args, **kwargs)
-        self.costs = iter([5.0])
+    leaf_base = MoodyLeaf
 
     def sufficient_cost(self, known, memory):
-        return next(self.costs, 0.0)
+        return np.array([next(self.costs, 0.0)])
 
 
 def test_a_round_in_which_nothing_was_decided_is_not_judged(env_of):

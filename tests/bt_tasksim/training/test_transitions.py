@@ -9,7 +9,7 @@ from bt_tasksim.training.transitions import Transitions
 
 
 def leaf():
-    return SimpleNamespace(model=SimpleNamespace(necessary_cost=lambda seen, memory: np.float64(seen)))
+    return SimpleNamespace(model=SimpleNamespace(necessary_cost=lambda seen, memory: np.array([seen])))
 
 
 def test_potentials_count_from_the_first_decision():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -148,7 +149,7 @@ def test_a_failed_parallel_says_why():
 
 def clocked(tree):
     context = Context.__new__(Context)
-    context.now = 0.0
+    context.times = np.zeros(1)
     for node in tree.iterate():
         node.setup(context=context)
     return context
@@ -160,7 +161,7 @@ def test_timeout_counts_episode_time():
     context = clocked(tree)
     out = ""
     for tick in range(5):
-        context.now = 7.0 + sum([0.05] * tick)
+        context.times = np.array([7.0 + sum([0.05] * tick)])
         out += ticks(tree, 1)
     assert out == "RRRFR"
     assert leaf.log == "RRRxR"
@@ -170,7 +171,7 @@ def test_timeout_names_what_was_not_done():
     tree = trees.timeout(0.1, Scripted("R"))
     context = clocked(tree)
     tree.tick_once()
-    context.now = 0.1
+    context.times = np.array([0.1])
     tree.tick_once()
     assert tree.status == Status.FAILURE
     assert tree.outcome == TIMED_OUT(TEXT(text="answer 1"), limit=0.1)

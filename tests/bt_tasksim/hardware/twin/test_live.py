@@ -228,8 +228,8 @@ def test_wrong_states_are_refused_and_the_run_goes_on(bench: Bench, stranger: An
             sent.append(4)
 
     thread = threading.Thread(target=pester)
-    runner, leaf = sweeping(bench.twin.port)
-    leaf.lasts = 2.0
+    runner, sweep = sweeping(bench.twin.port)
+    sweep.lasts = 2.0
     thread.start()
     try:
         with caplog.at_level(logging.WARNING, logger="bt_tasksim.ros"):
@@ -333,8 +333,8 @@ def test_bytes_that_are_no_protocol(bench: Bench) -> None:
         junk.send(rng.randbytes(200).decode("latin1"))
     junk.close()
     assert not bench.twin.ended()
-    runner, leaf = sweeping(bench.twin.port)
-    leaf.lasts = 0.3
+    runner, sweep = sweeping(bench.twin.port)
+    sweep.lasts = 0.3
     try:
         bench.evaluation.load(bench.configuration)
         assert runner.run(0).status.name == "SUCCESS"
