@@ -1,76 +1,42 @@
-"""Bundles of arrays: what a concept is shown, remembers and answers, taken apart, stacked and compared.
-
-A bundle is an array or number, or a dataclass, tuple, list or mapping of bundles.
-"""
+"""Bundles of arrays, compared: what a concept is shown, remembers and answers."""
 
 from __future__ import annotations
 
-import dataclasses
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from bt_tasksim.core.bundles import mapped, parts
 from bt_tasksim.core.poses import Array
 
 TOLERANCE = 1e-6
 """Difference of two numbers, in double precision, up to which they count as the same."""
 
 
-def parts(bundle: Any) -> dict[str, Any] | None:
-    """The parts of a bundle (dataclass, tuple, list or mapping), by name; None for anything else."""
-    if dataclasses.is_dataclass(bundle) and not isinstance(bundle, type):
-        return {f.name: getattr(bundle, f.name) for f in dataclasses.fields(bundle) if f.init}
-    if isinstance(bundle, tuple) and hasattr(bundle, "_asdict"):
-        return dict(bundle._asdict())
-    if isinstance(bundle, Mapping):
-        return {str(k): v for k, v in bundle.items()}
-    if isinstance(bundle, tuple | list):
-        return {str(k): v for k, v in enumerate(bundle)}
-    return None
-
-
-def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
-    """A bundle like the first one, whose arrays are made by ``function`` from those of all of them."""
-    first = bundles[0]
-    inner = parts(first)
-    if first is None or isinstance(first, str):
-        return first
-    if inner is None:
-        return function(*bundles)
-    others = [parts(b) or {} for b in bundles]
-    made = {k: mapped(function, *(o[k] for o in others)) for k in inner}
-    if isinstance(first, Mapping):
-        return dict(zip(first, made.values(), strict=True))
-    if isinstance(first, tuple | list) and not hasattr(first, "_asdict"):
-        return type(first)(made.values())
-    return type(first)(**made)
-
-
-def stacked(bundles: Sequence[Any]) -> Any:
-    """One bundle with a leading batch dimension, of several."""
-    return mapped(lambda *arrays: np.stack([np.asarray(a) for a in arrays]), *bundles)
-
-
-def in_torch(bundle: Any) -> Any:
-    """The same bundle with tensors."""
-    import torch
-
-    return mapped(lambda a: torch.from_numpy(np.array(a)), bundle)
+def joined(bundles: Sequence[Any]) -> Any:
+    """One bundle of all worlds of several, in their order; what is no array is that of the first one."""
+    return mapped(
+        lambda *arrays: np.concatenate(arrays) if is_array(arrays[0]) and arrays[0].ndim else arrays[0],
+        *bundles,
+    )
 
 
 def numbers(value: Any) -> Array:
     """An answer as a NumPy array."""
-    return value.detach().numpy() if _is_tensor(value) else np.asarray(value)
+    if is_tensor(value):
+        return value.detach().cpu().numpy()
+    return np.asarray(getattr(value, "_array", value))
 
 
 def is_array(value: Any) -> bool:
     """It is an array or a number of NumPy's, or a tensor."""
-    return isinstance(value, np.ndarray | np.generic) or _is_tensor(value)
+    return isinstance(value, np.ndarray | np.generic) or is_tensor(value)
 
 
-def _is_tensor(value: Any) -> bool:
+def is_tensor(value: Any) -> bool:
+    """It is a tensor of torch."""
     return "torch" in sys.modules and isinstance(value, sys.modules["torch"].Tensor)
 
 
@@ -97,25 +63,30 @@ def shapes(bundle: Any) -> object:
     return None if bundle is None or isinstance(bundle, str) else np.shape(numbers(bundle))
 
 
+def without_worlds(bundle: Any, worlds: int, name: str) -> str:
+    """The first part of a bundle that is no array with a row for each world, in words; empty for none."""
+    inner = parts(bundle)
+    if inner is not None:
+        found = (without_worlds(value, worlds, f"{name}.{key}") for key, value in inner.items())
+        return next((text for text in found if text), "")
+    if bundle is None or isinstance(bundle, str):
+        return ""
+    if not is_array(bundle):
+        return f"{name} is a {type(bundle).__name__}"
+    return "" if bundle.shape[:1] == (worlds,) else f"{name} has the shape {tuple(bundle.shape)}"
+
+
 def different(
-    name: str,
-    one: Sequence[Any],
-    many: Any,
-    n: int,
-    tolerance: float = TOLERANCE,
-    library: type | None = None,
-    one_for_all: bool = False,
+    name: str, one: Sequence[Any], many: Any, tolerance: float = TOLERANCE, library: type | None = None
 ) -> list[str]:
-    """How an answer to a batch differs from those one by one.
+    """How an answer to a batch differs from those to its worlds, one by one.
 
     Args:
         name: What is compared, for the sentences.
-        one: Answers one by one.
-        many: The answer to the batch.
-        n: Size of the batch.
-        tolerance: Largest difference.
+        one: Answers to worlds one by one, each with one row.
+        many: The answer to the batch of these worlds.
+        tolerance: Largest difference; 0: the bits are to be the same.
         library: Type that arrays should have.
-        one_for_all: The answer to a batch may be a single one.
     """
     inner = parts(one[0])
     if inner is not None:
@@ -125,23 +96,33 @@ def different(
         each = [parts(o) or {} for o in one]
         out: list[str] = []
         for k, value in whole.items():
-            out += different(f"{name}.{k}", [o[k] for o in each], value, n, tolerance, library, one_for_all)
+            out += different(f"{name}.{k}", [o.get(k) for o in each], value, tolerance, library)
         return out
     if one[0] is None or isinstance(one[0], str):
-        return [] if many == one[0] or many is None else [f"{name}: a batch gives {many!r}, not {one[0]!r}"]
-    alone: Array = np.stack([numbers(o) for o in one])
+        return [] if many == one[0] else [f"{name}: a batch gives {many!r}, not {one[0]!r}"]
+    each_row = [numbers(o) for o in one]
     together = numbers(many)
-    if together.ndim == 0 and not one_for_all:
-        return [f"{name}: a batch of {n} gives one number"]
-    if library is not None and together.ndim and not isinstance(many, library):
+    if len({row.shape for row in each_row}) > 1 or not each_row[0].ndim:
+        return [f"{name}: one by one it has the shapes {sorted({row.shape for row in each_row})}"]
+    alone: Array = np.concatenate(each_row)
+    if library is not None and not isinstance(many, library):
         return [f"{name}: gives a {type(many).__name__}"]
-    if together.ndim and together.shape != alone.shape:
+    if together.ndim == 0:
+        return [f"{name}: a batch of {len(one)} gives one number"]
+    if together.shape != alone.shape:
         return [f"{name}: a batch gives the shape {together.shape}, one by one it is {alone.shape}"]
     if (together.dtype == bool) != (alone.dtype == bool):
         return [f"{name}: a batch gives {together.dtype}, one by one it is {alone.dtype}"]
-    together = np.broadcast_to(together, alone.shape)
-    if not np.allclose(together, alone, rtol=0.0, atol=tolerance, equal_nan=True):
-        gap = np.abs(together.astype(float) - alone.astype(float))
-        wrong = int(np.sum(gap > tolerance))
-        return [f"{name}: {wrong} of {gap.size} numbers differ, by up to {np.nanmax(gap):.3g}"]
-    return []
+    return _unequal(name, together, alone, tolerance)
+
+
+def _unequal(name: str, together: Array, alone: Array, tolerance: float) -> list[str]:
+    if alone.dtype.kind not in "fiub":
+        wrong = together != alone
+        return [f"{name}: {wrong.sum()} of {wrong.size} texts differ"] if wrong.any() else []
+    a, b = together.astype(float), alone.astype(float)
+    close = np.isclose(a, b, rtol=0.0, atol=tolerance, equal_nan=True)
+    if close.all():
+        return []
+    most = np.nanmax(np.abs(a - b))
+    return [f"{name}: {np.sum(~close)} of {close.size} numbers differ, by up to {most:.3g}"]

@@ -19,6 +19,7 @@ from bt_tasksim.checking.recording import Recording, record
 from bt_tasksim.checking.situations import RecordedDecision, Situations, alike
 from bt_tasksim.checking.values import check_values
 from bt_tasksim.checking.watching import check_observables, check_watching
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.trees.nodes.train import concepts_in, follower_of, train_nodes
@@ -107,22 +108,22 @@ def check_concept(concept: type[ConceptModel], name: str, root: Any, runs: Recor
     Returns:
         What was found, and what was checked.
     """
-    leaves = [leaf for leaf in runs.decisions if _same(type(leaf), concept)]
+    leaves = [leaf for leaf in runs.decisions if _same(leaf.model_class, concept)]
     leaf = max(leaves, key=lambda leaf: len(runs.decisions[leaf]), default=None)
     decisions = runs.decisions[leaf] if leaf is not None else []
-    case = Case(type(leaf) if leaf is not None else concept, decisions, _followed(root, leaf))
+    case = Case(leaf.model_class if leaf is not None else concept, decisions, _followed(root, leaf))
     check_declaration(case)
     if not decisions:
         _never_acted(case, name, leaves, runs)
         check_observables(case)
         return case, f"{concept.__name__}, its declaration alone"
-    situations = Situations(spread(decisions, MOST), leaf=case.leaf)
+    situations = Situations(spread(decisions, MOST), model=case.model)
     compared = ""
     for part in (check_watching, check_values, check_beginning, check_purity):
         part(case, situations)
-    if check_batches(case, Situations(spread(alike(decisions), MOST), leaf=case.leaf)):
+    if check_batches(case, Situations(spread(alike(decisions), MOST), model=case.model)):
         compared = ", torch"
-    if case.leaf is not None and case.leaf.is_programmed and "done" in case.functions:
+    if case.model is not None and case.model.is_programmed and "done" in case.functions:
         _check_done(case, runs)
     programmed = f"{len(case.functions)} functions in {len(situations)} situations of {len(runs.ends)} runs"
     return case, f"{concept.__name__}, {programmed} of {Path(name).name}, one by one, in batches{compared}"
@@ -149,9 +150,9 @@ def _scenario_with(concept: type[ConceptModel]) -> str:
     found = ""
     for name in scenarios():
         root = load_source(name).build()
-        if any(_same(type(leaf), concept) for node in train_nodes(root) for leaf in concepts_in(node)):
+        if any(_same(leaf.model_class, concept) for node in train_nodes(root) for leaf in concepts_in(node)):
             return name
-        if not found and any(_same(type(leaf), concept) for leaf in concepts_in(root)):
+        if not found and any(_same(leaf.model_class, concept) for leaf in concepts_in(root)):
             found = name
     return found
 
@@ -161,9 +162,10 @@ def _record(name: str, concepts: Sequence[type[ConceptModel]]) -> tuple[Any, Rec
 
     source = load_source(name)
     root = source.build()
-    watched = [type(leaf) for leaf in concepts_in(root) if any(_same(type(leaf), c) for c in concepts)]
+    present = [leaf.model_class for leaf in concepts_in(root)]
+    watched = [kind for kind in present if any(_same(kind, c) for c in concepts)]
     if not watched:
-        known = ", ".join(sorted({type(leaf).__name__ for leaf in concepts_in(root)})) or "none"
+        known = ", ".join(sorted({kind.__name__ for kind in present})) or "none"
         wanted = " or ".join(c.__name__ for c in concepts)
         raise InputError(f"the tree '{name}' has no leaf of {wanted}; its concepts: {known}")
     stream = "training" if source.scene.stages else "evaluation"
@@ -179,13 +181,13 @@ def _file(concept: type) -> Path:
     return Path(inspect.getsourcefile(concept) or "").resolve()
 
 
-def _followed(root: Any, leaf: ConceptModel | None) -> bool:
+def _followed(root: Any, leaf: ConceptNode | None) -> bool:
     if root is None or leaf is None:
         return False
     return any(leaf in concepts_in(node) and follower_of(node) is not None for node in train_nodes(root))
 
 
-def _never_acted(case: Case, name: str, leaves: Sequence[ConceptModel], runs: Recording) -> None:
+def _never_acted(case: Case, name: str, leaves: Sequence[ConceptNode], runs: Recording) -> None:
     if not name:
         what = "stands in no tree that is known, so its functions were not run"
         remedy = f"give the file build() and scene(), or write {BESIDE}{case.file.name}, or name a --tree"
@@ -214,10 +216,10 @@ def _blamed(error: BaseException, file: Path) -> str:
 
 def _check_done(case: Case, runs: Recording) -> None:
     """The programmed policy ends at least once."""
-    leaf = case.leaf
-    assert leaf is not None
+    model = case.model
+    assert model is not None
     for decision in case.decisions:
-        found = case.call("done", lambda d=decision: leaf.done(d.seen, d.memory))  # type: ignore[misc]
+        found = case.call("done", lambda d=decision: model.done(d.seen, d.memory))  # type: ignore[misc]
         if found is FAILED or bool(np.any(numbers(found))):
             return
     what = f"is never true in {len(runs.ends)} runs (the last one ended: {runs.ends[-1]})"

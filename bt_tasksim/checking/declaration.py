@@ -37,7 +37,7 @@ def _check_parameters(case: Case) -> None:
             if bare and name not in declared:
                 what = f"'{name}: {getattr(hint, '__name__', hint)}' has no unit, so it is no parameter"
                 case.add(ERROR, "", what, "declare it as Metres, Radians, Seconds, Newtons or Ratio")
-    given = dict(case.leaf.values) if case.leaf is not None else {}
+    given = dict(case.model.values) if case.model is not None else {}
     for name, parameter in declared.items():
         unit = parameter.quantity.unit
         values = [] if parameter.required else [parameter.default]

@@ -11,6 +11,7 @@ from typing import Any
 
 from bt_tasksim.checking.questions import QUESTIONS
 from bt_tasksim.checking.situations import RecordedDecision, Situation, Situations
+from bt_tasksim.concept.functions import ConceptFunctions
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Seen
 
@@ -47,21 +48,6 @@ class Finding:
         return f"{self.level} {where}{line}: {self.what}; {self.remedy}"
 
 
-class OutOfReachError(Exception):
-    """A function of a concept has reached for what it must not know."""
-
-
-class Barred:
-    """Stands for the tree's context, which no pure function may use."""
-
-    def __init__(self) -> None:
-        self.reached: list[str] = []
-
-    def __getattr__(self, name: str) -> Any:
-        self.reached.append(name)
-        raise OutOfReachError(name)
-
-
 class Case:
     """One concept that is checked, with what is known of it and what was found.
 
@@ -79,13 +65,7 @@ class Case:
         self.file = Path(inspect.getsourcefile(concept) or "")
         self.findings: list[Finding] = []
         self._said: set[tuple[str, str]] = set()
-        self.barred = Barred()
-        self.leaf: ConceptModel | None = None
-        if decisions:
-            self.leaf = copy.copy(decisions[0].leaf)
-            self.leaf._model = self.leaf
-            self.leaf._context = self.barred  # type: ignore[assignment]  # on purpose
-            self.leaf._policy = None
+        self.model: ConceptFunctions | None = copy.copy(decisions[0].leaf.model) if decisions else None
 
     def overrides(self, name: str) -> bool:
         """The concept has a function of its own by this name."""
@@ -129,7 +109,7 @@ class Case:
 
     def ask(self, name: str, situation: Situation, like: Situations, seen: Seen | None = None) -> Any:
         """What a function answers; `FAILED`, and a finding, where it raises."""
-        return self.call(name, lambda: like.ask(name, situation, self.leaf, seen))
+        return self.call(name, lambda: like.ask(name, situation, self.model, seen))
 
     def call(self, name: str, answer: Callable[[], Any], where: str = "") -> Any:
         """What a call gives; `FAILED`, and a finding, where it raises.
@@ -139,22 +119,11 @@ class Case:
             answer: The call.
             where: In what case it was made, for the sentence.
         """
-        before = len(self.barred.reached)
         try:
-            found = answer()
+            return answer()
         except Exception as error:  # whatever it is, the user is to read it
-            found = FAILED
-            if not isinstance(error, OutOfReachError) and len(self.barred.reached) == before:
-                self.raised(name, error, where)
-        if len(self.barred.reached) > before:
-            self.add(
-                ERROR,
-                name,
-                f"reaches for the tree's context ('{self.barred.reached[-1]}'), where the hidden state is",
-                "a robot does not have it: use what 'seen' and 'memory' hold",
-                "context",
-            )
-        return found
+            self.raised(name, error, where)
+            return FAILED
 
     def raised(self, name: str, error: BaseException, where: str = "") -> None:
         """Note an exception."""
@@ -165,7 +134,7 @@ class Case:
                 line = trace.tb_lineno
             trace = trace.tb_next
         remedy = {
-            " for a batch": "write [..., :3] for [:3], xp.where for if, and xp's functions for those of math",
+            " for a batch": "write [:, :3] for [:3], xp.where for if, and xp's functions for those of math",
             " for tensors": "take functions from poses.array_namespace, and constants from poses.constant",
         }.get(where, "put it right")
         text = str(error).split("\n")[0] or "no reason given"

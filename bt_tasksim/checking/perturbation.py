@@ -1,15 +1,14 @@
-"""What is seen, what is hidden and what is remembered, changed at random."""
+"""What is seen, what is hidden and what is remembered, changed at random; all arrays are ``(N, ...)``."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from bt_tasksim.checking.bundles import parts
 from bt_tasksim.core import poses
+from bt_tasksim.core.bundles import mapped
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, Observation
 from bt_tasksim.planning.reference_motion import Path
@@ -17,15 +16,17 @@ from bt_tasksim.planning.reference_motion import Path
 
 def changed_observation(o: Observation, rng: np.random.Generator) -> Observation:
     """Elsewhere, otherwise felt, at another time."""
+    closure = np.clip(o.closure + rng.normal(scale=0.2, size=o.closure.shape), 0, 1)
+    which = rng.integers(0, 3, o.closure.shape)
     return dataclasses.replace(
         o,
-        time=o.time + rng.uniform(0, 1),
+        time=o.time + rng.uniform(0, 1, o.time.shape),
         tool_pose=changed_pose(o.tool_pose, rng),
         objects=changed_pose(o.objects, rng),
         tips=o.tips + rng.normal(scale=0.01, size=o.tips.shape),
         contacts=rng.random(o.contacts.shape) < 0.6,
-        closure=np.float64(rng.choice([0.0, 1.0, np.clip(o.closure + rng.normal(scale=0.2), 0, 1)])),
-        wrench=o.wrench + rng.normal(scale=3.0, size=6),
+        closure=np.where(which == 0, 0.0, np.where(which == 1, 1.0, closure)),
+        wrench=o.wrench + rng.normal(scale=3.0, size=o.wrench.shape),
     )
 
 
@@ -50,26 +51,14 @@ def changed_memory(memory: Any, rng: np.random.Generator) -> Any:
     """A memory of the same kind with other numbers."""
     if isinstance(memory, Path):
         table = memory.table.copy()
-        table[:, :3] += rng.normal(scale=0.01, size=3)
+        table[..., :3] += rng.normal(scale=0.01, size=(len(table), 1, 3))
         return memory._replace(table=table, duration=memory.duration * rng.uniform(0.7, 1.3))
-    inner = parts(memory)
-    if inner is None:
-        return _changed(memory, rng)
-    made = {k: changed_memory(v, rng) for k, v in inner.items()}
-    if isinstance(memory, Mapping):
-        return dict(zip(memory, made.values(), strict=True))
-    if isinstance(memory, tuple | list) and not hasattr(memory, "_asdict"):
-        return type(memory)(made.values())
-    return type(memory)(**made)
+    if hasattr(memory, "_fields"):
+        return type(memory)(*(changed_memory(value, rng) for value in memory))
+    return mapped(lambda value: _changed(value, rng), memory)
 
 
 def _changed(value: Any, rng: np.random.Generator) -> Any:
-    if isinstance(value, bool | np.bool_):
-        return np.bool_(rng.random() < 0.5)
-    if isinstance(value, int | np.integer):
-        return np.int64(rng.integers(0, 5))
-    if isinstance(value, float | np.floating):
-        return np.float64(value + rng.choice([0.0, 1.0, 2.5]))
     if not isinstance(value, np.ndarray):
         return value
     if value.dtype == bool:

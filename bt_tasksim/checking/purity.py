@@ -1,7 +1,8 @@
-"""Pure, and the same one by one, in batches and in torch."""
+"""Pure, and the same world by world, in batches and in torch."""
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import random
 import sys
@@ -10,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.checking.bundles import different, frozen, mapped, numbers, parts
+from bt_tasksim.checking.bundles import different, frozen
 from bt_tasksim.checking.findings import ERROR, FAILED, Case
 from bt_tasksim.checking.questions import QUESTIONS
 from bt_tasksim.checking.situations import Situation, Situations
-from bt_tasksim.concept.seen import Seen
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.poses import Array
 
 DATA = (bool, int, float, str, list, dict, set, np.ndarray)
 
@@ -22,12 +24,14 @@ DATA = (bool, int, float, str, list, dict, set, np.ndarray)
 def check_purity(case: Case, situations: Situations) -> None:
     """Functions change nothing, remember nothing, and give the same answer to the same question."""
     for name in case.functions:
+        if QUESTIONS[name].begins:
+            continue
         answers = []
         for situation in situations.single:
-            before = _surroundings(case, situations, situation)
+            before = _surroundings(case, situation)
             answer = case.ask(name, situation, situations)
             again = case.ask(name, situation, situations)
-            _compare(case, name, before, _surroundings(case, situations, situation))
+            _compare(case, name, before, _surroundings(case, situation))
             answers.append(frozen(answer))
             if frozen(again) != answers[-1]:
                 _unsteady(case, name)
@@ -38,17 +42,13 @@ def check_purity(case: Case, situations: Situations) -> None:
 
 def check_beginning(case: Case, situations: Situations) -> None:
     """What runs once at the start may plan and search, and leaves what it was given as it is."""
-    leaf = case.leaf
-    assert leaf is not None
     firsts = [s for s, d in zip(situations.single, case.decisions, strict=False) if d.first]
-    for name in ("initial_state", "begin"):
-        if not case.overrides(name):
-            continue
+    for name in (n for n in case.functions if QUESTIONS[n].begins and not case.has(n, "text")):
         for situation in firsts or situations.single[:1]:
-            before = _surroundings(case, situations, situation)
-            seen = Seen(situation.observation, situations.world, situations.robot, situation.elapsed)
-            case.call(name, lambda n=name, s=seen: getattr(leaf, n)(s))  # type: ignore[misc]
-            _compare(case, name, before, _surroundings(case, situations, situation))
+            before = _surroundings(case, situation)
+            with contextlib.suppress(NoWayError):
+                case.ask(name, situation, situations)
+            _compare(case, name, before, _surroundings(case, situation))
 
 
 def _compare(case: Case, name: str, before: dict[str, Any], after: dict[str, Any]) -> None:
@@ -62,7 +62,7 @@ _CHANGES = {
     "seen": ("changes what it is shown in 'seen'", "work on a copy: seen.tool.copy()"),
     "memory": ("changes the memory it is given", "return a new one from advance: memory._replace(...)"),
     "hidden": ("changes the hidden state", "work on a copy"),
-    "self": ("changes its own leaf or class", f"keep nothing on self: {KEEP}"),
+    "self": ("changes itself or its class", f"keep nothing on self: {KEEP}"),
     "module": ("changes a global variable", f"keep nothing there: {KEEP}"),
     "random": ("draws from global random numbers", "draw nothing: decide from what is seen"),
 }
@@ -81,18 +81,18 @@ def _unsteady(case: Case, name: str) -> None:
     )
 
 
-def _surroundings(case: Case, situations: Situations, situation: Situation) -> dict[str, Any]:
+def _surroundings(case: Case, situation: Situation) -> dict[str, Any]:
     """Everything that a pure function leaves as it is."""
-    leaf, concept = case.leaf, case.concept
+    concept = case.concept
     module = vars(sys.modules[concept.__module__]) if concept.__module__ in sys.modules else {}
     dice: list[Any] = [frozen(np.random.get_state(legacy=False)), random.getstate()]  # noqa: NPY002
     if "torch" in sys.modules:
         dice.append(frozen(sys.modules["torch"].random.get_rng_state()))
     return {
-        "seen": frozen((situation.observation, situation.elapsed, situations.world)),
+        "seen": frozen((situation.observation, situation.elapsed, situation.world)),
         "memory": frozen(situation.memory),
         "hidden": frozen((situation.hidden, situation.began)),
-        "self": frozen({**vars(leaf), **{f"class {k}": v for k, v in _data(vars(concept)).items()}}),
+        "self": frozen({**vars(case.model), **{f"class {k}": v for k, v in _data(vars(concept)).items()}}),
         "module": frozen(_data(module)),
         "random": dice,
     }
@@ -103,89 +103,60 @@ def _data(names: Any) -> dict[str, Any]:
 
 
 def check_batches(case: Case, situations: Situations) -> bool:
-    """The answer to a batch is the batch of the answers, with one and with two leading dimensions.
+    """The answer to a batch of worlds has the answers to each of them as its rows, in any order.
 
     Returns:
         They were compared in torch, too.
     """
+    if case.has("begin", "rows") or case.has("advance", "rows"):
+        return False  # its memories cannot stand in a batch
     torch = importlib.util.find_spec("torch") is not None
+    rng = np.random.default_rng(2)
     for name in case.functions:
-        one = [case.ask(name, s, situations) for s in situations.single]
-        if any(o is FAILED for o in one):
+        if _unfit(case, name):
             continue
-        n = len(one)
-        many = _batch(case, name, situations)
-        if many is FAILED:
+        found = case.call(name, lambda n=name: situations.asking(n))  # type: ignore[misc]
+        if found is FAILED:
             continue
-        found = different("the answer", one, many, n) if not _single_is_fine(name, many) else []
-        for text in found[:1]:
-            case.add(
-                ERROR,
-                name,
-                f"a batch is not the loop over it: {_part(text)}",
-                "write [..., :3] for [:3], xp.where for if, axis=-1 in sums",
-                "batch",
-            )
-        if not found:
-            _check_two_dimensions(case, name, situations, many)
-        if torch:
-            _check_torch(case, name, situations, one, n)
+        rows = np.array(found, np.int64)
+        one = {k: case.ask(name, situations.single[k], situations) for k in rows.tolist()}
+        if not one or any(o is FAILED for o in one.values()):
+            continue
+        for order in (rows, rng.permutation(rows)):
+            batch = situations.batch.at(order)
+            many = case.call(name, lambda n=name, b=batch: situations.ask(n, b, case.model), " for a batch")  # type: ignore[misc]
+            if many is FAILED:
+                break
+            for text in different("the answer", [one[k] for k in order.tolist()], many)[:1]:
+                what = f"a batch is not the loop over it: {_part(text)}"
+                case.add(
+                    ERROR, name, what, "write [:, :3] for [:3], xp.where for if, axis=-1 in sums", "batch"
+                )
+        if torch and not case.has(name, "batch") and not case.has(name, "raises for a batch"):
+            _check_torch(case, name, situations, rows, list(one.values()))
     return torch
 
 
-def _batch(case: Case, name: str, situations: Situations) -> Any:
-    return case.call(name, lambda: situations.ask(name, situations.batch, case.leaf), " for a batch")
-
-
-def _single_is_fine(name: str, many: Any) -> bool:
-    return QUESTIONS[name].one_for_all and parts(many) is None and numbers(many).ndim == 0
+def _unfit(case: Case, name: str) -> bool:
+    """It was found to give something that can not be compared."""
+    return case.has(name, "text") or case.has(name, "rows")
 
 
 def _part(text: str) -> str:
     return text.removeprefix("the answer: ").replace("the answer.", "")
 
 
-def _check_two_dimensions(case: Case, name: str, situations: Situations, many: Any) -> None:
-    half = len(situations) // 2
-    if half == 0:
-        return
-    wide = mapped(lambda a: a[: 2 * half].reshape(2, half, *a.shape[1:]), situations.batch)
-    answer = case.call(name, lambda: situations.ask(name, wide, case.leaf), " for a batch")
-    if answer is FAILED or _single_is_fine(name, many):
-        return
-
-    def same(a: Any, b: Any) -> bool:
-        inner = parts(a)
-        if inner is not None:
-            other = parts(b) or {}
-            return all(same(v, other.get(k)) for k, v in inner.items())
-        if a is None or b is None or isinstance(a, str):
-            return a is b or a == b
-        first, second = numbers(a), numbers(b)
-        should = (2, half, *first.shape[1:])
-        return second.shape == should and np.allclose(
-            first[: 2 * half].reshape(should), second, rtol=0.0, atol=1e-6, equal_nan=True
-        )
-
-    if not same(many, answer):
-        case.add(
-            ERROR,
-            name,
-            "a batch with two leading dimensions is not the loop over it",
-            "write axis=-1 for axis=1, and [..., 0] for [:, 0]",
-            "batch",
-        )
-
-
-def _check_torch(case: Case, name: str, situations: Situations, one: list[Any], n: int) -> None:
+def _check_torch(case: Case, name: str, situations: Situations, rows: Array, one: list[Any]) -> None:
     import torch
 
+    batch = situations.torch.at(torch.from_numpy(rows))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # torch's words about read-only constants are none of the user's
-        answer = case.call(name, lambda: situations.ask(name, situations.torch, case.leaf), " for tensors")
-    if answer is FAILED or _single_is_fine(name, answer) or case.has(name, "batch"):
+        answer = case.call(name, lambda: situations.ask(name, batch, case.model), " for tensors")
+    if answer is FAILED:
         return
-    for text in different("the answer", one, answer, n, library=torch.Tensor)[:1]:
+    library = None if QUESTIONS[name].words else torch.Tensor
+    for text in different("the answer", one, answer, library=library)[:1]:
         case.add(
             ERROR,
             name,

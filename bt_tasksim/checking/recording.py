@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.checking.situations import RecordedDecision
+from bt_tasksim.checking.situations import RecordedDecision, whole
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.errors import BtTasksimError
@@ -36,7 +37,7 @@ class Recording:
         errors: What a run raised.
     """
 
-    decisions: dict[ConceptModel, list[RecordedDecision]]
+    decisions: dict[ConceptNode, list[RecordedDecision]]
     ends: list[str]
     errors: list[BaseException]
 
@@ -56,7 +57,7 @@ class Spy:
 
     def __init__(
         self,
-        leaf: ConceptModel,
+        leaf: ConceptNode,
         policy: Policy | None,
         runner: Runner,
         notes: list[RecordedDecision],
@@ -66,7 +67,7 @@ class Spy:
         self.policy, self.runner, self.notes = policy, runner, notes
         self.run = 0
         self._rng = None if explore is None else np.random.default_rng(explore)
-        self._motion: Array = np.zeros(0)
+        self._motion: Array = np.zeros((1, 0))
         self._held = 0
         self._activation = -1
         self._began: Hidden | None = None
@@ -77,6 +78,7 @@ class Spy:
             raise TypeError(f"the spy on leaf '{self.leaf.name}' was asked outside of a tree")
         leaf = self.leaf
         hidden = self.runner.context.hidden()
+        hidden = None if hidden is None else whole(Hidden, hidden)
         first = self._activation != leaf.activations
         if first:
             self._activation, self._began = leaf.activations, hidden
@@ -86,12 +88,12 @@ class Spy:
             return self.policy.act(model, seen, memory)
         rng = self._rng or np.random.default_rng(0)
         if self._held % HOLD == 0:
-            self._motion = rng.uniform(-1.0, 1.0, model.actions)
+            self._motion = rng.uniform(-1.0, 1.0, (1, model.actions))
         self._held += 1
         if self.policy is not None:
             terminate = self.policy.act(model, seen, memory).terminate
         else:
-            terminate = np.bool_(rng.random() < 0.01)
+            terminate = rng.random(1) < 0.01
         return Action(self._motion, terminate)
 
 
@@ -117,19 +119,19 @@ def record(
         options: Which engines.
     """
     runner = Runner(tree, scene, options or EngineOptions(), longest=LONGEST)
-    leaves = [leaf for leaf in tree.iterate() if isinstance(leaf, ConceptModel)]
+    leaves = [leaf for leaf in tree.iterate() if isinstance(leaf, ConceptNode)]
     out = Recording({}, [], [])
-    kept: list[tuple[ConceptModel, Policy]] = []
+    kept: list[tuple[ConceptNode, Policy]] = []
     spies: list[Spy] = []
     for leaf in leaves:
-        if watched is not None and type(leaf) not in watched:
+        if watched is not None and type(leaf.model) not in watched:
             continue
         policy: Policy | None
         if watched is None:
             policy = leaf.policy_in_use
             kept.append((leaf, policy))
         else:
-            policy = ProgrammedPolicy() if leaf.is_programmed else None
+            policy = ProgrammedPolicy() if leaf.model.is_programmed else None
         notes = out.decisions.setdefault(leaf, [])
         spies.append(Spy(leaf, policy, runner, notes))
         leaf.use(spies[-1])

@@ -1,4 +1,4 @@
-"""Shapes, units and sizes of what a concept's functions give, and what its actions do."""
+"""Shapes, units and sizes of what a concept's functions give for one world, and what its actions do."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.checking.bundles import numbers, parts
+from bt_tasksim.checking.bundles import numbers, without_worlds
 from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
 from bt_tasksim.checking.situations import Situation, Situations, perturbed
-from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.functions import ConceptFunctions, sequence_of
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.core.outcomes import Outcome, Statement
+from bt_tasksim.core.bundles import parts
+from bt_tasksim.core.errors import InputError, NoWayError
+from bt_tasksim.core.outcomes import Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Command
 
@@ -43,7 +45,7 @@ def check_values(case: Case, situations: Situations) -> None:
             _check_memory(case, situation.memory, case.ask("advance", situation, situations))
     if "features" in case.functions:
         _check_features(case, situations)
-    _check_begin(case)
+    _check_begin(case, situations)
     _check_actions(case, situations)
     _check_words(case, situations)
 
@@ -52,33 +54,31 @@ def _check_boolean(case: Case, name: str, answer: Any) -> None:
     if answer is FAILED:
         return
     found = numbers(answer)
-    if found.dtype != bool or found.shape != ():
-        what = f"gives {found.dtype} of shape {found.shape}"
-        case.add(ERROR, name, what, "give one boolean for each situation: a comparison such as cost < limit")
+    if found.dtype != bool or found.shape != (1,):
+        what = f"gives {_kind(answer)} for one world"
+        case.add(ERROR, name, what, "give a boolean for each world: a comparison such as cost < limit")
 
 
 def _check_cost(case: Case, name: str, answer: Any) -> None:
     if answer is FAILED:
         return
     found = numbers(answer)
-    if found.dtype.kind not in "fiu" or found.shape != ():
-        what = f"gives {found.dtype} of shape {found.shape}"
-        case.add(
-            ERROR, name, what, "give one number for each situation: poses.norm(v), or xp.sum(v, axis=-1)"
-        )
-    elif not np.isfinite(found):
+    if found.dtype.kind not in "fiu" or found.shape != (1,):
+        what = f"gives {_kind(answer)} for one world"
+        case.add(ERROR, name, what, "give a number for each world: poses.norm(v), or xp.sum(v, axis=-1)")
+    elif not np.isfinite(found).all():
         case.add(
             ERROR,
             name,
-            f"gives {found}",
+            f"gives {found[0]}",
             "give a finite number, where nothing is known a large one",
             "finite",
         )
-    elif found < 0.0:
+    elif found[0] < 0.0:
         case.add(
             ERROR,
             name,
-            f"gives {found:.3g}",
+            f"gives {found[0]:.3g}",
             "a cost is 0 when the goal is reached, and never negative",
             "sign",
         )
@@ -95,16 +95,16 @@ def _check_command(case: Case, answer: Any, situations: Situations) -> None:
     if answer.hand is None:
         return
     hand, n = numbers(answer.hand), 1 + len(situations.robot.synergies)
-    if hand.shape != (n,):
-        what = f"gives a hand target of shape {hand.shape}"
-        remedy = f"(..., {n}) is the closure and {n - 1} synergies: closure[..., None]"
+    if hand.shape != (1, n):
+        what = f"gives a hand target of shape {hand.shape} for one world"
+        remedy = f"(N, {n}) is the closure and {n - 1} synergies: closure[..., None]"
         case.add(ERROR, "command", what, remedy, "hand")
     elif not np.isfinite(hand).all():
         case.add(
             ERROR, "command", "gives a hand target that is not finite", "find the division by zero", "hand"
         )
-    elif not 0.0 <= hand[0] <= 1.0:
-        what = f"gives a closure of {hand[0]:.3g}"
+    elif not 0.0 <= hand[0, 0] <= 1.0:
+        what = f"gives a closure of {hand[0, 0]:.3g}"
         case.add(
             ERROR,
             "command",
@@ -115,26 +115,26 @@ def _check_command(case: Case, answer: Any, situations: Situations) -> None:
 
 
 def _check_tool(case: Case, tool: Array) -> None:
-    if tool.shape != (7,):
-        what = f"gives a tool target of shape {tool.shape}"
+    if tool.shape != (1, 7):
+        what = f"gives a tool target of shape {tool.shape} for one world"
         case.add(
             ERROR,
             "command",
             what,
-            "(..., 7) is position and quaternion w x y z: xp.concat([p, q], axis=-1)",
+            "(N, 7) is position and quaternion w x y z: xp.concat([p, q], axis=-1)",
             "tool",
         )
     elif not np.isfinite(tool).all():
         case.add(
             ERROR, "command", "gives a tool target that is not finite", "find the division by zero", "tool"
         )
-    elif abs(float(np.linalg.norm(tool[3:])) - 1.0) > UNIT:
-        what = f"gives a quaternion of length {np.linalg.norm(tool[3:]):.3g}"
+    elif abs(float(np.linalg.norm(tool[0, 3:])) - 1.0) > UNIT:
+        what = f"gives a quaternion of length {np.linalg.norm(tool[0, 3:]):.3g}"
         case.add(
             ERROR, "command", what, "its order is w x y z, its length one: poses.normalise(q)", "quaternion"
         )
-    elif float(np.linalg.norm(tool[:3])) > FAR:
-        what = f"commands the tool {np.linalg.norm(tool[:3]):.3g} m away from the robot's base"
+    elif float(np.linalg.norm(tool[0, :3])) > FAR:
+        what = f"commands the tool {np.linalg.norm(tool[0, :3]):.3g} m away from the robot's base"
         case.add(ERROR, "command", what, "positions are in metres, in the robot base frame", "far")
 
 
@@ -142,7 +142,11 @@ def _check_memory(case: Case, before: Any, after: Any) -> None:
     if after is FAILED:
         return
     a, b = _structure(before), _structure(after)
-    if a != b:
+    if wrong := without_worlds(after, 1, "memory"):
+        case.add(
+            ERROR, "advance", f"gives no array with a row for each world: {wrong} for one world", ROWS, "rows"
+        )
+    elif a != b:
         what = f"loses the memory's structure: {_first_difference(before, after)}"
         case.add(
             ERROR, "advance", what, "return a memory of the same kind: memory._replace(...)", "structure"
@@ -172,9 +176,9 @@ def _first_difference(before: Any, after: Any, name: str = "memory") -> str:
 
 
 def _check_features(case: Case, situations: Situations) -> None:
-    leaf = case.leaf
-    assert leaf is not None
-    layout = case.call("layout", lambda: dict(type(leaf).layout(situations.robot)))
+    model = case.model
+    assert model is not None
+    layout = case.call("layout", lambda: dict(model.layout(situations.robot)))
     if layout is FAILED:
         return
     rows = []
@@ -183,15 +187,15 @@ def _check_features(case: Case, situations: Situations) -> None:
         if found is FAILED:
             return
         row = numbers(found)
-        if row.shape != (sum(layout.values()),):
-            what = f"gives the shape {row.shape}, and layout says ({sum(layout.values())},)"
+        if row.shape != (1, sum(layout.values())):
+            what = f"gives the shape {row.shape} for one world, and layout says (1, {sum(layout.values())})"
             case.add(ERROR, "features", what, "have both hold the same things in the same order", "shape")
             return
         if not np.isfinite(row).all():
-            where = _named(layout, int(np.flatnonzero(~np.isfinite(row))[0]))
+            where = _named(layout, int(np.flatnonzero(~np.isfinite(row[0]))[0]))
             case.add(ERROR, "features", f"{where} is not finite", "find the division by zero", "finite")
             return
-        rows.append(row.astype(float))
+        rows.append(row[0].astype(float))
     table = np.array(rows)
     for column in np.flatnonzero(np.abs(table).max(axis=0) > HUGE):
         what = f"{_named(layout, int(column))} is as large as {np.abs(table[:, column]).max():.3g}"
@@ -199,7 +203,7 @@ def _check_features(case: Case, situations: Situations) -> None:
         case.add(WARNING, "features", what, remedy, f"large {_named(layout, int(column))}")
     if len(_decided(case, situations)) > 4:
         chosen = np.array(
-            [numbers(case.ask("features", s, situations)) for s in _decided(case, situations)], float
+            [numbers(case.ask("features", s, situations))[0] for s in _decided(case, situations)], float
         )
         for column in np.flatnonzero(np.ptp(chosen, axis=0) == 0.0):
             what = f"{_named(layout, int(column))} was always {chosen[0, column]:.3g}"
@@ -212,7 +216,7 @@ def _decided(case: Case, situations: Situations) -> list[Situation]:
     real = situations.single[: situations.real]
     if "decides" not in case.functions:
         return real
-    return [s for s in real if (d := case.ask("decides", s, situations)) is not FAILED and bool(d)]
+    return [s for s in real if (d := case.ask("decides", s, situations)) is not FAILED and np.all(numbers(d))]
 
 
 def _named(layout: dict[str, int], column: int) -> str:
@@ -223,44 +227,68 @@ def _named(layout: dict[str, int], column: int) -> str:
     return f"number {column}"
 
 
-def _check_begin(case: Case) -> None:
-    """The first memory comes from what is seen alone."""
-    leaf = case.leaf
-    assert leaf is not None
-    for decision in [d for d in case.decisions if d.first][:3]:
-        seen = decision.seen
-        why = case.call("initial_state", lambda seen=seen: leaf.initial_state(seen))  # type: ignore[misc]
-        if why is not FAILED and not isinstance(why, Outcome | str | None):
-            what = f"gives {why!r}"
-            case.add(
-                ERROR,
-                "initial_state",
-                what,
-                "give a registered reason, or words, why it cannot start, and None where it can",
-                "text",
-            )
-        case.call("begin", lambda seen=seen: leaf.begin(seen))  # type: ignore[misc]
+def _check_begin(case: Case, situations: Situations) -> None:
+    """The first memory comes from what is seen alone, and is a bundle of arrays with a row for each world."""
+    model = case.model
+    assert model is not None
+    firsts = [s for s, d in zip(situations.single, case.decisions, strict=False) if d.first]
+    for situation in firsts[:3]:
+        seen = situations.asked(situation).seen
+        why = case.call("initial_state", lambda seen=seen: model.initial_state(seen))  # type: ignore[misc]
+        if why is not FAILED:
+            _check_possible(case, why)
+        memory = case.call("begin", lambda seen=seen: _memory(model, seen))  # type: ignore[misc]
+        if memory is not FAILED and (wrong := without_worlds(memory, 1, "memory")):
+            what = f"gives no array with a row for each world: {wrong} for one world"
+            case.add(ERROR, "begin", what, f"{ROWS}, such as zeros(seen.tool)", "rows")
+
+
+ROWS = "what is remembered is (N, ...)"
+
+
+def _memory(model: ConceptFunctions, seen: Seen) -> Any:
+    try:
+        return model.begin(seen)
+    except NoWayError:
+        return None
+
+
+def _check_possible(case: Case, why: Any) -> None:
+    remedy = "give what REASON.where(mask, ...) gives, or several of them, and () where it can always start"
+    try:
+        unmet = sequence_of(why, case.concept.__name__) if why is not None else why
+    except (InputError, TypeError):
+        unmet = None
+    if unmet is None:
+        case.add(ERROR, "initial_state", f"gives {why!r}", remedy, "text")
+        return
+    for one in unmet:
+        applies = numbers(one.applies)
+        if applies.dtype != bool or applies.shape != (1,):
+            what = f"says where it cannot start by {_kind(one.applies)} for one world"
+            case.add(ERROR, "initial_state", what, "give a boolean for each world: ~held", "mask")
+
+
+def _kind(value: Any) -> str:
+    found = numbers(value)
+    return f"{found.dtype} of shape {found.shape}"
 
 
 def _check_words(case: Case, situations: Situations) -> None:
-    leaf = case.leaf
-    assert leaf is not None
+    model = case.model
+    assert model is not None
     for situation in situations.single[: situations.real]:
-        seen = Seen(situation.observation, situations.world, situations.robot, situation.elapsed)
-        said = case.call("explain", lambda seen=seen, m=situation.memory: leaf.explain(seen, m))  # type: ignore[misc]
+        at = situations.asked(situation)
+        said = case.call("explain", lambda at=at: model.explain(at.seen, at.memory))  # type: ignore[misc]
         if said is not FAILED and not isinstance(said, Statement | str | None):
             case.add(
                 ERROR,
                 "explain",
                 f"gives a {type(said).__name__}",
-                "give a Form with its numbers, or a sentence with numbers and units",
+                "give a Form with its numbers, or a sentence that is true of all worlds",
                 "text",
             )
-        case.call("limits", lambda seen=seen, m=situation.memory: _limits_said(leaf, seen, m))  # type: ignore[misc]
-
-
-def _limits_said(leaf: ConceptModel, seen: Seen, memory: Any) -> list[str]:
-    return [limit.outcome().sentence for limit in leaf.limits(seen, memory)]
+        case.call("limits", lambda at=at: [x.at(0).sentence for x in model.limits(at.seen, at.memory)])  # type: ignore[misc]
 
 
 def _check_actions(case: Case, situations: Situations) -> None:
@@ -296,16 +324,16 @@ def _check_actions(case: Case, situations: Situations) -> None:
 
 def _held(case: Case, situation: Situation, situations: Situations, k: int, size: float) -> Array | None:
     """The commands of an action that is held for a while."""
-    leaf = case.leaf
-    assert leaf is not None
-    action = np.zeros(case.concept.actions)
-    action[k] = size
+    model = case.model
+    assert model is not None
+    action = np.zeros((1, case.concept.actions))
+    action[:, k] = size
     memory, given = situation.memory, []
     for tick in range(STEADY):
-        elapsed = situation.elapsed + tick * situations.world.control_period
-        seen = Seen(situation.observation, situations.world, situations.robot, np.float64(elapsed))
-        command = case.call("command", lambda s=seen, m=memory: leaf.command(action, s, m))  # type: ignore[misc]
-        memory = case.call("advance", lambda s=seen, m=memory: leaf.advance(action, s, m))  # type: ignore[misc]
+        later = situation._replace(elapsed=situation.elapsed + tick * situations.period)
+        seen = situations.asked(later).seen
+        command = case.call("command", lambda s=seen, m=memory: model.command(action, s, m))  # type: ignore[misc]
+        memory = case.call("advance", lambda s=seen, m=memory: model.advance(action, s, m))  # type: ignore[misc]
         if command is FAILED or memory is FAILED or not isinstance(command, Command):
             return None
         given += [numbers(p).ravel() for p in (command.tool, command.hand) if p is not None]

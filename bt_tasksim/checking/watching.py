@@ -12,9 +12,10 @@ from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
 from bt_tasksim.checking.situations import Situation, Situations
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.errors import nearest
+from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.observables import FIELDS, observable, observables
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import Observation, WorldModel
+from bt_tasksim.core.world import Observation
 from bt_tasksim.robot.description import RobotDescription
 
 WITHOUT_HIDDEN = (
@@ -54,7 +55,7 @@ class WatchedSeen(Seen):
     __slots__ = ("_elapsed", "watched")
 
     def __init__(
-        self, observation: Observation, world: WorldModel, robot: RobotDescription, elapsed: Array
+        self, observation: Observation, world: WorldFacts, robot: RobotDescription, elapsed: Array
     ) -> None:
         self.watched = WatchedObservation(observation)
         self._elapsed = elapsed
@@ -69,7 +70,7 @@ class WatchedSeen(Seen):
 
     @property
     def elapsed(self) -> Array:
-        """``(...)`` seconds since the concept became active."""
+        """``(N,)`` seconds since the concept became active."""
         self.watched.read.add("time")
         return self._elapsed
 
@@ -132,7 +133,7 @@ def _read(case: Case, situations: Situations) -> set[str]:
         if name not in case.functions:
             continue
         for situation in situations.single:
-            seen = WatchedSeen(situation.observation, situations.world, situations.robot, situation.elapsed)
+            seen = WatchedSeen(situation.observation, situation.world, situations.robot, situation.elapsed)
             case.ask(name, situation, situations, seen)
             if name == "features":
                 read |= seen.watched.read
@@ -157,7 +158,7 @@ def _depends(case: Case, situations: Situations, name: str) -> bool:
         if usual is FAILED:
             return True
         value: Array = np.asarray(getattr(situation.observation, name))
-        others: list[Any] = [getattr(real[k - 1].observation, name)]
+        others: list[Any] = [o for o in [getattr(real[k - 1].observation, name)] if o.shape == value.shape]
         others += [~value] if value.dtype == bool else [np.zeros_like(value), 1e3 * value + 1.0]
         for other in others:
             if name == "time":
@@ -182,8 +183,6 @@ def _through_memory(case: Case, situations: Situations, names: list[str]) -> lis
             other: Array = (
                 ~value if value.dtype == bool else value * LOUDER + (0.0 if name in _SIZES else 0.01)
             )
-            if name == "closure":
-                other = np.float64(other)
             observation = dataclasses.replace(situation.observation, **{name: other})
             answers = []
             for shown in (situation, situation._replace(observation=observation)):

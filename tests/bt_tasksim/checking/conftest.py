@@ -9,22 +9,22 @@ import pytest
 
 from bt_tasksim.checking.concept_file import check_concept
 from bt_tasksim.checking.recording import Recording
-from bt_tasksim.checking.situations import RecordedDecision
+from bt_tasksim.checking.situations import RecordedDecision, whole
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import poses
-from bt_tasksim.core.world import Hidden
+from bt_tasksim.core.world import Hidden, Observation
 
 
 def hidden_of(observation, closure=0.0):
-    n = len(observation.objects)
+    n = observation.objects.shape[1]
     return Hidden(
         time=observation.time,
         objects=observation.objects,
-        velocities=np.full((n, 6), 0.01),
-        hand_force=np.full(n, closure),
-        hand_distance=np.zeros(n),
-        support=np.ones((n, n), bool),
-        penetration=np.float64(0.0),
+        velocities=np.full((1, n, 6), 0.01),
+        hand_force=np.full((1, n), closure),
+        hand_distance=np.zeros((1, n)),
+        support=np.ones((1, n, n), bool),
+        penetration=np.zeros(1),
         tool_pose=observation.tool_pose,
     )
 
@@ -36,26 +36,26 @@ def decisions(toy):
     def make(leaf, n=5):
         stage = toy(leaf)
         world, rng = stage.context.world, np.random.default_rng(0)
-        first, found, memory = stage.context.observation, [], None
+        first, found, memory = whole(Observation, stage.context.observation), [], None
         for k in range(n):
             objects = first.objects.copy()
-            objects[:, 0] += 0.01 * k
+            objects[..., 0] += 0.01 * k
             observation = dataclasses.replace(
                 first,
-                time=np.float64(0.05 * k),
-                tool_pose=poses.pose(first.tool_pose[:3] + 0.01 * k, first.tool_pose[3:]),
+                time=np.array([0.05 * k]),
+                tool_pose=poses.shifted(first.tool_pose, np.full(3, 0.01 * k)),
                 tips=rng.normal(size=first.tips.shape),
-                closure=np.float64(0.1 * k),
+                closure=np.array([0.1 * k]),
                 contacts=rng.random(first.contacts.shape) < 0.5,
                 contact_force=rng.normal(size=first.contact_force.shape),
-                wrench=rng.normal(size=6),
+                wrench=rng.normal(size=(1, 6)),
                 arm_velocity=rng.normal(size=first.arm_velocity.shape),
                 objects=objects,
             )
-            seen = Seen(observation, world, stage.runner.robot, np.float64(0.05 * k))
+            seen = Seen(observation, world, stage.runner.robot, np.array([0.05 * k]))
             if k == 0:
                 try:
-                    memory = leaf.begin(seen)
+                    memory = leaf.model.begin(seen)
                 except Exception:
                     memory = None
             hidden = hidden_of(observation, 0.1 * k)
