@@ -1,4 +1,4 @@
-"""Bring: pure in batches, where it ends, which way it takes, and what it says when it cannot."""
+"""Bring: each world as alone, where it ends, which way it takes, and what it says when it cannot."""
 
 import dataclasses
 
@@ -6,19 +6,22 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
+from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Bring
 from bt_tasksim.concept_nodes.bring import standing_pose
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.outcomes import CANNOT_START, NO_WAY
-from bt_tasksim.core.world import Obstacle
+from bt_tasksim.core.world import Obstacle, WorldModel
+from bt_tasksim.scene.shapes import ShapeSize, object_model
 
 pytestmark = pytest.mark.physical
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf", "pick_and_throw"])
-def test_one_by_one_and_in_batches_are_the_same(situations, functions, scenario):
+def test_each_world_is_treated_as_alone(situations, functions, scenario):
     answers = {name: situations(Bring, scenario).check(name) for name in functions}
     for name in ("done", "maintained", "necessary_cost", "sufficient_cost"):
         assert len({float(np.squeeze(a)) for a in answers[name]}) > 1, name
@@ -27,11 +30,11 @@ def test_one_by_one_and_in_batches_are_the_same(situations, functions, scenario)
 def carry(toy, leaf, name="cup", obstacles=None):
     stage = toy(leaf)
     if obstacles is not None:
-        stage.context._world = dataclasses.replace(stage.context.world, obstacles=tuple(obstacles))
+        stage.context.begin([dataclasses.replace(stage.world.model, obstacles=tuple(obstacles))])
     stage.world.hold(name)
     stage.look()
-    seen = stage.context.seen(0.0)
-    grip = poses.multiply(poses.inverse(seen.tool), seen.object(name))
+    seen = stage.context.seen(ONE, np.zeros(1))
+    grip = poses.relative(seen.tool, seen.object(name))[0]
     status = stage.tick(400)
     tools = np.array([c.tool for c in stage.world.steps])
     ends = poses.multiply(tools[-1], grip) if len(tools) else None
@@ -41,7 +44,7 @@ def carry(toy, leaf, name="cup", obstacles=None):
 def test_it_ends_upright_above_the_place_with_its_heading(toy):
     stage, status, _, cup = carry(toy, Bring("box", to="goal", hover=0.05), "box")
     assert status == Status.SUCCESS
-    place, model = stage.context.world.place("goal"), stage.context.world.object("box")
+    place, model = stage.world.model.place("goal"), stage.world.model.object("box")
     local = poses.multiply(poses.inverse(place.pose), cup)
     assert np.allclose(local[:3], [0, 0, model.extent[2] / 2 + 0.05], atol=1e-3)
     turned = min(float(poses.angle_between(local[3:], poses.yaw(k * np.pi))) for k in range(model.symmetry))
@@ -50,7 +53,8 @@ def test_it_ends_upright_above_the_place_with_its_heading(toy):
 
 def test_above_another_object_and_to_a_position(toy):
     stage, status, _, cup = carry(toy, Bring("cup", to="box", hover=0.03))
-    box, world = stage.context.seen(0.0).object("box"), stage.context.world
+    world = stage.world.model
+    box = stage.world.now.objects[world.object_index("box")]
     top = box[2] + world.object("box").extent[2] / 2
     assert status == Status.SUCCESS and np.allclose(cup[:2], box[:2], atol=1e-3)
     assert cup[2] - world.object("cup").extent[2] / 2 == pytest.approx(top + 0.03, abs=1e-3)
@@ -111,32 +115,55 @@ def test_without_the_object_in_the_hand_it_cannot_start(toy):
 # ---- how an object stands ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["box", "cube", "cylinder", "cup", "oval", "diamond"])
-def test_standing_poses_are_upright_near_and_the_same_in_batches(kind):
-    from bt_tasksim.scene.shapes import ShapeSize, object_model
+KINDS = ("box", "cube", "cylinder", "cup", "oval", "diamond")
 
-    torch = pytest.importorskip("torch")
+
+def thing(kind):
     size = (
         (0.06, 0.06, 0.06) if kind == "cube" else (0.05, 0.05 if kind in ("cylinder", "cup") else 0.07, 0.1)
     )
-    model = object_model("thing", kind, ShapeSize(size, (1.0, 1.0), None))
-    rng = np.random.default_rng(0)
-    now = rng.normal(size=(40, 7))
+    return object_model("thing", kind, ShapeSize(size, (1.0, 1.0), None))
+
+
+def facts(models):
+    """What is known of a thing in so many worlds."""
+    return WorldFacts.of([WorldModel((model,), {}, ("a", "b"), 0.08, 0.05) for model in models]).object("thing")
+
+
+def random_poses(n):
+    now = np.random.default_rng(0).normal(size=(n, 7))
     now[:, 3:] = poses.normalise(now[:, 3:])
-    frame = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.7))
-    single = np.array([standing_pose(frame, n, model, 0.03) for n in now])
-    assert np.allclose(standing_pose(frame, now, model, 0.03), single, atol=1e-12)
-    assert np.allclose(standing_pose(frame, torch.from_numpy(now), model, 0.03).numpy(), single, atol=1e-12)
+    return now
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_standing_poses_are_upright_and_near(kind):
+    torch = pytest.importorskip("torch")
+    model, now = thing(kind), random_poses(40)
+    frame = np.repeat(poses.pose([0.4, 0.1, 0.2], poses.yaw(0.7))[None], 40, axis=0)
+    known = facts([model] * 40)
+    stands = standing_pose(frame, now, known, 0.03)
+    in_torch = standing_pose(torch.from_numpy(frame), torch.from_numpy(now), known.map(torch.from_numpy), 0.03)
+    assert np.allclose(in_torch.numpy(), stands, atol=1e-12)
     half = model.extent[2] / 2
-    assert np.allclose(single[:, :3], [0.4, 0.1, 0.23 + half])
-    turns = np.array([poses.angle_between(n[3:], s[3:]) for n, s in zip(now, single, strict=True)])
+    assert np.allclose(stands[:, :3], [0.4, 0.1, 0.23 + half])
+    turns = poses.angle_between(now[:, 3:], stands[:, 3:])
     if kind == "cube":  # some face is down, and no orientation of a cube is further away than this
         assert turns.max() < np.deg2rad(62.8)
         assert np.allclose(
-            np.sort(np.abs(poses.to_matrix(single[:, 3:])[:, 2]), axis=-1), [0, 0, 1], atol=1e-9
+            np.sort(np.abs(poses.to_matrix(stands[:, 3:])[:, 2]), axis=-1), [0, 0, 1], atol=1e-9
         )
     else:
-        assert np.allclose(poses.rotate(single[:, 3:], np.array([0.0, 0, 1])), [0, 0, 1], atol=1e-9)
+        assert np.allclose(poses.z_axis(stands[:, 3:]), [0, 0, 1], atol=1e-9)
     if model.symmetry == 0:  # the shortest turn to upright is the tilt itself
-        tilt = np.arccos(np.clip(poses.rotate(now[:, 3:], np.array([0.0, 0, 1]))[:, 2], -1, 1))
-        assert np.allclose(turns, tilt, atol=1e-6)
+        assert np.allclose(turns, poses.tilt(now[:, 3:]), atol=1e-6)
+
+
+def test_things_of_unlike_kinds_stand_in_one_batch_as_each_one_alone(rows_alike):
+    models, now = [thing(KINDS[k % len(KINDS)]) for k in range(30)], random_poses(30)
+    frame, height = random_poses(30)[::-1].copy(), np.linspace(0.0, 0.1, 30)
+    with np.errstate(all="raise"):
+        rows_alike(
+            lambda rows: standing_pose(frame[rows], now[rows], facts([models[k] for k in rows]), height[rows]),
+            30,
+        )

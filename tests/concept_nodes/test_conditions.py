@@ -1,4 +1,4 @@
-"""Conditions: pure in batches, right at their limits, and they say what they saw."""
+"""Conditions: each world as alone, right at their limits, and they say what they saw."""
 
 import math
 
@@ -13,30 +13,33 @@ from bt_tasksim.core.errors import InputError
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf"])
-def test_one_by_one_and_in_batches_are_the_same(situations, scenario):
+def test_each_world_is_treated_as_alone(situations, scenario):
     near = situations(Place, scenario)
-    target = near.leaf.target
-    place = near.leaf.on
+    target, place = near.model.target, near.model.on
     for condition in (
-        Holding(target),
-        AtPose(target, on=place, tolerance=0.05, angle=0.3),
-        AtPose(target, on=target, tolerance=0.1, angle=3.2),
-        Upright(target),
-        TimePassed(3.0),
+        Holding.value(target),
+        AtPose.value(target, on=place, tolerance=0.05, angle=0.3),
+        AtPose.value(target, on=target, tolerance=0.1, angle=3.2),
+        Upright.value(target),
+        TimePassed.value(3.0),
     ):
         answers = situations(Pick if isinstance(condition, TimePassed) else Place, scenario).check(
-            "", condition
+            "holds", condition
         )
-        assert {bool(a) for a in answers} <= {True, False}
+        assert all(answer.shape == (1,) and answer.dtype == bool for answer in answers)
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf"])
 def test_the_situations_of_that_test_have_both_answers(situations, scenario):
     near = situations(Place, scenario)
-    target, place = near.leaf.target, near.leaf.on
-    for condition in (Holding(target), AtPose(target, on=place, tolerance=0.05, angle=0.3), Upright(target)):
-        answers = {bool(near.ask("", s, condition)) for s in near.single}
-        assert answers == {True, False}, condition.name
+    target, place = near.model.target, near.model.on
+    for condition in (
+        Holding.value(target),
+        AtPose.value(target, on=place, tolerance=0.05, angle=0.3),
+        Upright.value(target),
+    ):
+        answers = {bool(near.ask("holds", s, condition)[0]) for s in near.single}
+        assert answers == {True, False}, condition
 
 
 def asked(toy, condition, **changes):
@@ -67,7 +70,7 @@ def test_upright(toy, degrees, yes):
     [(0, 0, True), (19, 0, True), (21, 0, False), (0, 11, True), (0, 12, False)],
 )
 def test_at_pose(toy, millimetres, degrees, yes):
-    world = toy(TimePassed(0.0)).context.world
+    world = toy(TimePassed(0.0)).world.model
     place, half = world.place("goal"), world.object("cup").extent[2] / 2
     turn = poses.from_rotation_vector(np.array([0, math.radians(degrees), 0]))
     pose = poses.multiply(place.pose, poses.pose([millimetres / 1000, 0, half], turn))
@@ -78,7 +81,7 @@ def test_at_pose(toy, millimetres, degrees, yes):
 
 
 def test_on_another_object(toy):
-    world = toy(TimePassed(0.0)).context.world
+    world = toy(TimePassed(0.0)).world.model
     box = toy(TimePassed(0.0)).world.now.objects[1]
     above = box + np.array(
         [0, 0, (world.object("box").extent[2] + world.object("cup").extent[2]) / 2, 0, 0, 0, 0]
@@ -108,6 +111,6 @@ def test_conditions_command_nothing_and_are_built_again(toy):
     stage.tick()
     assert stage.context.command.tool is None and stage.context.command.hand is None
     leaf = AtPose("cup", on="goal", tolerance=0.01, name="there")
-    assert AtPose(**leaf.arguments()).values == leaf.values and leaf.arguments()["name"] == "there"
+    assert AtPose(**leaf.arguments()).model == leaf.model and leaf.arguments()["name"] == "there"
     with pytest.raises(InputError, match="condition AtPose: parameter 'on' is missing"):
         AtPose("cup")

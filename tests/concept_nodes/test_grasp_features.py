@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bt_tasksim.checking.bundles import stacked
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Grasp, grasp_features
 from bt_tasksim.concept_nodes.grasp_features import (
@@ -23,7 +22,6 @@ from bt_tasksim.concept_nodes.grasp_features import (
     TIME_SCALING,
 )
 from bt_tasksim.core import poses
-from bt_tasksim.core.world import Observation
 
 SCENARIOS = ("pick_and_place", "shelf_to_shelf")
 
@@ -34,44 +32,44 @@ def near(request, situations):
 
 
 def instant(near, k=0):
-    s = near.single[k]
-    return Seen(s.observation, near.world, near.robot, s.elapsed), s.memory
+    at = near.asked(near.single[k])
+    return at.seen, at.memory
 
 
 @pytest.mark.parametrize("name", ["features", "decides", "programmed_motion"])
-def test_one_by_one_and_in_batches_are_the_same(near, name):
+def test_each_world_is_treated_as_alone(near, name):
     near.check(name, tolerance=1e-6)  # a count of ticks over three is in single precision in torch
 
 
-def test_an_action_in_batches_is_the_same_one_by_one(near):
+def test_an_action_in_a_batch_is_the_same_as_alone(near, rows_alike):
     """With exploring actions, too: command and advance."""
     torch = pytest.importorskip("torch")
     from bt_tasksim.checking.bundles import different
 
-    rng = np.random.default_rng(0)
-    actions = rng.uniform(-1.5, 1.5, (len(near), len(ACTIONS)))
-    for name in ("command", "advance"):
-        one = []
-        for s, action in zip(near.single, actions, strict=True):
-            seen = Seen(s.observation, near.world, near.robot, s.elapsed)
-            one.append(getattr(near.leaf, name)(action, seen, s.memory))
-        for s, many in ((near.batch, actions), (near.torch, torch.from_numpy(actions))):
-            seen = Seen(s.observation, near.world, near.robot, s.elapsed)
-            answer = getattr(near.leaf, name)(many, seen, s.memory)
-            assert not different(name, one, answer, len(near), 1e-9)
+    actions = np.random.default_rng(0).uniform(-1.5, 1.5, (len(near), len(ACTIONS)))
+    for name in ("command", "advance", "carry_out"):
+
+        def ask(rows, situation=near.batch, actions=actions, name=name):
+            at = near.asked(situation.at(rows))
+            return getattr(near.model, name)(actions[rows], at.seen, at.memory)
+
+        rows_alike(ask, len(near))
+        one = [ask(np.array([k])) for k in range(len(near))]
+        tensors = ask(torch.arange(len(near)), near.torch, torch.from_numpy(actions))
+        assert not different(name, one, tensors, 1e-9, torch.Tensor)
 
 
 def test_carrying_an_action_out_is_its_command_and_its_memory(near):
     rng = np.random.default_rng(1)
     for k in range(len(near.single)):
         seen, memory = instant(near, k)
-        action = rng.uniform(-1.0, 1.0, len(ACTIONS))
-        command, after = near.leaf.carry_out(action, seen, memory)
-        expected = near.leaf.command(action, seen, memory)
+        action = rng.uniform(-1.0, 1.0, (1, len(ACTIONS)))
+        command, after = near.model.carry_out(action, seen, memory)
+        expected = near.model.command(action, seen, memory)
         assert np.array_equal(command.tool, expected.tool) and np.array_equal(command.hand, expected.hand)
         assert all(
             np.array_equal(a, b)
-            for a, b in zip(after[1:], near.leaf.advance(action, seen, memory)[1:], strict=True)
+            for a, b in zip(after[1:], near.model.advance(action, seen, memory)[1:], strict=True)
         )
 
 
@@ -79,7 +77,7 @@ def test_features_are_as_long_as_the_layout_and_of_the_order_of_one(near):
     size = sum(Grasp.layout(near.robot).values())
     for k in range(near.real):
         found = grasp_features.features(*instant(near, k))
-        assert found.shape == (size,) and np.isfinite(found).all()
+        assert found.shape == (1, size) and np.isfinite(found).all()
         assert np.abs(found).max() < 60.0
 
 
@@ -89,12 +87,12 @@ def test_parts_of_the_features_stand_where_the_layout_says(near):
     for name, size in layout.items():
         places[name] = slice(at, at + size)
         at += size
-    found = grasp_features.features(seen, memory)
-    assert np.array_equal(found[places["contacts"]], seen.contacts)
-    assert np.allclose(found[places["offsets"]], memory.offset / np.array(SCALE))
-    assert np.allclose(found[places["contacts so far"]], memory.touched)
-    assert np.allclose(found[places["estimate"]], memory.estimate)
-    local = poses.transform(poses.inverse(memory.goal), seen.tool[:3])
+    (found,) = grasp_features.features(seen, memory)
+    assert np.array_equal(found[places["contacts"]], seen.contacts[0])
+    assert np.allclose(found[places["offsets"]], memory.offset[0] / np.array(SCALE))
+    assert np.allclose(found[places["contacts so far"]], memory.touched[0])
+    assert np.allclose(found[places["estimate"]], memory.estimate[0])
+    local = poses.localise(memory.goal, seen.tool[:, :3])[0]
     assert np.allclose(found[places["tool from grasp pose"]][:3], local / 0.03)
 
 
@@ -102,18 +100,18 @@ def test_the_programmed_action_is_the_middle_of_an_action_at_the_reference_motio
     for k in range(near.real):
         seen, memory = instant(near, k)
         there = memory._replace(offset=memory.middle * np.array(SCALE))
-        action = near.leaf.programmed_motion(seen, memory)
+        action = near.model.programmed_motion(seen, memory)
         assert np.allclose(offsets(action, seen, there), there.offset, atol=1e-12)
         assert scaling_of(action, seen, memory) == 1.0
-    reference = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.3))
-    assert grasp_features.displaced(reference, np.zeros(CLOSE + 1)) is reference
+    reference = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.3))[None]
+    assert np.array_equal(grasp_features.displaced(reference, np.zeros((1, CLOSE + 1))), reference)
 
 
 def test_offsets_change_no_faster_than_their_rate_and_go_no_farther_than_their_scale(near):
     seen, memory = approaching(near)
-    share = near.world.control_period / PERIOD
-    memory = memory._replace(offset=np.zeros(CLOSE + 1), middle=np.zeros(CLOSE + 1))
-    far = np.full(len(ACTIONS), 9.0)
+    share = near.period / PERIOD
+    memory = memory._replace(offset=np.zeros((1, CLOSE + 1)), middle=np.zeros((1, CLOSE + 1)))
+    far = np.full((1, len(ACTIONS)), 9.0)
     rate = share * np.array(RATE)
     assert np.allclose(offsets(far, seen, memory), rate)
     rate[ALONG] = share * BACK_RATE
@@ -127,12 +125,12 @@ def approaching(near, within=0.5, contact=0, behind=0.0):
     """An open hand ``within`` seconds of its straight approach, ``behind`` metres from where it should be,
     ``contact`` of its fingertips touching."""
     seen, memory = instant(near)
-    tips = np.zeros(len(near.robot.tips), bool)
-    tips[:contact] = True
-    found = {f.name: getattr(seen.observation, f.name) for f in dataclasses.fields(Observation)}
-    seen = Seen(Observation(**found | {"contacts": tips}), near.world, near.robot, memory.begins + within)
+    tips = np.zeros((1, len(near.robot.tips)), bool)
+    tips[:, :contact] = True
+    observation = dataclasses.replace(near.single[0].observation, contacts=tips)
+    seen = Seen(observation, seen.world, near.robot, memory.begins + within)
     ahead = poses.multiply(seen.tool, poses.pose([0.0, 0.0, behind], [1.0, 0.0, 0.0, 0.0]))
-    return seen, memory._replace(target=ahead, closing=np.float64(-1.0), delay=np.float64(0.0))
+    return seen, memory._replace(target=ahead, closing=np.array([-1.0]), delay=np.zeros(1))
 
 
 def offsets(action, seen, memory):
@@ -140,12 +138,13 @@ def offsets(action, seen, memory):
 
 
 def scaling_of(action, seen, memory):
-    return float(grasp_features.time_scaling(action, grasp_features.met(action, seen, memory), seen, memory))
+    met = grasp_features.met(action, seen, memory)
+    return float(grasp_features.time_scaling(action, met, seen, memory)[0])
 
 
 def paced(scaling):
-    action = np.zeros(len(ACTIONS))
-    action[TIME_SCALING] = scaling
+    action = np.zeros((1, len(ACTIONS)))
+    action[:, TIME_SCALING] = scaling
     return action
 
 
@@ -156,8 +155,8 @@ def paced(scaling):
 def test_the_middle_of_the_pace_is_a_careful_approach(near, asked, share):
     seen, memory = approaching(near)
     assert scaling_of(paced(asked), seen, memory) == pytest.approx(share)
-    after = near.leaf.advance(paced(asked), seen, memory)
-    assert float(after.delay) == pytest.approx((1.0 - share) * near.world.control_period)
+    after = near.model.advance(paced(asked), seen, memory)
+    assert after.delay == pytest.approx([(1.0 - share) * near.period])
     before, _ = approaching(near, within=-0.1)
     assert scaling_of(paced(asked), before, memory) == 1.0
 
@@ -168,18 +167,18 @@ def test_the_middle_of_the_pace_is_a_careful_approach(near, asked, share):
 )
 def test_a_hand_that_stands_on_something_goes_back(near, contact, behind, stands):
     seen, memory = approaching(near, contact=contact, behind=behind)
-    memory = memory._replace(offset=np.zeros(CLOSE + 1), middle=np.zeros(CLOSE + 1))
-    along = offsets(paced(0.0), seen, memory)[ALONG]
+    memory = memory._replace(offset=np.zeros((1, CLOSE + 1)), middle=np.zeros((1, CLOSE + 1)))
+    along = offsets(paced(0.0), seen, memory)[0, ALONG]
     assert bool(grasp_features.met(paced(0.0), seen, memory).stands) == stands
     assert along == pytest.approx(-BACK_RATE if stands else 0.0)
     assert scaling_of(paced(0.0), seen, memory) == (0.0 if stands else CAREFUL)
     assert not grasp_features.met(paced(HASTE), seen, memory).stands
-    assert not grasp_features.met(paced(0.0), seen, memory._replace(closing=np.float64(0.1))).stands
+    assert not grasp_features.met(paced(0.0), seen, memory._replace(closing=np.array([0.1]))).stands
 
 
 def across(speed):
     action = paced(0.0)
-    action[ACROSS] = speed
+    action[:, ACROSS] = speed
     return action
 
 
@@ -195,32 +194,32 @@ def across(speed):
 )
 def test_a_search_aside_stays_where_it_has_come(near, contact, behind, closing, searches):
     seen, memory = approaching(near, contact=contact, behind=behind)
-    zero = np.zeros(CLOSE + 1)
-    memory = memory._replace(offset=zero, middle=zero, closing=np.float64(closing))
+    zero = np.zeros((1, CLOSE + 1))
+    memory = memory._replace(offset=zero, middle=zero, closing=np.array([closing]))
     action = across(-0.5)
     assert bool(grasp_features.met(action, seen, memory).searches) == searches
-    after = near.leaf.advance(action, seen, memory)
-    share = near.world.control_period / PERIOD
+    after = near.model.advance(action, seen, memory)
+    share = near.period / PERIOD
     expected = -0.5 * share * RATE[ACROSS] if searches else max(-0.25 * SCALE[ACROSS], -share * RATE[ACROSS])
-    assert after.offset[ACROSS] == pytest.approx(expected)
-    assert after.middle[ACROSS] * SCALE[ACROSS] == pytest.approx(expected if searches else 0.0)
+    assert after.offset[0, ACROSS] == pytest.approx(expected)
+    assert after.middle[0, ACROSS] * SCALE[ACROSS] == pytest.approx(expected if searches else 0.0)
     calm, _ = approaching(near)
-    later = after._replace(closing=np.float64(-1.0), target=memory.target)
-    stays = offsets(across(0.0), calm, later)[ACROSS]
+    later = after._replace(closing=np.array([-1.0]), target=memory.target)
+    stays = offsets(across(0.0), calm, later)[0, ACROSS]
     assert stays == pytest.approx(expected if searches else 0.0)
     hurried = action.copy()
-    hurried[TIME_SCALING] = HASTE
+    hurried[:, TIME_SCALING] = HASTE
     assert not grasp_features.met(hurried, seen, memory).searches
 
 
 def test_fingers_come_as_slowly_as_the_pace_until_opposing_ones_touch(near):
     seen, memory = approaching(near, contact=1)
-    memory = memory._replace(closing=np.float64(0.1), closed=np.float64(0.2))
-    step = near.robot.hand_speed * near.world.control_period
+    memory = memory._replace(closing=np.array([0.1]), closed=np.array([0.2]))
+    step = near.robot.hand_speed * near.period
 
     def closed(scaling, asked=1.0, seen=seen, tightening=1.0):
-        found = grasp_features.closed(np.float64(scaling), np.float64(asked), tightening, seen, memory)
-        return float(found)
+        found = grasp_features.closed(np.array([scaling]), np.array([asked]), tightening, seen, memory)
+        return float(found[0])
 
     assert closed(0.25) == pytest.approx(0.2 + 0.25 * step)
     assert closed(0.25, asked=0.21) == 0.21 and closed(0.25, asked=0.1) == 0.1
@@ -234,11 +233,11 @@ def test_fingers_come_as_slowly_as_the_pace_until_opposing_ones_touch(near):
 def test_displacements_are_in_the_tools_frame():
     reference = poses.pose(
         [0.4, 0.1, 0.2], poses.frame_from_axes(np.array([0.0, 0, -1]), np.array([0.0, 1, 0]))
-    )
-    offset = np.array([0.01, 0.02, 0.03, 0.2, 0.4])
+    )[None]
+    offset = np.array([[0.01, 0.02, 0.03, 0.2, 0.4]])
     moved = grasp_features.displaced(reference, offset)
-    local = poses.multiply(poses.inverse(reference), moved)
-    assert np.allclose(local[:3], offset[:3])
-    assert np.allclose(poses.rotation_vector(local[3:]), [0.0, 0.0, 0.2])
-    many = grasp_features.displaced(stacked([reference, reference]), stacked([offset, 0.0 * offset]))
-    assert np.allclose(many, [moved, reference])
+    local = poses.relative(reference, moved)
+    assert np.allclose(local[:, :3], offset[:, :3])
+    assert np.allclose(poses.rotation_vector(local[:, 3:]), [[0.0, 0.0, 0.2]])
+    many = grasp_features.displaced(np.repeat(reference, 2, 0), np.concatenate([offset, 0.0 * offset]))
+    assert np.array_equal(many, np.concatenate([moved, reference]))

@@ -1,4 +1,4 @@
-"""Pick: pure in batches, a straight way off the support, and what it says when it cannot."""
+"""Pick: each world as alone, a straight way off the support, and what it says when it cannot."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.physical
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf"])
-def test_one_by_one_and_in_batches_are_the_same(situations, functions, scenario):
+def test_each_world_is_treated_as_alone(situations, functions, scenario):
     answers = {name: situations(Pick, scenario).check(name) for name in functions}
     for name in ("done", "maintained", "necessary_cost", "sufficient_cost"):
         assert len({float(np.squeeze(a)) for a in answers[name]}) > 1, name
@@ -53,23 +53,23 @@ def test_without_the_object_in_the_hand_it_cannot_start(toy):
 def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
     from bt_tasksim.concept.seen import Known
 
-    decisions = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick]
-    cost = [float(d.leaf.sufficient_cost(Known(d.hidden, d.seen.world), d.memory)) for d in decisions]
+    decisions = [d for d in recorded_run("pick_and_place") if type(d.leaf.model) is Pick]
+    cost = [float(d.leaf.model.sufficient_cost(Known(d.hidden, d.seen.world), d.memory)[0]) for d in decisions]
     assert cost[0] == 10.0 and cost[-1] == 0.0
 
 
 def test_what_may_not_be_squeezed_costs_the_hands_force(recorded_run):
     from bt_tasksim.concept.seen import Known
 
-    decision = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick][-1]
+    decision = [d for d in recorded_run("pick_and_place") if type(d.leaf.model) is Pick][-1]
     now = Known(decision.hidden, decision.seen.world)
-    force = float(now.hand_force(decision.leaf.target))
+    force = float(now.hand_force(decision.leaf.model.target)[0])
     assert force > 1.0
     for squeeze in (force / 2, force / 4):
-        leaf = Pick(decision.leaf.target, squeeze=squeeze)
-        assert float(leaf.sufficient_cost(now, decision.memory)) == pytest.approx(force / squeeze)
-    gentle = Pick(decision.leaf.target, squeeze=1000.0)
-    assert float(gentle.sufficient_cost(now, decision.memory)) < 1.0
+        pick = Pick.value(decision.leaf.model.target, squeeze=squeeze)
+        assert pick.sufficient_cost(now, decision.memory) == pytest.approx([force / squeeze])
+    gentle = Pick.value(decision.leaf.model.target, squeeze=1000.0)
+    assert gentle.sufficient_cost(now, decision.memory)[0] < 1.0
 
 
 def test_the_squeeze_counts_at_the_beginning_too(recorded_run):
@@ -77,9 +77,9 @@ def test_the_squeeze_counts_at_the_beginning_too(recorded_run):
 
     from bt_tasksim.concept.seen import Known
 
-    decision = [d for d in recorded_run("pick_and_place") if type(d.leaf) is Pick][-1]
+    decision = [d for d in recorded_run("pick_and_place") if type(d.leaf.model) is Pick][-1]
     hidden = decision.hidden
     harder = dataclasses.replace(hidden, hand_force=3.0 * hidden.hand_force)
-    leaf = Pick(decision.leaf.target, squeeze=float(hidden.hand_force[0]))
-    cost = leaf.sufficient_cost(Known(hidden, decision.seen.world, harder), decision.memory)
-    assert float(cost) == pytest.approx(3.0)
+    pick = Pick.value(decision.leaf.model.target, squeeze=float(hidden.hand_force[0, 0]))
+    cost = pick.sufficient_cost(Known(hidden, decision.seen.world, harder), decision.memory)
+    assert cost == pytest.approx([3.0])

@@ -1,16 +1,17 @@
-"""Release: pure in batches, opens before it draws back, and ends what was held."""
+"""Release: each world as alone, opens before it draws back, and ends what was held."""
 
 import numpy as np
 import pytest
 from py_trees.common import Status
 
+from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Release
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import TIMED_OUT
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "pick_and_throw"])
-def test_one_by_one_and_in_batches_are_the_same(situations, functions, scenario):
+def test_each_world_is_treated_as_alone(situations, functions, scenario):
     for name in functions:
         if name != "maintained":  # it maintains nothing
             situations(Release, scenario).check(name)
@@ -20,7 +21,7 @@ def start(toy, leaf):
     stage = toy(leaf)
     stage.world.hold("cup")
     stage.look()
-    stage.context.reach("holding", "cup")
+    stage.context.reach("holding", "cup", ONE)
     step = stage.world.step
 
     def let_go(command):
@@ -49,7 +50,7 @@ def test_it_opens_then_draws_back_against_its_approach(toy):
 def test_afterwards_nothing_is_held(toy):
     stage = start(toy, Release("cup"))
     stage.tick(200)
-    assert not stage.context.reached("holding", "cup")
+    assert not stage.context.reached("holding", "cup", ONE)
 
 
 def test_a_hand_that_still_touches_something_is_not_done(toy):
@@ -66,4 +67,4 @@ def test_a_hand_that_still_touches_something_is_not_done(toy):
     assert stage.tick(200) == Status.FAILURE
     assert leaf.outcome.is_a(TIMED_OUT)
     assert leaf.outcome.detail.numbers == pytest.approx({"opening": 1.0, "contacts": 1, "force": 0.0})
-    assert stage.context.reached("holding", "cup")
+    assert stage.context.reached("holding", "cup", ONE)
