@@ -88,6 +88,7 @@ def plan(
     if line.shape[1] == 1:
         return Path(line + xp.zeros((1, samples, 1), dtype=line.dtype, device=line.device), zero + shortest)
     turned = poses.angle_between(line[:, :-1, 3:], line[:, 1:, 3:])
+    turned = xp.where(xp.all(line[:, :-1] == line[:, 1:], axis=-1), xp.zeros_like(turned), turned)
     along = _summed(xp.maximum(ways, turned * (speed / turn)))
     total = along[:, -1]
     peak = 1.875  # of a minimum-jerk motion, over its mean speed
@@ -123,7 +124,9 @@ def _spaced(line: Array, along: Array, samples: int) -> Array:
     shares = xp.linspace(0.0, 1.0, samples, dtype=line.dtype, device=line.device)
     wanted = shares[None, :] * along[:, -1:]
     passed = xp.sum(xp.astype(along[:, None, :] <= wanted[:, :, None], xp.int64), axis=-1)
-    k = xp.clip(passed - 1, 0, line.shape[1] - 2)
+    # The end is that of the last piece with a length: a waypoint that is repeated after it changes nothing.
+    last = xp.sum(xp.astype(along < along[:, -1:], xp.int64), axis=-1)[:, None]
+    k = xp.clip(xp.minimum(passed, last) - 1, 0, line.shape[1] - 2)
     begins = xp.take_along_axis(along, k, axis=1)
     length = xp.take_along_axis(along, k + 1, axis=1) - begins
     there = length > 0.0
