@@ -258,9 +258,7 @@ def _object_facts(rows: Sequence[Sequence[ObjectModel | None]]) -> ObjectFacts:
     axes = [((0.0, 1.0, 0.0),) if model is None else model.grasp_axes for model in models]
     widths = [(np.inf,) if model is None else model.grasp_widths for model in models]
     shape = (len(rows), len(rows[0]))
-    turned, counts = _padded(turns, shape, 0.0)
-    counts[..., 0] = True
-    turned[~counts] = _IDENTITY[0]
+    turned, counts = _padded(turns, shape, "rotations")
     return ObjectFacts(
         present=np.array([model is not None for model in models], bool).reshape(shape),
         extent=np.array([(1.0,) * 3 if m is None else m.extent for m in models], float).reshape(*shape, 3),
@@ -270,8 +268,8 @@ def _object_facts(rows: Sequence[Sequence[ObjectModel | None]]) -> ObjectFacts:
         cubic=np.array([m is not None and m.cubic for m in models], bool).reshape(shape),
         rotations=turned,
         rotation_counts=counts,
-        grasp_axes=_padded(axes, shape, 0.0)[0],
-        grasp_widths=_padded(widths, shape, np.inf)[0],
+        grasp_axes=_padded(axes, shape, "grasp_axes")[0],
+        grasp_widths=_padded(widths, shape, "grasp_widths")[0],
     )
 
 
@@ -302,21 +300,31 @@ def _place_facts(rows: Sequence[Sequence[PlaceModel | None]]) -> PlaceFacts:
 def _obstacle_facts(worlds: Sequence[WorldModel]) -> ObstacleFacts:
     most = max(len(world.obstacles) for world in worlds)
     shape = (len(worlds), most)
-    present, pose, size = np.zeros(shape, bool), np.zeros((*shape, 7)), np.zeros((*shape, 3))
-    pose[..., 3] = 1.0
+    present, size = np.zeros(shape, bool), np.zeros((*shape, 3))
+    pose = np.broadcast_to(_FILLING["pose"], (*shape, 7)).copy()
     for i, world in enumerate(worlds):
         for k, box in enumerate(world.obstacles):
             present[i, k], pose[i, k], size[i, k] = True, box.pose, box.size
     return ObstacleFacts(present, pose, size)
 
 
-def _padded(rows: Sequence[Any], shape: tuple[int, int], nothing: float) -> tuple[Array, Array]:
+_FILLING: Mapping[str, Any] = {
+    "rotations": (1.0, 0.0, 0.0, 0.0),
+    "grasp_axes": (0.0, 1.0, 0.0),
+    "grasp_widths": np.inf,
+    "pose": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+}
+"""What stands in the arrays of facts where a world has fewer entries than others; else zeros."""
+
+
+def _padded(rows: Sequence[Any], shape: tuple[int, int], name: str) -> tuple[Array, Array]:
     """Lists of unlike lengths as one array ``(*shape, most, ...)``, and which entries are there."""
-    most = max((len(row) for row in rows), default=1)
-    inner = np.shape(rows[0][0]) if rows else ()
-    out, there = np.full((len(rows), most, *inner), nothing), np.zeros((len(rows), most), bool)
+    most, filling = max((len(row) for row in rows), default=1) or 1, _FILLING[name]
+    inner = np.shape(filling)
+    out = np.broadcast_to(filling, (len(rows), most, *inner)).copy()
+    there = np.zeros((len(rows), most), bool)
     for i, row in enumerate(rows):
-        out[i, : len(row)] = row
+        out[i, : len(row)] = np.reshape(row, (len(row), *inner))
         there[i, : len(row)] = True
     return out.reshape(*shape, most, *inner), there.reshape(*shape, most)
 
@@ -417,7 +425,7 @@ def joined(worlds: Sequence[WorldFacts]) -> WorldFacts:
         bundles = [getattr(facts, kind) for facts in worlds]
         return type(bundles[0])(
             **{
-                f.name: _concatenated([getattr(b, f.name) for b in bundles], f.name == "grasp_widths")
+                f.name: _concatenated([getattr(b, f.name) for b in bundles], _FILLING.get(f.name, 0))
                 for f in fields(bundles[0])
             }
         )
@@ -434,14 +442,14 @@ def joined(worlds: Sequence[WorldFacts]) -> WorldFacts:
     )
 
 
-def _concatenated(arrays: Sequence[Array], infinite: bool) -> Array:
-    """Arrays ``(n, ...)`` one below the other; what is shorter is filled with zeros, or infinity."""
+def _concatenated(arrays: Sequence[Array], filling: Any) -> Array:
+    """Arrays ``(n, ...)`` one below the other; what is shorter is filled up."""
     shapes = {array.shape[1:] for array in arrays}
     if len(shapes) > 1:
         most = tuple(np.max(list(shapes), axis=0).tolist())
         filled = []
         for array in arrays:
-            out = np.full((array.shape[0], *most), np.inf if infinite else 0, array.dtype)
+            out = np.full((array.shape[0], *most), filling, array.dtype)
             out[(slice(None), *(slice(0, n) for n in array.shape[1:]))] = array
             filled.append(out)
         arrays = filled
