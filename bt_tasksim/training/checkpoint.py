@@ -32,7 +32,7 @@ from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.run_log import tree_text
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.fixtures import load_fixture
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import Scene, WorldSource
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.trees.walk import nodes_of
 
@@ -170,7 +170,7 @@ def check_tensors(path: Path, tensors: Mapping[str, Array], expected: Mapping[st
 
 
 def subject(
-    tree: Behaviour, scene: Scene, layouts: Mapping[str, Any], node: str, options: EngineOptions
+    tree: Behaviour, scene: WorldSource, layouts: Mapping[str, Any], node: str, options: EngineOptions
 ) -> dict[str, str]:
     """What a training is of, as hashes by name.
 
@@ -183,10 +183,13 @@ def subject(
     """
     robot = load_robot(scene.robot)
     text = tree_text(tree) or [[type(n).__qualname__, n.name, len(n.children)] for n in nodes_of(tree)]
-    world = {
-        "scene": _plain(dataclasses.replace(scene, robot="", name="")),
-        "fixtures": [_plain(load_fixture(name)) for name in scene.fixtures],
-    }
+    if isinstance(scene, Scene):
+        world = {
+            "scene": _plain(dataclasses.replace(scene, robot="", name="")),
+            "fixtures": [_plain(load_fixture(name)) for name in scene.fixtures],
+        }
+    else:
+        world = {"source": scene.name, "names": [*sorted(scene.object_names), *sorted(scene.place_names)]}
     engines = {k: v for k, v in _plain(options).items() if k not in ("key", "timeout", "connect_timeout")}
     return {
         "tree": _hash([text, node]),

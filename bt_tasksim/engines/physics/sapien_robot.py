@@ -11,6 +11,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import JointTarget
 from bt_tasksim.engines.physics.sapien_world import CONTACT_OFFSET, World, array, floats, sapien_pose
+from bt_tasksim.engines.physics.sapien_wrist import WristSensor
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.urdf_links import links_below, load_links, root_pose, still_links
 from bt_tasksim.robot.urdf_visuals import load_collisions
@@ -27,7 +28,6 @@ millimetres for one step, and kicks what is light."""
 FAST = 0.6
 """Share of the hand's own speed from which it closes fast."""
 _ARM_BIT = 1 << 8  # shapes that share a bit of group 2 do not collide with each other
-_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 class RobotBuilder:
@@ -110,14 +110,8 @@ class Robot:
         _set_surfaces(robot, world, links, still_links(tree), hand)
         self._set_drives(robot, joint_position)
         self._tool_link, self._tool_pose = links[tool_frame[0]], tool_frame[1].tolist()
-        self._wrist = [link.name for link in articulation.get_links()].index(robot.wrist_link)
-        wrist = links[robot.wrist_link]
-        joint = next(j for j in articulation.get_joints() if j.child_link == wrist)
         self._tool_identity = bool(np.array_equal(self._tool_pose, [0, 0, 0, 1, 0, 0, 0]))
-        frame = poses.multiply(array(wrist.entity_pose), array(joint.pose_in_child))
-        in_joint = poses.multiply(poses.inverse(frame), self.tool())
-        self._lever = in_joint[:3].tolist()
-        self._to_tool = [0.0, 0.0, 0.0, *(in_joint[3:] * _CONJUGATE).tolist()]
+        self._sensor = WristSensor(articulation, links[robot.wrist_link], self.tool())
         self._tips = [(links[tip.links[0]], list(tip.point)) for tip in robot.tips]
 
     def _set_drives(self, robot: RobotDescription, joint_position: Array) -> None:
@@ -183,17 +177,8 @@ class Robot:
         return np.array([poses.point(floats(link.entity_pose), point) for link, point in self._tips])
 
     def wrench(self) -> Array:
-        """External wrench ``(6,)`` at the tool, from the wrist joint's incoming force.
-
-        SAPIEN reports the force that the wrist's parent exerts on it in the joint's frame, which may be
-        turned against the link's; at rest the world's force on the hand is its opposite. Moments are moved
-        to the tool origin: t' = t - r x f.
-        """
-        x, y, z, u, v, w = self._articulation.get_link_incoming_joint_forces()[self._wrist].tolist()
-        rx, ry, rz = self._lever
-        moment = [ry * z - rz * y - u, rz * x - rx * z - v, rx * y - ry * x - w]
-        frame = self._to_tool
-        return np.array([*poses.point(frame, [-x, -y, -z]), *poses.point(frame, moment)])
+        """External wrench ``(6,)`` at the tool, see `WristSensor.wrench`."""
+        return self._sensor.wrench()
 
 
 def _set_surfaces(
