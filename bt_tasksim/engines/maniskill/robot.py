@@ -13,7 +13,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import JointTarget
 from bt_tasksim.engines.maniskill.environment import Environment
 from bt_tasksim.engines.physics.sapien_world import array, floats
-from bt_tasksim.engines.physics.sapien_wrist import WristSensor
+from bt_tasksim.engines.physics.sapien_wrist import external_wrench, wrist_frame
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.urdf_links import links_below, load_links, still_links
 
@@ -52,7 +52,10 @@ class Robot:
         self._tool_link, self._tool_pose = links[robot.tool_link], robot.tool_pose.tolist()
         self._tips = [(links[tip.links[0]], list(tip.point)) for tip in robot.tips]
         self._controls = Controls(agent.controller, robot.joints, owner)
-        self._sensor = WristSensor(self._articulation, links[robot.wrist_link], self._world_tool())
+        wrist = links[robot.wrist_link]
+        self._wrist = self._articulation.get_links().index(wrist)
+        lever, to_tool = wrist_frame(self._articulation, wrist, self._world_tool())
+        self._lever, self._to_tool = lever[None], to_tool[None, None]
         tree = load_links(robot.urdf)
         hand, still = links_below(tree, robot.wrist_link), still_links(tree)
         tip_of = {name: i for i, tip in enumerate(robot.tips) for name in tip.links}
@@ -109,15 +112,16 @@ class Robot:
         """Positions of the fingertips ``(n_tips, 3)``, robot base frame."""
         frame = self._from_world
         return np.array(
-            [poses.point(frame, poses.point(floats(link.entity_pose), at)) for link, at in self._tips]
+            [poses.point(frame, poses.point([*floats(link.entity_pose)], at)) for link, at in self._tips]
         )
 
     def wrench(self) -> Array:
         """External wrench ``(6,)`` at the tool, tool frame; ManiSkill's links carry no weight."""
-        return self._sensor.wrench()
+        incoming = self._articulation.get_link_incoming_joint_forces()[None, self._wrist].astype(float)
+        return external_wrench(incoming, self._lever, self._to_tool)[0]
 
     def _world_tool(self) -> Array:
-        return np.array(poses.composed(floats(self._tool_link.entity_pose), self._tool_pose))
+        return np.array(poses.composed([*floats(self._tool_link.entity_pose)], self._tool_pose))
 
 
 class Controls:

@@ -120,7 +120,7 @@ class ManiSkillPhysics(PhysicsEngine):
             world.bodies[body_of(self._open().actor(entry.actor or name))] = ("fixture", n + k)
         self._n_bodies = n + len(self.world.file.fixtures)
         self._reader = ContactReader(world, len(self.robot.tips), skin=0.0)
-        self._touch = Touch(np.zeros((len(self.robot.tips), 3)), [0.0] * n, [np.inf] * n, set())
+        self._touch = Touch([[0.0] * 3] * len(self.robot.tips), [0.0] * n, [np.inf] * n, set())
         self._configuration = c
         return self._state(np.zeros(6))  # SAPIEN's sensor still has the force of the last episode's last step
 
@@ -200,7 +200,7 @@ class ManiSkillPhysics(PhysicsEngine):
             joint_position=q,
             joint_velocity=v,
             joint_effort=effort,
-            tip_force=poses.rotate(turn, self._touch.tip_force),
+            tip_force=poses.rotate(turn, np.array(self._touch.tip_force).reshape(-1, 3)),
             wrench=wrench,
             tool_pose=robot.tool(),
             tips=robot.tips(),
