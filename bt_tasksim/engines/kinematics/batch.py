@@ -19,7 +19,19 @@ from bt_tasksim.engines.kinematics.failures import Failures, Reach
 from bt_tasksim.engines.kinematics.inverse import InverseKinematics
 from bt_tasksim.engines.kinematics.linear import total
 from bt_tasksim.engines.kinematics.models import arm_model, full_model
-from bt_tasksim.engines.kinematics.rows import columns, contiguous, host, put, taken, where_true
+from bt_tasksim.engines.kinematics.rows import (
+    at_least,
+    columns,
+    contiguous,
+    either,
+    every,
+    highest,
+    host,
+    put,
+    some,
+    taken,
+    where_true,
+)
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
@@ -155,16 +167,17 @@ class BatchKinematics:
         self, tool: Array | None, hand: Array | None, joints: Array, rows: np.ndarray | None = None
     ) -> Solution:
         """`solve` of the parts of a command, with joints ``(k, n_joints)`` for worlds that begin."""
-        whole = rows is None or (len(rows) == self.n and bool(np.all(rows == self._all)))
+        if rows is not None and len(rows) == self.n and bool(np.all(rows == self._all)):
+            rows = None
         memory = self._memory
-        if not whole:
+        if rows is not None:
             memory = _Memory(*(taken(part, rows) for part in memory))
         memory = self._begun(memory, joints)
         memory, moved, failures = self._asked(memory, tool, hand)
-        if not moved and whole and self._still is not None:
+        if not moved and rows is None and self._still is not None:
             return Solution(self._still, failures)
         memory, target, still = self._follow(memory, failures)
-        if whole:
+        if rows is None:
             self._memory, self._still = memory, target if still else None
         else:
             old = self._memory
@@ -205,7 +218,7 @@ class BatchKinematics:
     def _begun(self, memory: _Memory, joints: Array) -> _Memory:
         """Worlds that have no target yet get their joints' positions ``(k, n_joints)``, within the limits."""
         xp = array_namespace(self._like)
-        if bool(xp.all(memory.begun)):
+        if every(memory.begun):
             return memory
         new = where_true(~memory.begun)
         start = columns(constant(joints, self._like))
@@ -227,8 +240,8 @@ class BatchKinematics:
         goal = memory.goal
         if tool is not None:
             asked = columns(tool)
-            fresh = xp.any(asked != memory.tool, axis=0) & ~xp.all(xp.isnan(asked), axis=0)
-            if bool(xp.any(fresh)):
+            fresh = _new(asked, memory.tool)
+            if some(fresh):
                 moved = True
                 index = where_true(fresh)
                 arm, seen, failures = self._near(memory, asked, index)
@@ -238,10 +251,10 @@ class BatchKinematics:
                 memory = memory._replace(goal=goal, seen=seen, tool=xp.where(fresh, asked, memory.tool))
         if hand is not None:
             asked = columns(hand)
-            fresh = xp.any(asked != memory.hand, axis=0) & ~xp.all(xp.isnan(asked), axis=0)
+            fresh = _new(asked, memory.hand)
             if failures:
                 fresh = fresh & ~xp.asarray(failures.mask, device=goal.device)
-            if bool(xp.any(fresh)):
+            if some(fresh):
                 moved = True
                 fingers = xp.where(fresh, columns(self.robot.hand_position(hand)), goal[self._arm :])
                 goal = xp.concat([goal[: self._arm], fingers], axis=0)
@@ -254,11 +267,10 @@ class BatchKinematics:
 
     def _near(self, memory: _Memory, tool: Array, index: np.ndarray) -> tuple[Array, Array, Failures]:
         """The arms ``(n, N)`` for tool poses ``(7, N)`` of the rows that ask, and what their chains see."""
-        xp = array_namespace(tool)
         last, seen, n = memory.goal[: self._arm], memory.seen, tool.shape[-1]
         turns = _turns(tool)
         codes, misses = np.zeros(n, int), np.zeros((2, n))
-        if not bool(xp.all(taken(turns, index))):
+        if not every(taken(turns, index)):
             good = host(turns)
             codes[index[~good[index]]] = Reach.NO_ROTATION
             index = index[good[index]]
@@ -269,9 +281,7 @@ class BatchKinematics:
                 return arm, seen, self._none(n)
             codes, misses = found.code, np.stack([found.distance, found.angle])
         else:
-            found = self.inverse.near(
-                placements(taken(tool, index)), taken(last, index), taken(seen, index)
-            )
+            found = self.inverse.near(placements(taken(tool, index)), taken(last, index), taken(seen, index))
             arm, seen = put(last, index, found.q), put(seen, index, found.seen)
             codes[index] = found.code
             misses[:, index] = found.distance, found.angle
@@ -291,17 +301,23 @@ class BatchKinematics:
         if failures:
             goal = xp.where(xp.asarray(failures.mask, device=goal.device), memory.target, goal)
         step = goal - memory.target
-        share = xp.abs(step) * memory.per_step
-        arm, hand = xp.max(share[:n], axis=0), xp.max(share[n:], axis=0)
+        share = abs(step) * memory.per_step
+        arm, hand = highest(share[:n]), highest(share[n:])
         fastest = xp.maximum(arm, hand)
         target, limited = goal, fastest > 1.0
-        if bool(xp.any(limited)):
-            slowed = [step[:n] / xp.clip(arm, min=1.0), step[n:] / xp.clip(hand, min=1.0)]
+        if some(limited):
+            slowed = [step[:n] / at_least(arm, 1.0), step[n:] / at_least(hand, 1.0)]
             step = xp.concat(slowed, axis=0)
             target = xp.where(limited, memory.target + step, target)
         asked = JointTarget(_rows(target), _rows(step * memory.rate))
-        still = not failures and not bool(xp.any(fastest))
+        still = not failures and not some(fastest > 0.0)
         return memory._replace(target=target), asked, still
+
+
+def _new(asked: Array, before: Array) -> Array:
+    """Rows ``(N,)`` of which something is asked ``(k, N)`` that is not what was asked before."""
+    fresh = either(asked != before)
+    return fresh & either(asked == asked) if some(fresh) else fresh  # a number equals itself, NaN does not
 
 
 def _turns(poses: Array) -> Array:

@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from bt_tasksim.core.poses import Array, array_namespace, constant, from_matrix
+from bt_tasksim.engines.kinematics.rows import chosen, some
 
 _NEARLY_PI = 3e-2
 """rad from half a turn, within which the axis is read from the symmetric part of a rotation matrix."""
@@ -126,17 +127,14 @@ def _turned_to(axis: Array) -> Array:
 
 
 def placements(poses: Array) -> Array:
-    """Rotation and position ``(3, 4, N)`` of poses ``(7, N)``, whose quaternions need not be of length one."""
+    """Rotation and position ``(3, 4, N)`` of poses ``(7, N)``, with quaternions of any length."""
     xp = array_namespace(poses)
     q = poses[3:]
     products = q[:, None] * q[None, :]
     square = products[0, 0] + products[1, 1] + products[2, 2] + products[3, 3]
     flat = xp.reshape(products * (2.0 / square), (16, q.shape[1]))
     whole, one, sign = (constant(x, poses) for x in (_WHOLE, _ONE, _SIGN))
-    device = poses.device
-    a = xp.take(flat, xp.asarray(_FIRST, device=device), axis=0)
-    b = xp.take(flat, xp.asarray(_SECOND, device=device), axis=0)
-    rotation = whole + one * a + sign * b
+    rotation = whole + one * chosen(flat, _FIRST) + sign * chosen(flat, _SECOND)
     return xp.concat([xp.reshape(rotation, (3, 3, q.shape[1])), poses[:3, None]], axis=1)
 
 
@@ -176,22 +174,20 @@ def difference(here: Array, there: Array) -> Array:
     way += here[1, :3][:, None] * gap[1]
     way += here[2, :3][:, None] * gap[2]
     flat = xp.reshape(way, (12, rows))
-    device = here.device
-    skew = xp.take(flat, xp.asarray(_LEFT, device=device), axis=0) - xp.take(
-        flat, xp.asarray(_RIGHT, device=device), axis=0
-    )
+    skew = chosen(flat, _LEFT) - chosen(flat, _RIGHT)
     squares = skew * skew
-    least = float(xp.finfo(here.dtype).smallest_normal)
-    sine = xp.sqrt(squares[0] + squares[1] + squares[2] + least)  # both are twice what they are called
+    sine = xp.sqrt(squares[0] + squares[1] + squares[2] + _LEAST)  # both are twice what they are called
     cosine = flat[0] + flat[5] + flat[10] - 1.0
     angle = xp.atan2(sine, cosine)
     turn = (angle / sine) * skew
     half = angle > math.pi - _NEARLY_PI
-    if bool(xp.any(half)):
+    if some(half):
         turn = xp.where(half, _half_turn(way, skew, angle), turn)
     return xp.concat([way[:, 3], turn], axis=0)
 
 
+_LEAST = 1e-37
+"""Keeps a sine of zero from being divided by; nothing beside any other, and a number in float32, too."""
 _LEFT, _RIGHT = np.array([9, 2, 4]), np.array([6, 8, 1])
 
 
@@ -199,15 +195,13 @@ def _half_turn(way: Array, skew: Array, angle: Array) -> Array:
     """Rotation vectors ``(3, N)`` of rotation matrices in ``way (3, 4, N)`` of nearly half a turn."""
     xp = array_namespace(way)
     cosine = xp.cos(angle)
-    square = xp.stack([way[i, i] - cosine for i in range(3)], axis=0)  # (1 - cosine) axis_i^2
-    size = xp.sqrt(xp.clip(square / (1.0 - cosine), min=0.0))
-    # The largest component is positive; its row gives the signs of the others, and the skew part the whole's.
+    size = xp.stack([way[i, i] - cosine for i in range(3)], axis=0)  # (1 - cosine) axis_i^2
     best = xp.argmax(size, axis=0)
     axis = xp.zeros_like(size)
     for i in range(3):
         row = xp.stack([way[i, j] + way[j, i] for j in range(3)], axis=0)
-        signs = xp.where(row < 0.0, -xp.ones_like(row), xp.ones_like(row))
-        signs = xp.concat([signs[:i], xp.ones_like(row[:1]), signs[i + 1 :]], axis=0)
-        axis = xp.where(best == i, signs * size, axis)
+        row = xp.concat([row[:i], 2.0 * size[i : i + 1], row[i + 1 :]], axis=0)  # along the axis
+        axis = xp.where(best == i, row, axis)
+    axis = axis / xp.sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2])
     along = skew[0] * axis[0] + skew[1] * axis[1] + skew[2] * axis[2]
     return xp.where(along < 0.0, -axis, axis) * angle

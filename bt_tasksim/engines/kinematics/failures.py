@@ -1,4 +1,4 @@
-"""Why an arm could not follow its commands, by world: numbers first, and the sentence when somebody reads it."""
+"""Why an arm could not follow its commands, by world: numbers, and the sentence when somebody reads it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Failures:
     @property
     def mask(self) -> np.ndarray:
         """Rows ``(k,)`` that failed."""
-        return self.code != Reach.REACHED
+        return np.asarray(self.code != Reach.REACHED)
 
     def __bool__(self) -> bool:
         """A row has failed."""

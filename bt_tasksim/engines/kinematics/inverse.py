@@ -23,7 +23,19 @@ from bt_tasksim.core.poses import Array, array_namespace, clip, constant
 from bt_tasksim.engines.kinematics.chain import Chain, difference
 from bt_tasksim.engines.kinematics.failures import Reach
 from bt_tasksim.engines.kinematics.linear import solve_symmetric, total
-from bt_tasksim.engines.kinematics.rows import host, joined, put, taken, where_true
+from bt_tasksim.engines.kinematics.rows import (
+    at_least,
+    chosen,
+    either,
+    every,
+    highest,
+    host,
+    joined,
+    put,
+    some,
+    taken,
+    where_true,
+)
 from bt_tasksim.robot.description import RobotDescription
 
 _TOLERANCE = 5e-5
@@ -47,8 +59,8 @@ _SWING, _SWING_PER_METRE, _SWING_PER_RADIAN = 0.5, 10.0, 2.0
 """A tracked arm may change its posture at once by so much: rad, and more for the way that the tool goes."""
 _SETTLING = 0.3
 """Share of the way to the preferred posture that one step of settling asks of the null space."""
-_RESTARTS, _AT_ONCE = 24, 8
-"""Random postures to begin at, and how many of them are tried at once."""
+_RESTARTS = 24
+"""Random postures to begin at."""
 
 
 class Found(NamedTuple):
@@ -109,7 +121,11 @@ class InverseKinematics:
         self.chain = Chain.of(model, "tool", like)
         self._patience = patience
         self._n = len(robot.arm_joints)
-        column = (robot.arm_lower[:, None], robot.arm_upper[:, None], robot.rest[:, None])
+        column = (
+            robot.arm_lower[:, None].copy(),
+            robot.arm_upper[:, None].copy(),
+            robot.rest[:, None].copy(),
+        )
         self._lower, self._upper, self._rest = (constant(values, like) for values in column)
         self._pull = constant(_PULL * robot.posture[:, None], like)
         asked = np.flatnonzero(robot.task_mask > 0.0)
@@ -132,14 +148,13 @@ class InverseKinematics:
             last: The joints before ``(n, N)``.
             seen: ``(n + 1, 3, 4, N)``, what `Chain.seen` says of those.
         """
-        xp = array_namespace(goal)
         pull = self._pull * (self._rest - last)
-        pull = pull * (_PULL_LIMIT / xp.clip(xp.max(xp.abs(pull), axis=0), min=_PULL_LIMIT))
+        pull = pull * (_PULL_LIMIT / at_least(_largest(pull), _PULL_LIMIT))
         reached = self._iterate(last, goal, _TRACK, pull, seen)
         rows = goal.shape[-1]
         found = Found(reached.q, reached.seen, *np.zeros((3, rows)))
         solved = reached.worst <= _TOLERANCE
-        if bool(xp.all(solved)):
+        if every(solved):
             return found
         hard = where_true(~solved)
         return _with(found, hard, self._again(taken(goal, hard), taken(last, hard)))
@@ -160,7 +175,10 @@ class InverseKinematics:
         other = self._search(goal, [self._rest], last, best)
         swings = (other.code == Reach.REACHED) & (host(_largest(other.q - last)) > swing)
         other.code[swings] = Reach.SWINGS
-        other.distance[swings], other.angle[swings] = missed.distance[left][swings], missed.angle[left][swings]
+        other.distance[swings], other.angle[swings] = (
+            missed.distance[left][swings],
+            missed.angle[left][swings],
+        )
         return _with(found, left, other)
 
     def nearest(self, goal: Array, starts: list[Array], posture: Array | None = None) -> Found:
@@ -170,7 +188,7 @@ class InverseKinematics:
 
         Args:
             goal: Placements of the tool ``(3, 4, N)``.
-            starts: Joints ``(n, N)`` or ``(n, 1)`` to begin at, before the rest posture and fixed random ones.
+            starts: Joints ``(n, N)`` or ``(n, 1)`` to begin at, before the rest posture and random ones.
             posture: Joints ``(n, N)`` or ``(n, 1)`` to come near to; by default the rest posture.
         """
         return self._search(goal, [*starts, self._rest], self._rest if posture is None else posture)
@@ -190,11 +208,8 @@ class InverseKinematics:
         least = missed.cost if best is not None else np.full(rows, np.inf)
         found = Found(at.q, at.seen, np.full(rows, Reach.UNREACHABLE), missed.distance, missed.angle)
         left = np.arange(rows)
-        random = [
-            xp.broadcast_to(self._starts[:, i : i + _AT_ONCE, None], (self._n, _AT_ONCE, rows))
-            for i in range(0, _RESTARTS, _AT_ONCE)
-        ]
-        for begin, all_count in [(tries, True), *((start, False) for start in random)]:
+        random = xp.broadcast_to(self._starts[..., None], (self._n, _RESTARTS, rows))
+        for begin, all_count in ((tries, True), (random, False)):
             if not all_count and time.monotonic() - began > self._patience:
                 break
             found, least = self._try(found, least, left, taken(begin, left), goal, posture, all_count)
@@ -243,7 +258,10 @@ class InverseKinematics:
                 settled &= np.cumsum(good, axis=0) == 1
             which = np.flatnonzero(settled.reshape(-1))
             q, seen = self._settle(
-                taken(reached.q, which), taken(reached.seen, which), taken(goals, which), taken(postures, which)
+                taken(reached.q, which),
+                taken(reached.seen, which),
+                taken(goals, which),
+                taken(postures, which),
             )
             reached = reached._replace(q=put(reached.q, which, q), seen=put(reached.seen, which, seen))
             apart = host(_square(reached.q - postures)).reshape(many, len(left))
@@ -294,7 +312,6 @@ class InverseKinematics:
             The joints, within their limits, the chain there, and the largest component of the remaining error
             (m, rad).
         """
-        xp = array_namespace(goal)
         rows = np.arange(goal.shape[-1])
         ended: list[_Reached] = []
         of: list[np.ndarray] = []
@@ -308,9 +325,9 @@ class InverseKinematics:
                 break
             if pull is None:
                 done = worst <= _TOLERANCE if stuck is None else (worst <= _TOLERANCE) | stuck
-                if bool(xp.all(done)):
+                if every(done):
                     break
-                if bool(xp.any(done)):
+                if some(done):
                     index, rest = where_true(done), where_true(~done)
                     ended.append(_Reached(taken(q, index), taken(seen, index), taken(worst, index)))
                     of.append(rows[index])
@@ -334,17 +351,18 @@ class InverseKinematics:
         error = error * self._weights
         damping = 0.5 * total(error * error) + _DAMPING
         step = self._step(jacobian, error, damping, pull)
-        largest = xp.max(xp.abs(step), axis=0)
-        kept = q + step * (_LONGEST / xp.clip(largest, min=_LONGEST))
+        largest = _largest(step)
+        kept = q + step * (_LONGEST / at_least(largest, _LONGEST))
         stuck = None if pull is not None else largest < _STUCK
-        past = xp.any((kept < self._lower) | (kept > self._upper), axis=0)
-        if bool(xp.any(past)):
-            index = where_true(past)
-            parts = (taken(x, index) for x in (q, jacobian, error, damping))
-            held = self._saturate(*parts, None if pull is None else taken(pull, index))
+        past = (kept < self._lower) | (kept > self._upper)
+        if some(past):
+            index = where_true(either(past))
+            here = taken(q, index)
+            z = xp.zeros_like(here) if pull is None else taken(pull, index)
+            held = self._saturate(here, taken(jacobian, index), taken(error, index), taken(damping, index), z)
             kept = put(kept, index, held)
             if stuck is not None:
-                stuck = put(stuck, index, _largest(held - taken(q, index)) < _STUCK)
+                stuck = put(stuck, index, _largest(held - here) < _STUCK)
         if stuck is not None:
             kept = xp.where(stuck, q, kept)
         return kept, stuck
@@ -356,24 +374,21 @@ class InverseKinematics:
             return _along(jacobian, solve_symmetric(square, error))
         return pull + _along(jacobian, solve_symmetric(square, error - total(jacobian * pull[:, None])))
 
-    def _saturate(
-        self, q: Array, jacobian: Array, error: Array, damping: Array, pull: Array | None
-    ) -> Array:
+    def _saturate(self, q: Array, jacobian: Array, error: Array, damping: Array, pull: Array) -> Array:
         """The step's result within the limits: joints that pass one are set on it, the worst first."""
         xp = array_namespace(q)
-        z = xp.zeros_like(q) if pull is None else pull
         free, step = xp.ones_like(q), xp.zeros_like(q)
         joint = xp.asarray(np.arange(self._n)[:, None], device=q.device)
         for _ in range(self._n):
             held = step * (1.0 - free)
             left = error - total(jacobian * held[:, None])
-            moved = self._step(jacobian * free[:, None], left, damping, z * free) * free
-            moved = moved * (_LONGEST / xp.clip(xp.max(xp.abs(moved), axis=0), min=_LONGEST))
+            moved = self._step(jacobian * free[:, None], left, damping, pull * free) * free
+            moved = moved * (_LONGEST / at_least(_largest(moved), _LONGEST))
             step = moved + held
             excess = xp.where(free > 0.0, xp.maximum(q + step - self._upper, self._lower - q - step), 0.0 * q)
             worst = joint == xp.argmax(excess, axis=0)
             sets = worst & (excess > 0.0)
-            if not bool(xp.any(sets)):
+            if not some(sets):
                 break
             limit = xp.where(step > 0.0, self._upper - q, self._lower - q)
             step, free = xp.where(sets, limit, step), xp.where(sets, 0.0 * free, free)
@@ -382,10 +397,7 @@ class InverseKinematics:
     def _error(self, seen: Array, goal: Array) -> Array:
         """What is left of the way in the components that are asked for ``(m, N)``, m and rad."""
         way = difference(seen[0], goal)
-        if self._asked is None:
-            return way
-        xp = array_namespace(way)
-        return xp.take(way, xp.asarray(self._asked, device=way.device), axis=0)
+        return way if self._asked is None else chosen(way, self._asked)
 
     def _missed(self, seen: Array, goal: Array) -> _Missed:
         """How far the tool is from its placements."""
@@ -416,8 +428,7 @@ def _along(jacobian: Array, force: Array) -> Array:
 
 def _largest(values: Array) -> Array:
     """Largest magnitude ``(N,)`` of values ``(k, N)``."""
-    xp = array_namespace(values)
-    return xp.max(xp.abs(values), axis=0)
+    return highest(abs(values))
 
 
 def _square(values: Array) -> Array:

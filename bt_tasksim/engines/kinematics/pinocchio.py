@@ -105,7 +105,9 @@ class PinocchioKinematics(KinematicsEngine):
             UnreachableError: No posture brings the tool there; says by how much the nearest one misses.
         """
         asked = np.asarray(pose, float)[None]
-        found, failures = self.batch.joints_at(asked, *(None if q is None else q[None] for q in (seed, posture)))
+        found, failures = self.batch.joints_at(
+            asked, *(None if q is None else q[None] for q in (seed, posture))
+        )
         if failures:
             raise _error(failures)
         return found[0]

@@ -58,3 +58,49 @@ def contiguous(array: Array) -> Array:
     if type(array) is np.ndarray:
         return np.ascontiguousarray(array)
     return array.contiguous() if hasattr(array, "contiguous") else array
+
+
+# What follows is the library's own, said shortly for NumPy, whose wrappers take longer than few rows.
+
+
+def some(mask: Array) -> bool:
+    """An element of a mask is true."""
+    if type(mask) is np.ndarray:
+        return bool(np.count_nonzero(mask))
+    return bool(array_namespace(mask).any(mask))
+
+
+def every(mask: Array) -> bool:
+    """All elements of a mask are true."""
+    if type(mask) is np.ndarray:
+        return bool(np.count_nonzero(mask) == mask.size)
+    return bool(array_namespace(mask).all(mask))
+
+
+def either(mask: Array) -> Array:
+    """An element ``(N,)`` of each row of a mask ``(k, N)`` is true."""
+    if type(mask) is np.ndarray:
+        return np.logical_or.reduce(mask, axis=0)
+    return array_namespace(mask).any(mask, axis=0)
+
+
+def highest(values: Array) -> Array:
+    """Largest ``(N,)`` of values ``(k, N)``."""
+    if type(values) is np.ndarray:
+        return np.maximum.reduce(values, axis=0)
+    return array_namespace(values).max(values, axis=0)
+
+
+def at_least(values: Array, low: float) -> Array:
+    """Values, and where they are smaller the bound."""
+    if type(values) is np.ndarray:
+        return np.maximum(values, low)
+    return array_namespace(values).clip(values, min=low)
+
+
+def chosen(array: Array, index: np.ndarray) -> Array:
+    """Entries ``(k, ...)`` of the first axis by their indices."""
+    if type(array) is np.ndarray:
+        return array.take(index, axis=0)
+    xp = array_namespace(array)
+    return xp.take(array, xp.asarray(index, device=array.device), axis=0)
