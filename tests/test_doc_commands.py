@@ -173,6 +173,8 @@ def run_command(words: list[str]) -> None:
     words = [word for word in words if word != "--video"]
     if name == "evaluate":
         words = overridden(words, "--episodes 1 --workers 1")
+        if "--resume" in words:
+            assert main([word for word in words if word != "--resume"]) == 0
     elif name == "train":
         shutil.rmtree("policies")
         words = overridden([w for w in words if w != "800000"], "--settings tiny.json --workers 1")

@@ -3,37 +3,24 @@
 from __future__ import annotations
 
 import contextlib
-import copy
+import functools
 import multiprocessing
 import os
 import signal
 import time
-import traceback
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, Generic, Literal, Protocol, Self, TypeVar
+from typing import Any, Literal
 
 from bt_tasksim.core import child
-from bt_tasksim.core.culprit import users_place
-from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.fleet import Fleet, ItemT, ResultT, Shares, StateT, Work, results_of, sendable
 from bt_tasksim.core.interrupts import held_back
 
-StateT = TypeVar("StateT")
-StateT_contra = TypeVar("StateT_contra", contravariant=True)
-ResultT = TypeVar("ResultT")
-ResultT_co = TypeVar("ResultT_co", covariant=True)
 
-
-class Task(Protocol[StateT_contra, ResultT_co]):
-    """What a worker is to do; it is pickled, and so is its result."""
-
-    def run(self, state: StateT_contra, /) -> ResultT_co:
-        """Do it with what the worker keeps."""
-
-
-class Workers(Generic[StateT]):
-    """Worker processes; a context manager, which ends them.
+class Workers(Fleet[StateT]):
+    """Worker processes as a fleet.
 
     A worker ends when its parent is gone. Ctrl-C does not reach it: the parent ends it.
 
@@ -61,42 +48,35 @@ class Workers(Generic[StateT]):
                 self._pipes.append(mine)
                 self._processes.append(process)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self.close(0.0 if kind is not None else 2.0)
-
     @property
     def pids(self) -> tuple[int | None, ...]:
         """The workers' process ids."""
         return tuple(process.pid for process in self._processes)
 
-    def each(self, tasks: Sequence[Task[StateT, ResultT]]) -> Iterator[tuple[int, ResultT]]:
-        """The tasks' numbers and results, in the order in which they are done.
+    def spread(
+        self, work: Work[StateT, ItemT, ResultT], items: Sequence[ItemT], share: int = 1
+    ) -> Iterator[tuple[int, ResultT]]:
+        """See `Fleet.spread`.
 
         Raises:
-            BtTasksimError: A worker found an error; then they are good for nothing any more.
-            InputError: A user's own code raised in a worker; says where.
-            MachineError: A worker ended, or something else was raised in it.
+            MachineError: A worker ended: nobody makes up for it.
         """
-        waiting = list(enumerate(tasks))[::-1]
-        busy: dict[Connection, int] = {}
+        shares = Shares(len(items), share)
         idle = list(self._pipes)
         try:
-            while waiting or busy:
-                while waiting and idle:
-                    pipe = idle.pop()
-                    number, task = waiting.pop()
-                    pipe.send(task)
-                    busy[pipe] = number
-                for ready in wait(list(busy)):
+            while shares.left:
+                while idle and (taken := shares.take(idle[-1], len(self._pipes))):
+                    idle.pop().send((work, [items[number] for number in taken]))
+                for ready in wait(shares.members):
                     assert isinstance(ready, Connection)
-                    kind, result = ready.recv()
+                    kind, what = ready.recv()
                     if kind == "error":
-                        raise result
-                    idle.append(ready)
-                    yield busy.pop(ready), result
+                        raise what
+                    index, result = what
+                    number = shares.done(ready, index)
+                    if ready not in shares.members:
+                        idle.append(ready)
+                    yield number, result
         except (EOFError, ConnectionError) as error:
             raise MachineError("a worker process ended; is there enough memory?") from error
 
@@ -125,35 +105,22 @@ def _serve(make: Callable[[], StateT], pipe: Connection, others: list[Connection
     for other in others:
         other.close()
     parent = os.getppid()
-    made: list[StateT] = []
+    kept = functools.cache(make)
     while os.getppid() == parent:
         try:
             if not pipe.poll(1.0):
                 continue
-            task: Task[StateT, object] = pipe.recv()
+            work, items = pipe.recv()
         except (EOFError, OSError):
             break
         try:
-            if not made:
-                made.append(make())
-            pipe.send(("done", task.run(made[0])))
+            for answer in results_of(kept, work, items):
+                pipe.send(answer)
         except BrokenPipeError:
             break
-        except Exception as error:
-            pipe.send(("error", _sendable(error)))
+        except Exception as error:  # a result that cannot be pickled
+            pipe.send(("error", sendable(error)))
     os._exit(0)
-
-
-def _sendable(error: Exception) -> Exception:
-    """An error that comes through a pipe: itself where it can, else one with the same sentence."""
-    if not isinstance(error, BtTasksimError) and (place := users_place(error)):
-        return InputError(f"{place}: {type(error).__name__}: {error}")
-    if not isinstance(error, BtTasksimError):
-        return MachineError(f"{error!r}: {traceback.format_exc(limit=-3)}")
-    try:
-        return copy.copy(error)  # as it is put together again on the other side
-    except Exception:  # whatever its constructor asks for
-        return InputError(str(error)) if isinstance(error, InputError) else MachineError(str(error))
 
 
 @contextlib.contextmanager

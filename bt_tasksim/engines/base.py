@@ -17,7 +17,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from bt_tasksim.core.errors import InputError, MachineError, nearest
 from bt_tasksim.core.poses import Array
@@ -26,6 +26,9 @@ from bt_tasksim.core.world import Command, Hidden, JointTarget, Observation, Wor
 from bt_tasksim.engines.images import Image
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
+
+if TYPE_CHECKING:
+    from bt_tasksim.engines.batch import PhysicsBatch
 
 ROLES = ("kinematics", "physics", "rendering", "postprocess")
 """In the order in which the pipeline calls them; the kinds of part are ``engine/`` and these."""
@@ -183,6 +186,22 @@ class PhysicsEngine(Engine):
     """Moves the world on by one control period: a simulator, or a real robot behind its guard."""
 
     role = "physics"
+
+    @classmethod
+    def batch(cls, robot: RobotDescription, setup: EngineSetup, worlds: int, threads: int) -> PhysicsBatch:
+        """Many worlds of a robot at once.
+
+        Args:
+            robot: The robot.
+            setup: See `create`.
+            worlds: How many; at least 1.
+            threads: How many threads may step them; at least 1.
+
+        Raises:
+            InputError: This engine has no worlds in batches, the default; or see `create`.
+            MachineError: See `create`.
+        """
+        raise InputError(f"the physics engine '{setup.name}' has no worlds in batches: run them one by one")
 
     @abstractmethod
     def reset(self, configuration: ActorConfiguration) -> WorldState:

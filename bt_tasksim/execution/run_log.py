@@ -21,7 +21,6 @@ import json
 import math
 import platform
 import re
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +31,7 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.identity import package_versions
 from bt_tasksim.core.world import Observation, WorldModel
 from bt_tasksim.demos_decomp.log import Demonstration, Log, Surface, Track, Video
 from bt_tasksim.demos_decomp.log_file import write_log
@@ -43,17 +43,6 @@ from bt_tasksim.trees.walk import nodes_of
 
 STATUSES = {Status.INVALID: 0, Status.RUNNING: 1, Status.SUCCESS: 2, Status.FAILURE: 3}
 """Numbers in ``tree/status``."""
-PACKAGES = (
-    "bt-tasksim",
-    "numpy",
-    "py-trees",
-    "pin",
-    "sapien",
-    "mani-skill",
-    "mujoco",
-    "opencv-python-headless",
-)
-"""Packages whose versions a log names, where they are installed."""
 ABOUT = frozenset((
     "status", "success", "reason", "why", "leaf", "outcome", "scenario", "seed", "stream", "robot", "engines",
     "perception", "options", "longest", "policies", "control_steps", "control_frequency", "sim_time",
@@ -295,11 +284,7 @@ def about(result: Result, runner: Runner, scenario: str) -> dict[str, Any]:
 def versions(robot: RobotDescription) -> dict[str, str]:
     """Versions of everything that a run's numbers may depend on."""
     found = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
-    for package in PACKAGES:
-        try:
-            found[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
+    found |= package_versions()
     found["robot file"] = hashlib.sha256(robot.source.read_bytes()).hexdigest()[:16]
     return found
 

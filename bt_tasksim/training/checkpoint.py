@@ -7,7 +7,6 @@ still read.
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 import math
@@ -19,22 +18,15 @@ from typing import Any
 
 import numpy as np
 import safetensors.numpy
-from py_trees.behaviour import Behaviour
 from safetensors import safe_open
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_bytes
 from bt_tasksim.core.json_text import parse_json
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.renamed import former_names, with_present_names
+from bt_tasksim.core.renamed import with_present_names
 from bt_tasksim.engines.remote.plain import from_plain, shown
-from bt_tasksim.execution.pipelines import EngineOptions
-from bt_tasksim.execution.run_log import tree_text
-from bt_tasksim.robot.description import load_robot
-from bt_tasksim.scene.fixtures import load_fixture
-from bt_tasksim.scene.scene import Scene
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.trees.walk import nodes_of
 
 FORMER = {"lesson": "stage"}
 """Present names of facts by those that they had in earlier versions."""
@@ -53,7 +45,7 @@ class Facts:
 
     Attributes:
         config: Its settings.
-        about: What it is a training of, see `subject`; empty where an older checkpoint does not say.
+        about: What it is a training of, see `training_subject`; empty where an older checkpoint does not say.
         iteration: Rollouts that are done.
         stage: Number of the stage.
         recent: Whether the last episodes were successes.
@@ -167,65 +159,6 @@ def check_tensors(path: Path, tensors: Mapping[str, Array], expected: Mapping[st
     missing = sorted(name for name in shapes if name not in tensors and not name.startswith("optimizer/"))
     if missing:
         raise damaged(path, f"'{missing[0]}' is missing")
-
-
-def subject(
-    tree: Behaviour, scene: Scene, layouts: Mapping[str, Any], node: str, options: EngineOptions
-) -> dict[str, str]:
-    """What a training is of, as hashes by name.
-
-    Args:
-        tree: The tree.
-        scene: The scene.
-        layouts: What the leaves under training see and decide, in plain data.
-        node: Name of the node that is trained.
-        options: Which engines.
-    """
-    robot = load_robot(scene.robot)
-    text = tree_text(tree) or [[type(n).__qualname__, n.name, len(n.children)] for n in nodes_of(tree)]
-    world = {
-        "scene": _plain(dataclasses.replace(scene, robot="", name="")),
-        "fixtures": [_plain(load_fixture(name)) for name in scene.fixtures],
-    }
-    engines = {k: v for k, v in _plain(options).items() if k not in ("key", "timeout", "connect_timeout")}
-    return {
-        "tree": _hash([text, node]),
-        "scene": _hash(world),
-        "robot": hashlib.sha256(robot.source.read_bytes()).hexdigest(),
-        "layout of features and actions": _hash(layouts),
-        "choice of engines": _hash(engines),
-    }
-
-
-def _plain(value: Any) -> Any:
-    """A value as JSON can hold it; fields at their defaults are left out, so that new ones change nothing.
-
-    A renamed field keeps its former name here, so that a hash of earlier versions still fits.
-    """
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        first = {present: former for former, present in former_names(type(value)).items()}
-        return {
-            first.get(f.name, f.name): _plain(getattr(value, f.name))
-            for f in dataclasses.fields(value)
-            if not _is_default(f, getattr(value, f.name))
-        }
-    if isinstance(value, Mapping):
-        return {str(key): _plain(v) for key, v in value.items()}
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, list | tuple | set | frozenset):
-        return [_plain(v) for v in value]
-    return value if isinstance(value, str | int | float | bool | None) else repr(value)
-
-
-def _is_default(field: dataclasses.Field[Any], value: Any) -> bool:
-    if field.default is not dataclasses.MISSING:
-        return bool(np.all(field.default == value))
-    return field.default_factory is not dataclasses.MISSING and bool(np.all(field.default_factory() == value))
-
-
-def _hash(content: Any) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _digest(text: str, arrays: Mapping[str, Array]) -> str:

@@ -7,10 +7,8 @@ or on the order of the episodes.
 from __future__ import annotations
 
 import contextlib
-import json
-import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -21,13 +19,15 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.plugins import load_all
 from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
-from bt_tasksim.core.files import check_writable, write_text
+from bt_tasksim.core.fleet import Fleet, Here
+from bt_tasksim.core.identity import identity
 from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import outcome_of_error
-from bt_tasksim.core.plugins import loaded
+from bt_tasksim.core.plugins import load_plugin, loaded
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.scene.configuration import check_seed
+from bt_tasksim.training.evaluation_file import EvaluationFile, KeptEvaluation
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
 
 if TYPE_CHECKING:
@@ -55,40 +55,6 @@ class Job:
     plugins: tuple[str, ...] = field(default_factory=loaded)
 
 
-class EvaluationFile:
-    """Keeps an evaluation in a file while it is made: give it to `evaluate` as ``keep``.
-
-    Args:
-        path: Where to; what is there stays until the first episode has ended.
-
-    Raises:
-        InputError: The folder does not exist, or the path is a folder or a device.
-        MachineError: It is not writable.
-    """
-
-    EVERY = 2.0
-    """Seconds between two writings: what a killed evaluation loses at most."""
-
-    def __init__(self, path: str | Path) -> None:
-        check_writable(path)
-        self.path = path
-        self._written = -math.inf
-
-    def __call__(self, evaluation: Evaluation, last: bool) -> None:
-        """Write what there is, if it is time.
-
-        Args:
-            evaluation: What there is.
-            last: There will be no more.
-        """
-        now = time.monotonic()
-        if last or now - self._written >= self.EVERY:
-            self._written = now
-            # A disk that is full now may not be so at the end, when it counts.
-            with contextlib.nullcontext() if last else contextlib.suppress(MachineError):
-                write_text(self.path, json.dumps(evaluation.to_json(), indent=2, allow_nan=False) + "\n")
-
-
 class EvaluationInterrupted(KeyboardInterrupt):  # as KeyboardInterrupt, which it is
     """An evaluation was interrupted.
 
@@ -108,22 +74,24 @@ class EvaluationTerminated(EvaluationInterrupted, Terminated):
 def evaluate(
     job: Job,
     seeds: Sequence[int],
-    workers: int = 1,
+    workers: int | None = None,
     progress: Callable[[EpisodeOutcome], None] | None = None,
     stream: str = "evaluation",
-    keep: Callable[[Evaluation, bool], None] | None = None,
+    keep: EvaluationFile | None = None,
     stopped: Callable[[Evaluation], None] | None = None,
+    kept: KeptEvaluation | None = None,
 ) -> Evaluation:
     """Run one episode for each seed.
 
     Args:
         job: What to run.
         seeds: Seeds of the episodes.
-        workers: Worker processes; 1 runs in this process.
-        progress: Called after every episode, in the order in which they end.
+        workers: Worker processes; 1 runs in this process, and so does None.
+        progress: Called after every episode, in the order in which they end; first for those that are kept.
         stream: Stream of draws.
-        keep: Called after every episode with what there is, and at the end with true, however it comes.
+        keep: Keeps every episode as it ends, and all of them at the end, however it comes.
         stopped: Called with what there is where an error ends it after an episode.
+        kept: Go on from this: its episodes are not run again.
 
     Returns:
         The outcomes in the order of the seeds.
@@ -131,80 +99,105 @@ def evaluate(
     Raises:
         EvaluationInterrupted: By Ctrl-C; holds what there is.
         EvaluationTerminated: By SIGTERM or SIGHUP; likewise.
-        InputError: The tree, scene, robot or engines are no good, or there are no seeds.
+        InputError: The tree, scene, robot or engines are no good, or there are no seeds, or what is kept is
+            of something else.
         LostEngine: An engine in another process has gone away.
         MachineError: A robot has failed, or a worker process ended.
     """
     if not seeds:
         raise InputError("an evaluation needs at least one episode")
-    if workers < 1:
+    if workers is not None and workers < 1:
         raise InputError(f"an evaluation needs at least one worker, found {workers}")
-    if workers > 1 and job.options.remote:
+    if workers is not None and workers > 1 and job.options.remote:
         raise InputError("an engine in another process serves one client at a time: evaluate with 1 worker")
     for seed in seeds:
         check_seed(seed)
-    started = time.perf_counter()
+    started = time.perf_counter() - (kept.seconds if kept is not None else 0.0)
+    versions = identity()  # before anybody edits a file
     runner = _runner(job)  # errors show here, before any process starts
-    engines, perception = result_names(job.options, runner.pipeline)
-    found: dict[int, EpisodeOutcome] = {}
-
-    def evaluation() -> Evaluation:
-        return Evaluation(
-            scenario=_name(job),
-            robot=runner.robot.name,
-            engines=engines,
-            perception=perception,
-            policies=_policies(runner),
-            outcomes=tuple(found[s] for s in seeds if s in found),
-            seconds=time.perf_counter() - started,
-            asked=len(seeds),
-        )
-
-    def ended(outcome: EpisodeOutcome) -> None:
-        found[outcome.seed] = outcome
-        if progress is not None:
-            progress(outcome)
-        if keep is not None and len(found) < len(seeds):
-            keep(evaluation(), False)
-
     with closing(runner.pipeline):  # what serves one client at a time is free for the next one
+        engines, perception = result_names(job.options, runner.pipeline)
+        subject = _subject(job, runner, stream)
+        if kept is not None:
+            kept.check(subject, seeds)
+        found = {outcome.seed: outcome for outcome in kept.outcomes} if kept is not None else {}
+        todo = [seed for seed in dict.fromkeys(seeds) if seed not in found]
+
+        def evaluation() -> Evaluation:
+            return Evaluation(
+                scenario=_name(job),
+                robot=runner.robot.name,
+                engines=engines,
+                perception=perception,
+                policies=_policies(runner),
+                outcomes=tuple(found[s] for s in seeds if s in found),
+                seconds=time.perf_counter() - started,
+                asked=len(seeds),
+                subject=subject,
+                versions=versions,
+            )
+
+        def ended(outcome: EpisodeOutcome) -> None:
+            found[outcome.seed] = outcome
+            if progress is not None:
+                progress(outcome)
+            if keep is not None and len(found) < len(seeds):
+                keep.add(outcome, time.perf_counter() - started, evaluation)
+
         try:
+            if progress is not None:
+                for outcome in found.values():
+                    progress(outcome)
             with terminable():
-                _run_all(runner, job, seeds, workers, ended, stream)
+                if todo:
+                    with _fleet(job, runner, workers or 1, len(todo)) as fleet:
+                        for _, outcome in fleet.spread(partial(episodes, stream=stream), todo):
+                            ended(outcome)
             if keep is not None:
-                keep(evaluation(), True)
+                keep.end(evaluation())
         except KeyboardInterrupt as stop:
             with ending():
                 if keep is not None and found:
-                    keep(evaluation(), True)
+                    keep.end(evaluation())
             kind = EvaluationTerminated if isinstance(stop, Terminated) else EvaluationInterrupted
             raise kind(evaluation()) from stop
         except BtTasksimError:
             if found and keep is not None:
                 with contextlib.suppress(BtTasksimError):  # the first error is the one to tell
-                    keep(evaluation(), True)
+                    keep.end(evaluation())
             if found and stopped is not None:
                 stopped(evaluation())
             raise
-    return evaluation()
+        return evaluation()
 
 
-def _run_all(
-    runner: Runner,
-    job: Job,
-    seeds: Sequence[int],
-    workers: int,
-    ended: Callable[[EpisodeOutcome], None],
-    stream: str,
-) -> None:
-    """Run all episodes, in this process or in others."""
+def _fleet(job: Job, runner: Runner, workers: int, most: int) -> Fleet[Runner]:
+    """What runs the episodes, of which there are so many."""
     if workers == 1:
-        for seed in seeds:
-            ended(episode(runner, seed, stream))
-        return
-    with Workers(partial(_runner, job), min(workers, len(seeds)), "spawn") as pool:
-        for _, outcome in pool.each([_EpisodeTask(seed, stream) for seed in seeds]):
-            ended(outcome)
+        return Here(runner)
+    return Workers(partial(_runner, job), min(workers, most), "spawn")
+
+
+def episodes(
+    runner: Runner, seeds: Sequence[int], stream: str = "evaluation"
+) -> Iterator[tuple[int, EpisodeOutcome]]:
+    """Run a share of an evaluation; every member of a fleet does this.
+
+    Args:
+        runner: The runner.
+        seeds: Seeds of the episodes.
+        stream: Stream of draws.
+
+    Yields:
+        Index and outcome of each episode as it ends, whatever the order.
+
+    Raises:
+        InputError: See `episode`, as for the others.
+        LostEngine: An engine in another process has gone away.
+        MachineError: A robot has failed.
+    """
+    for index, seed in enumerate(seeds):
+        yield index, episode(runner, seed, stream)
 
 
 def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOutcome:
@@ -243,17 +236,6 @@ def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOut
     )
 
 
-@dataclass(frozen=True)
-class _EpisodeTask:
-    """One episode, for a worker that keeps a runner."""
-
-    seed: int
-    stream: str
-
-    def run(self, runner: Runner, /) -> EpisodeOutcome:
-        return episode(runner, self.seed, self.stream)
-
-
 def _runner(job: Job) -> Runner:
     from bt_tasksim.execution.runner import Runner
     from bt_tasksim.trees.load import load_source
@@ -261,6 +243,16 @@ def _runner(job: Job) -> Runner:
     load_all(job.plugins)
     source = load_source(job.tree, job.robot, job.scene, job.policies)
     return Runner(source.build(), source.scene, job.options)
+
+
+def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
+    from bt_tasksim.training.subject import evaluation_subject
+
+    files = {plugin: getattr(load_plugin(plugin), "__file__", None) for plugin in job.plugins}
+    code = {f"plugin {Path(plugin).name}": file for plugin, file in files.items() if file is not None}
+    if job.tree.endswith(".py"):
+        code["tree"] = job.tree
+    return evaluation_subject(runner.tree, runner.scene, job.options, _policies(runner), code, stream)
 
 
 def _name(job: Job) -> str:

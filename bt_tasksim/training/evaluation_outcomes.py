@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from bt_tasksim.core.outcomes import Outcome, outcome_from_data, recorded_outcome
@@ -89,6 +91,10 @@ class Evaluation:
     seconds: float
     asked: int | None = None
     """Episodes that were asked for; None for as many as there are outcomes."""
+    subject: Mapping[str, str] = field(default_factory=dict)
+    """What was evaluated, as hashes by name, see `bt_tasksim.training.subject`; empty where nobody asks."""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    """Of the program, see `bt_tasksim.core.identity`."""
 
     @property
     def complete(self) -> bool:
@@ -116,6 +122,7 @@ class Evaluation:
         """The fields of ``evaluate --json``."""
         n = len(self.outcomes)
         failures = Counter(o.reason for o in self.outcomes if not o.success)
+        episodes = [o.to_data() for o in self.outcomes]
         return {
             "scenario": self.scenario,
             "robot": self.robot,
@@ -132,7 +139,10 @@ class Evaluation:
             "failed_seeds": [o.seed for o in self.outcomes if not o.success],
             "seconds": round(self.seconds, 3),
             "control_steps": sum(o.control_steps for o in self.outcomes),
-            "outcomes": [o.to_data() for o in self.outcomes],
+            "subject": dict(self.subject),
+            "versions": dict(self.versions),
+            "sha256": outcomes_hash(episodes),
+            "outcomes": episodes,
         }
 
     def lines(self) -> list[str]:
@@ -150,6 +160,11 @@ class Evaluation:
         if any(o.success and math.isnan(o.position_error) for o in self.outcomes):
             lines.append("  (the scene has no goal: success is the tree's own word, nothing was judged)")
         return [*lines, *(f"  {line}" for line in self.failure_lines())]
+
+
+def outcomes_hash(episodes: Sequence[Any]) -> str:
+    """SHA-256 of episodes in plain data, by which a file says that they are what was written."""
+    return hashlib.sha256(json.dumps(episodes).encode()).hexdigest()
 
 
 def wilson(successes: int, n: int) -> tuple[float, float]:

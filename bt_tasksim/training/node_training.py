@@ -30,13 +30,13 @@ from bt_tasksim.training.checkpoint import (
     check_tensors,
     damaged,
     read_checkpoint,
-    subject,
     write_checkpoint,
 )
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.env import EpisodeEnv, shared_layout
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
 from bt_tasksim.training.rollouts import DrawTask, EnvironmentRollout, RolloutTask
+from bt_tasksim.training.subject import training_subject
 from bt_tasksim.trees.nodes.train import Train
 
 if TYPE_CHECKING:
@@ -290,13 +290,13 @@ class NodeTraining:
         write_text(self.folder / HISTORY, json.dumps(self.history, indent=1) + "\n")
 
     def _about(self) -> dict[str, str]:
-        """What this is a training of, see `bt_tasksim.training.checkpoint.subject`."""
+        """What this is a training of, see `bt_tasksim.training.subject.training_subject`."""
         robot = load_robot(self.task.scene.robot)
         layouts = {
             leaf.name: [list(shared_layout(self.node, [leaf], robot).items()), leaf.actions]
             for leaf in self.node.learners()
         }
-        return subject(self.task.tree, self.task.scene, layouts, self.node.name, self.task.options)
+        return training_subject(self.task.tree, self.task.scene, layouts, self.node.name, self.task.options)
 
     def _kept(self) -> tuple[Path, dict[str, Array], Facts] | None:
         """The checkpoint to go on from, one of this training; nothing is written before it is known to be."""

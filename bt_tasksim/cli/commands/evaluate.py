@@ -31,23 +31,31 @@ def evaluate(
         int, typer.Option(parser=arguments.episodes, metavar="N", help="Number of draws.")
     ] = 100,
     workers: Annotated[
-        int, typer.Option(parser=arguments.workers, metavar="W", help="Worker processes.")
-    ] = 1,
+        int | None,
+        typer.Option(parser=arguments.workers, metavar="W", help="Worker processes.", show_default="1"),
+    ] = None,
     json_: Annotated[
         Path | None, typer.Option("--json", metavar="F", help="Write every episode as JSON.")
     ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from the file of --json, after an interrupt or a kill.")
+    ] = False,
 ) -> None:
     """Run a tree on many seeded draws and count successes."""
     from bt_tasksim.core.files import alone, check_targets
+    from bt_tasksim.core.identity import identity
     from bt_tasksim.training import evaluation
+    from bt_tasksim.training.evaluation_file import EvaluationFile, read_kept
 
+    if resume and json_ is None:
+        raise InputError("evaluate: --resume goes on from the file of --json: name it")
     if seed + episodes > arguments.SEEDS:
         raise InputError(f"evaluate: the last seed would be {seed + episodes - 1}, beyond 64 bits")
     check_targets([json_], (tree.tree, tree.scene, tree.robot))
     tree.load_nodes()
     chosen = policies(engines.policy)
     job = evaluation.Job(tree.tree, tree.scene, tree.robot, engines.options(), chosen)
-    keep = None if json_ is None else evaluation.EvaluationFile(json_)
+    keep = None if json_ is None else EvaluationFile(json_)
 
     def tell(found: Evaluation) -> None:
         say(*map(printable, found.lines()))
@@ -55,6 +63,7 @@ def evaluate(
     only = contextlib.nullcontext() if json_ is None else alone(json_)
     try:
         with only, progress("episodes", episodes) as advance:
+            kept = read_kept(json_, identity()) if resume and json_ is not None else None
             found = evaluation.evaluate(
                 job,
                 range(seed, seed + episodes),
@@ -62,6 +71,7 @@ def evaluate(
                 lambda outcome: advance(outcome.success),
                 keep=keep,
                 stopped=tell,
+                kept=kept,
             )
     except evaluation.EvaluationInterrupted as stop:
         tell(stop.evaluation)

@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from bt_tasksim.core import poses
-from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.rolling import rolling_damping
 from bt_tasksim.engines.physics.sapien_robot import SKIN
 from bt_tasksim.engines.physics.sapien_world import DAMPING, World
@@ -25,13 +22,13 @@ class Touch:
     """What touches what at one instant.
 
     Attributes:
-        tip_force: Contact force ``(n_tips, 3)`` on each fingertip, N.
+        tip_force: Contact force, three numbers, on each fingertip, N.
         hand_force: Force of the robot on each object, N.
         hand_distance: Metres between the robot and each object; infinite where it is far.
         support: Objects and the objects and fixtures that they touch, by index.
     """
 
-    tip_force: Array
+    tip_force: list[list[float]]
     hand_force: list[float]
     hand_distance: list[float]
     support: set[tuple[int, int]]
@@ -121,7 +118,7 @@ class ContactReader:
             [math.fsum(axis) for axis in zip(*forces, strict=True)] or [0.0] * 3 for forces in on_tip
         ]
         hand_force = [math.fsum(forces) for forces in on_object]
-        return Touch(np.array(tip_force).reshape(-1, 3), hand_force, distance, support)
+        return Touch(tip_force, hand_force, distance, support)
 
 
 def resist_rolling(world: World, step: float, hand_force: list[float]) -> None:

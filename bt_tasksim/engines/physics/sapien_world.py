@@ -138,9 +138,9 @@ def sapien_pose(pose: Iterable[float]) -> sapien.Pose:
     return sapien.Pose(p[:3], p[3:])
 
 
-def floats(pose: sapien.Pose) -> list[float]:
-    """The seven numbers of one of SAPIEN's poses."""
-    return [*pose.p.tolist(), *pose.q.tolist()]
+def floats(pose: sapien.Pose) -> tuple[float, ...]:
+    """The seven numbers of one of SAPIEN's poses, as it pickles them: much quicker than its two arrays."""
+    return pose.__getstate__()  # type: ignore[no-any-return]
 
 
 def array(pose: sapien.Pose) -> Array:

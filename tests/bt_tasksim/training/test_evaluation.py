@@ -17,13 +17,13 @@ from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report.write import write_run
 from bt_tasksim.scene.success import HAND_NOT_CLEAR
 from bt_tasksim.training.evaluation import (
-    EvaluationFile,
     EvaluationInterrupted,
     EvaluationTerminated,
     Job,
     episode,
     evaluate,
 )
+from bt_tasksim.training.evaluation_file import EvaluationFile
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation, wilson
 from bt_tasksim.trees.scenarios import pick_and_place
 
@@ -202,6 +202,7 @@ def test_bad_input_is_refused_before_any_process_starts(arguments, sentence):
 
 def test_what_is_done_is_kept_as_it_comes(tmp_path, monkeypatch):
     monkeypatch.setattr(EvaluationFile, "EVERY", 0.0)
+    monkeypatch.setattr(EvaluationFile, "SHARE", math.inf)
     path, seen = tmp_path / "e.json", []
 
     def look(outcome):

@@ -48,12 +48,13 @@ def rolling_cylinder(engine, speed):
     still.step(20)
     velocity, spin = [speed, 0.0, 0.0], [0.0, speed / radius, 0.0]
     if engine == "sapien":
-        body = still.physics._world.objects[0]
+        body = still.physics.simulated.world.objects[0]
         body.set_linear_velocity(velocity)
         body.set_angular_velocity(spin)
     else:
-        data, address = still.physics._data, still.physics._world.object_dof[0]
-        local = data.xmat[still.physics._world.object_body[0]].reshape(3, 3).T @ spin
+        data, world = still.physics.simulated.data, still.physics.simulated.world
+        address = world.object_dof[0]
+        local = data.xmat[world.object_body[0]].reshape(3, 3).T @ spin
         data.qvel[address] = [*velocity, *local]
     return still
 
@@ -71,7 +72,7 @@ def test_a_rolling_cylinder_comes_to_rest(engine):
 
 def test_rolling_resistance_ends_where_the_hand_touches_or_nothing_moves():
     still = rolling_cylinder("sapien", speed=0.12)
-    body = still.physics._world.objects[0]
+    body = still.physics.simulated.world.objects[0]
     own = body.angular_damping
     still.step(4)
     assert body.angular_damping > own

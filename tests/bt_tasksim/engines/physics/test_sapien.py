@@ -42,7 +42,9 @@ def test_frames_that_physx_need_not_move_are_where_kinematics_says(robot):
     assert np.allclose(state.tool_pose[:3], tool[:3], atol=1e-5)
     assert abs(state.tool_pose[3:] @ tool[3:]) == pytest.approx(1.0, abs=1e-6)
     assert np.allclose(state.tips, kinematics.tips(q), atol=1e-5)
-    moved = [body.name for body, (kind, _) in physics._world.bodies.items() if kind in ("arm", "hand")]
+    moved = [
+        body.name for body, (kind, _) in physics.simulated.world.bodies.items() if kind in ("arm", "hand")
+    ]
     assert moved and not any("tcp" in name or name.endswith("_tip") for name in moved)
 
 

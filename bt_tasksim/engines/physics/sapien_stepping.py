@@ -1,0 +1,187 @@
+"""One world of SAPIEN as it goes on: how finely it is stepped, when contacts are looked at, what is read."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import JointTarget
+from bt_tasksim.engines.physics.disturbance import DisturbanceForce
+from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
+from bt_tasksim.engines.physics.sapien_robot import Robot
+from bt_tasksim.engines.physics.sapien_world import DAMPING, World, floats
+from bt_tasksim.scene.configuration import ActorConfiguration
+
+FINE = 8
+"""How many times shorter steps are while something falls."""
+ROLLING = 0.02
+"""Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
+WATCHED = 4
+"""Control periods after the hand closed fast or a contact came or went, in which overlaps are looked for at
+every step; at other times at the period's end."""
+
+
+class SapienReading(NamedTuple):
+    """What PhysX says of a world at one instant, as it says it: plain numbers cost least here.
+
+    Attributes:
+        time: Seconds since the episode began.
+        position: Of all joints of the articulation, in its own order.
+        velocity: The same.
+        incoming: Forces ``(n_links, 6)`` and torques that each link's parent exerts on it.
+        frames: Poses of `Robot.frames`.
+        objects: Poses of the objects.
+        velocities: Six numbers for each object.
+        touch: What touches what.
+        penetration: The deepest overlap so far, metres.
+    """
+
+    time: float
+    position: Array
+    velocity: Array
+    incoming: Array
+    frames: list[tuple[float, ...]]
+    objects: list[tuple[float, ...]]
+    velocities: list[list[float]]
+    touch: Touch
+    penetration: float
+
+
+class SapienWorld:
+    """A world of SAPIEN, see `bt_tasksim.engines.physics.threaded.SimulatedWorld`.
+
+    Args:
+        world: The world, with its robot.
+        robot: The robot in it.
+        configuration: What was drawn.
+        n_tips: Number of fingertips.
+
+    Attributes:
+        world: The world.
+        robot: The robot in it.
+        reading: What was read last.
+    """
+
+    reading: SapienReading
+
+    def __init__(self, world: World, robot: Robot, configuration: ActorConfiguration, n_tips: int) -> None:
+        self.world, self.robot = world, robot
+        self.n_objects, self.n_fixtures = len(configuration.objects), len(configuration.fixtures)
+        self._dt = self._last_dt = 1.0 / configuration.physics_frequency
+        self._substeps = configuration.physics_frequency // configuration.control_frequency
+        self._time = 0.0
+        self._falling = self._rolling = False
+        self._watch = 0
+        self._reader = ContactReader(world, n_tips)
+        self._touch = Touch([[0.0] * 3] * n_tips, [], [], set())
+        disturbance, names = configuration.disturbance, [actor.name for actor in configuration.objects]
+        self._disturbance = DisturbanceForce(disturbance)
+        self._pushed = names.index(disturbance.object) if disturbance is not None else -1
+        self._read()
+
+    @property
+    def deepest_pair(self) -> tuple[str, str, float, float] | None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        return self._reader.deepest_pair
+
+    def advance(self, target: JointTarget) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        self._last_dt = self._dt
+        if self.robot.drive_to(target.position.tolist(), target.velocity.tolist()):
+            self._watch = WATCHED
+        step = self.world.system.step
+        if not self._disturbance.over:
+            for _ in range(self._substeps):
+                self._disturbed_step()
+        elif self._falling:
+            self._fine_steps(self._substeps)
+        elif self._watch > 0 or self._rolling:
+            watched, self._watch = self._watch > 0, max(self._watch - 1, 0)
+            for k in range(self._substeps):
+                if watched and k > 0:
+                    self._reader.read_depth(self._time)
+                if self._rolling:
+                    resist_rolling(self.world, self._last_dt, self._touch.hand_force)
+                step()
+        else:
+            for _ in range(self._substeps):
+                step()
+        self._time += self._dt * self._substeps
+        self._read()
+
+    def _fine_steps(self, n: int) -> None:
+        world = self.world
+        world.scene.set_timestep(self._dt / FINE)
+        self._last_dt = self._dt / FINE
+        for _ in range(n * FINE):
+            if self._disturbance.pushing:
+                self._push()
+            if self._rolling:
+                resist_rolling(world, self._last_dt, self._touch.hand_force)
+            world.system.step()
+            self._reader.read_depth(self._time)
+        world.scene.set_timestep(self._dt)
+
+    # ---- reading ----------------------------------------------------------------------------------------
+
+    def _read(self) -> None:
+        robot, bodies = self.robot, self.world.objects
+        q, v = robot.articulation.get_qpos(), robot.articulation.get_qvel()
+        objects = [floats(body.entity_pose) for body in bodies]
+        moving = [[*b.linear_velocity.tolist(), *b.angular_velocity.tolist()] for b in bodies]
+        if not math.isfinite(float(q @ q) + float(v @ v) + sum(map(sum, objects)) + sum(map(sum, moving))):
+            raise MachineError(
+                f"SAPIEN's state is no longer finite after {self._time:.2f} s: see the last target"
+            )
+        self._feel()
+        self.reading = SapienReading(
+            self._time,
+            q,
+            v,
+            robot.articulation.get_link_incoming_joint_forces(),
+            [floats(link.entity_pose) for link in robot.frames],
+            objects,
+            moving,
+            self._touch,
+            self._reader.penetration,
+        )
+
+    def _feel(self) -> None:
+        """Read what touches what; look closely for some time where that has changed."""
+        before, now = self._touch, self._reader.read(self._time, self._last_dt)
+        touched = [force > 0.0 for force in now.hand_force]
+        if touched != [force > 0.0 for force in before.hand_force] or now.support != before.support:
+            self._watch = WATCHED
+        self._touch = now
+
+    def note_motion(self, falling: bool, spin: float) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`; air alone slows what rolls no more."""
+        self._falling = falling
+        rolled, self._rolling = self._rolling, spin > ROLLING
+        if rolled and not self._rolling:
+            for body in self.world.objects:
+                body.set_angular_damping(DAMPING)
+
+    # ---- disturbance ------------------------------------------------------------------------------------
+
+    def _disturbed_step(self) -> None:
+        """One physics step, with a push that begins some time after the object was first held clear."""
+        k = self._pushed
+        held = self._touch.hand_force[k] > 1.0 and not any(i == k for i, _ in self._touch.support)
+        self._disturbance.watch(self._time, held)
+        if self._disturbance.pushing or self._falling:
+            self._fine_steps(1)
+        else:
+            self.world.system.step()
+
+    def _push(self) -> None:
+        """Push the object until it has left the hand, no faster than the disturbance says."""
+        self._feel()
+        body = self.world.objects[self._pushed]
+        touched = self._touch.hand_force[self._pushed] > 0.0
+        force = self._disturbance.force(self._time, touched, body.linear_velocity)
+        if force.any():
+            body.wake_up()
+            body.add_force_at_point(force.tolist(), body.entity_pose.p)

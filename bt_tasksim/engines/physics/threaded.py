@@ -1,0 +1,336 @@
+"""Simulated worlds, stepped by threads, and the laws of their states over all of them at once.
+
+A simulator lets go of the interpreter's lock while it steps, so threads step several worlds at a time. What
+each world reports of itself is plain and raw; positions of tool and tips, efforts and wrenches are computed
+from that for all worlds together, with operations whose result for one row does not depend on the others.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from bt_tasksim.core.errors import BtTasksimError, MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Hidden, JointTarget, WorldState
+from bt_tasksim.engines.base import PhysicsEngine
+from bt_tasksim.engines.batch import PhysicsBatch
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
+
+FALLING = (0.1, 1.5)
+"""Speeds in m/s and rad/s of an object that the hand does not touch, from which an engine takes finer steps:
+a tilted object that lands spins so fast that it would be millimetres deep within an ordinary one."""
+ONE = np.zeros(1, int)
+"""The row of a batch of one."""
+
+
+class SimulatedWorld(Protocol):
+    """One world of a batch, which one thread at a time works on.
+
+    Attributes:
+        n_objects: Number of its objects.
+        n_fixtures: Number of its fixtures.
+    """
+
+    n_objects: int
+    n_fixtures: int
+
+    @property
+    def deepest_pair(self) -> tuple[str, str, float, float] | None:
+        """Names of the bodies that overlapped most, metres, and seconds; None before any."""
+
+    def advance(self, target: JointTarget) -> None:
+        """Go on by one control period, and take the readings of its end.
+
+        Args:
+            target: Of this world alone, ``(n_joints,)``.
+
+        Raises:
+            MachineError: The state is no longer finite.
+        """
+
+    def note_motion(self, falling: bool, spin: float) -> None:
+        """How objects that the hand does not touch move, as it was read last.
+
+        Args:
+            falling: One is faster than `FALLING`.
+            spin: The fastest turns at, rad/s.
+        """
+
+
+W = TypeVar("W", bound=SimulatedWorld)
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How objects of several worlds stand in arrays.
+
+    Attributes:
+        counts: Objects of each world ``(k,)``.
+        objects: The most objects, of all worlds of the batch.
+        fixtures: The most fixtures.
+    """
+
+    counts: Array
+    objects: int
+    fixtures: int
+
+    def padded(self, values: Array | Sequence[Any], width: int = 0) -> Array:
+        """What objects have, ``(k, objects)`` or with a ``width`` ``(k, objects, width)``, NaN at the end.
+
+        Args:
+            values: Of all objects, world after world.
+            width: Numbers that each has; 0 for one alone.
+        """
+        tail = (width,) if width else ()
+        out = np.full((len(self.counts), self.objects, *tail), np.nan)
+        out[np.arange(self.objects) < self.counts[:, None]] = np.asarray(values, float).reshape(-1, *tail)
+        return out
+
+    def support(self, pairs: Sequence[Iterable[tuple[int, int]]]) -> Array:
+        """`Hidden.support` from the pairs of each world, whose fixtures are numbered behind its objects."""
+        out = np.zeros((len(self.counts), self.objects, self.objects + self.fixtures), bool)
+        found = np.array([(k, i, j) for k, world in enumerate(pairs) for i, j in world], int).reshape(-1, 3)
+        k, i, j = found[:, 0], found[:, 1], found[:, 2]
+        out[k, i, np.where(j < self.counts[k], j, j + self.objects - self.counts[k])] = True
+        return out
+
+
+class ThreadedBatch(PhysicsBatch, Generic[W]):
+    """A batch of simulated worlds, each an object of its own.
+
+    Args:
+        robot: The robot.
+        worlds: How many there are; at least 1.
+        threads: How many threads step them; at least 1.
+
+    Attributes:
+        robot: The robot.
+        simulated: The worlds by row; None before the first reset.
+    """
+
+    def __init__(self, robot: RobotDescription, worlds: int, threads: int) -> None:
+        super().__init__(worlds)
+        self.robot = robot
+        self.simulated: list[W | None] = [None] * worlds
+        self._threads = threads
+        self._pool = ThreadPoolExecutor(threads - 1, "physics") if threads > 1 else None
+        self._stiffness = robot.drive_array("stiffness")
+        self._damping = robot.drive_array("damping")
+        self._limit = robot.drive_array("force_limit")
+        joints = (worlds, len(robot.joints))
+        self._position, self._velocity = np.zeros(joints), np.zeros(joints)
+        self._layout = (0, 0)
+        self._state: WorldState | None = None
+        self._hidden: Hidden | None = None
+
+    # ---- what an engine adds ----------------------------------------------------------------------------
+
+    @abstractmethod
+    def _build(self, row: int, configuration: ActorConfiguration, start: Array) -> W:
+        """A fresh world, with its joints at ``start (n_joints,)`` and the readings of its beginning.
+
+        Raises:
+            InputError: It cannot be built.
+        """
+
+    @abstractmethod
+    def _read(self, rows: Array, worlds: list[W], layout: Layout) -> tuple[WorldState, Hidden]:
+        """States ``(k, ...)`` of these worlds, from the readings that they took last."""
+
+    def _effort(self, rows: Array, q: Array, v: Array) -> Array:
+        """Efforts ``(k, n_joints)`` of the drives by their own law, which simulators do not report."""
+        effort = self._stiffness * (self._position[rows] - q) + self._damping * (self._velocity[rows] - v)
+        return np.minimum(np.maximum(effort, -self._limit), self._limit)
+
+    # ---- the batch --------------------------------------------------------------------------------------
+
+    def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> None:
+        """See `PhysicsBatch.reset`."""
+        robot = self.robot
+        built: list[int] = []
+        for row, configuration in zip(np.asarray(rows).tolist(), configurations, strict=True):
+            start = np.array(configuration.joint_position or np.concatenate([robot.rest, robot.hand_open]))
+            self.errors[row] = None
+            try:
+                self.simulated[row] = self._build(row, configuration, start)
+            except BtTasksimError as error:
+                self.simulated[row], self.errors[row] = None, error
+                continue
+            self._position[row], self._velocity[row] = start, 0.0
+            built.append(row)
+        present = [world for world in self.simulated if world is not None]
+        most = (
+            max((world.n_objects for world in present), default=0),
+            max((world.n_fixtures for world in present), default=0),
+        )
+        if most != self._layout or self._state is None:  # arrays of another width: all worlds anew
+            self._layout, self._state, self._hidden = most, None, None
+            built = [row for row, world in enumerate(self.simulated) if world is not None]
+        self._gather(np.array(built, int))
+
+    def step(self, target: JointTarget, rows: Array) -> None:
+        """See `PhysicsBatch.step`."""
+        rows = np.asarray(rows)
+        position, velocity = np.asarray(target.position, float), np.asarray(target.velocity, float)
+        finite = np.isfinite(position).all(axis=1) & np.isfinite(velocity).all(axis=1)
+        for k in np.flatnonzero(~finite).tolist():
+            self.errors[rows[k]] = self.errors[rows[k]] or MachineError(
+                f"the joint target is not finite: {position[k]}, {velocity[k]}"
+            )
+        going = np.array([self.errors[row] is None for row in rows.tolist()], bool)
+        rows, position, velocity = rows[going], position[going], velocity[going]
+        self._position[rows], self._velocity[rows] = position, velocity
+
+        def advance(job: tuple[int, Array, Array]) -> None:
+            row, to, speed = job
+            world = self.simulated[row]
+            assert world is not None
+            try:
+                world.advance(JointTarget(to, speed))
+            except BtTasksimError as error:
+                self.errors[row] = error
+
+        self._share(advance, zip(rows.tolist(), position, velocity, strict=True))
+        self._gather(np.array([row for row in rows.tolist() if self.errors[row] is None], int))
+
+    def state(self, rows: Array) -> WorldState:
+        """See `PhysicsBatch.state`."""
+        assert self._state is not None, "no world was ever reset"
+        return taken(self._state, rows)
+
+    def hidden(self, rows: Array) -> Hidden:
+        """See `PhysicsBatch.hidden`."""
+        assert self._hidden is not None, "no world was ever reset"
+        return taken(self._hidden, rows)
+
+    def close(self) -> None:
+        """See `PhysicsBatch.close`."""
+        if self._pool is not None:
+            self._pool.shutdown()
+        self.simulated = [None] * self.worlds
+
+    def _share(self, work: Callable[[T], None], jobs: Iterable[T]) -> None:
+        """Do all jobs, each by the thread that is free for it."""
+        left = iter(jobs)  # one for all: taking the next one is a single step of the interpreter
+
+        def some() -> None:
+            for job in left:
+                work(job)
+
+        others = [self._pool.submit(some) for _ in range(self._threads - 1)] if self._pool else []
+        try:
+            some()
+        finally:
+            for other in others:
+                other.result()
+
+    def _gather(self, rows: Array) -> None:
+        """Read the worlds of these rows into the arrays of all."""
+        if not len(rows):
+            return
+        worlds: list[W] = [world for row in rows.tolist() if (world := self.simulated[row]) is not None]
+        layout = Layout(np.array([world.n_objects for world in worlds]), *self._layout)
+        state, hidden = self._read(rows, worlds, layout)
+        if self._state is None or self._hidden is None:
+            self._state, self._hidden = _room(state, self.worlds), _room(hidden, self.worlds)
+        _put(self._state, rows, state)
+        _put(self._hidden, rows, hidden)
+        assert state.velocities is not None
+        free = hidden.hand_force == 0.0
+        u, v, w, x, y, z = (np.where(free, state.velocities[..., i], 0.0) for i in range(6))
+        speed, spin = np.sqrt(u * u + v * v + w * w), np.sqrt(x * x + y * y + z * z)
+        falling = ((speed > FALLING[0]) | (spin > FALLING[1])).any(axis=1)
+        fastest = spin.max(axis=1, initial=0.0)
+        for k, world in enumerate(worlds):
+            world.note_motion(bool(falling[k]), float(fastest[k]))
+
+
+class SimulatedPhysics(PhysicsEngine, Generic[W]):
+    """A physics engine of one world: the case of one of a batch.
+
+    Args:
+        batch: The batch, of one world.
+    """
+
+    def __init__(self, batch: ThreadedBatch[W]) -> None:
+        self.robot = batch.robot
+        self._batch = batch
+
+    @property
+    def simulated(self) -> W:
+        """The world itself, after a reset."""
+        (world,) = self._batch.simulated
+        assert world is not None, "it was not reset"
+        return world
+
+    @property
+    def deepest_pair(self) -> tuple[str, str, float, float] | None:
+        """Names of the bodies that overlapped most, metres, and seconds; None before any."""
+        return self.simulated.deepest_pair
+
+    def reset(self, configuration: ActorConfiguration) -> WorldState:
+        """See `PhysicsEngine.reset`."""
+        self._batch.reset(ONE, [configuration])
+        return self._now()
+
+    def step(self, target: JointTarget) -> WorldState:
+        """See `PhysicsEngine.step`.
+
+        Raises:
+            MachineError: The target or the state is not finite; nothing has moved for a bad target.
+        """
+        self._batch.errors[0] = None  # who was told may try again
+        self._batch.step(JointTarget(target.position[None], target.velocity[None]), ONE)
+        return self._now()
+
+    def hidden(self) -> Hidden:
+        """See `PhysicsEngine.hidden`."""
+        return _unbatched(self._batch.hidden(ONE))
+
+    def close(self) -> None:
+        """See `Engine.close`."""
+        self._batch.close()
+
+    def _now(self) -> WorldState:
+        (error,) = self._batch.errors
+        if error is not None:
+            raise error
+        return _unbatched(self._batch.state(ONE))
+
+
+B = TypeVar("B", WorldState, Hidden)
+
+
+def taken(bundle: B, rows: Array) -> B:
+    """Some rows of a bundle of arrays."""
+    return type(bundle)(**{name: value[rows] for name, value in _arrays(bundle)})
+
+
+def _unbatched(bundle: B) -> B:
+    return type(bundle)(**{name: value[0] for name, value in _arrays(bundle)})
+
+
+def _room(bundle: B, n: int) -> B:
+    """Arrays for ``n`` rows like those of a bundle."""
+    return type(bundle)(**{name: _rows_like(value, n) for name, value in _arrays(bundle)})
+
+
+def _rows_like(value: Array, n: int) -> Array:
+    return np.zeros((n, *value.shape[1:]), value.dtype)
+
+
+def _put(bundle: B, rows: Array, values: B) -> None:
+    for name, value in _arrays(values):
+        getattr(bundle, name)[rows] = value
+
+
+def _arrays(bundle: WorldState | Hidden) -> list[tuple[str, Array]]:
+    return [(field.name, getattr(bundle, field.name)) for field in fields(bundle)]

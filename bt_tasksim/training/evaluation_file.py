@@ -1,0 +1,259 @@
+"""The file of an evaluation: written while it is made, whole at any time, and gone on from after a kill.
+
+Each episode is appended at once to a journal beside the file, ``FILE.episodes``: a line of JSON for what is
+evaluated, then one for each episode, each with a checksum. The file itself is written anew every few seconds
+and at the end, when the journal goes. So a killed process loses the episodes that had not ended, and a
+machine without power those of the last seconds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import time
+import zlib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bt_tasksim.core.bounded_text import read_bytes
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.files import check_writable, write_bytes, write_text
+from bt_tasksim.core.identity import differences
+from bt_tasksim.core.json_text import parse_json_object
+from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation, outcomes_hash
+
+LARGEST = 1 << 32
+"""Bytes of a file that is gone on from; an episode has about a thousand."""
+
+
+def journal_of(path: str | Path) -> Path:
+    """Where the episodes of an evaluation are appended, by its file."""
+    path = Path(path)
+    return path.with_name(f"{path.name}.episodes")
+
+
+class EvaluationFile:
+    """Keeps an evaluation in a file while it is made: give it to `evaluate` as ``keep``.
+
+    Args:
+        path: Where to; what is there stays until the first episode has ended.
+
+    Raises:
+        InputError: The folder does not exist, or the path is a folder or a device.
+        MachineError: It is not writable.
+    """
+
+    EVERY = 2.0
+    """Seconds between two writings of the whole file, and after which a line is surely on the disk."""
+    SHARE = 0.05
+    """Of the time, that writings of the whole file take at most: a long one is written less often."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path, self.journal = Path(path), journal_of(path)
+        for place in (self.path, self.journal):
+            check_writable(place)
+        self._lines: int | None = None
+        self._next_whole = self._next_flush = 0.0
+
+    def add(self, outcome: EpisodeOutcome, seconds: float, evaluation: Callable[[], Evaluation]) -> None:
+        """Keep an episode.
+
+        Args:
+            outcome: How it ended.
+            seconds: That all of it has taken so far.
+            evaluation: Gives what there is, this episode included.
+        """
+        # A disk that is full now may not be so at the end, when it counts.
+        with contextlib.suppress(MachineError, OSError):
+            self._append(outcome, seconds, evaluation)
+        began = time.monotonic()
+        if began >= self._next_whole:
+            with contextlib.suppress(MachineError):
+                self._write(evaluation())
+            took = time.monotonic() - began
+            self._next_whole = began + max(self.EVERY, took / self.SHARE)
+
+    def end(self, evaluation: Evaluation) -> None:
+        """Write all that there is; there will be no more.
+
+        Raises:
+            MachineError: It cannot be written; the journal stays.
+        """
+        self._close()
+        self._write(evaluation)
+        with contextlib.suppress(OSError):
+            self.journal.unlink()
+
+    def _append(self, outcome: EpisodeOutcome, seconds: float, evaluation: Callable[[], Evaluation]) -> None:
+        now = time.monotonic()
+        if self._lines is None:
+            if now < self._next_flush:
+                return  # it could not be written a moment ago
+            self._next_flush = now + self.EVERY
+            whole = evaluation()
+            lines = [_line({"subject": whole.subject, "versions": whole.versions})]
+            lines += [_line({"episode": o.to_data()}) for o in whole.outcomes[:-1]]
+            lines += [_line({"episode": whole.outcomes[-1].to_data(), "seconds": seconds})]
+            write_bytes(self.journal, b"".join(lines))
+            self._lines = os.open(self.journal, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
+            return
+        try:
+            line = _line({"episode": outcome.to_data(), "seconds": seconds})
+            if os.write(self._lines, line) < len(line):
+                raise OSError("the disk is full")
+            if now >= self._next_flush:
+                self._next_flush = now + self.EVERY
+                os.fsync(self._lines)
+        except OSError:
+            self._close()  # with half a line, perhaps: begin anew
+            raise
+
+    def _write(self, evaluation: Evaluation) -> None:
+        write_text(self.path, json.dumps(evaluation.to_json(), indent=2, allow_nan=False) + "\n")
+
+    def _close(self) -> None:
+        if self._lines is not None:
+            os.close(self._lines)
+            self._lines = None
+
+
+@dataclass(frozen=True)
+class KeptEvaluation:
+    """What the file of an evaluation holds that has not ended.
+
+    Attributes:
+        path: The file.
+        subject: What was evaluated, as hashes by name.
+        outcomes: The episodes that had ended.
+        seconds: Time that they took.
+    """
+
+    path: Path
+    subject: Mapping[str, str]
+    outcomes: tuple[EpisodeOutcome, ...]
+    seconds: float
+
+    def check(self, subject: Mapping[str, str], seeds: Collection[int]) -> None:
+        """Check that an evaluation may go on from it.
+
+        Raises:
+            InputError: It is one of something else, or of seeds that are not asked for; says which.
+        """
+        others = [name for name in subject if self.subject.get(name) != subject[name]]
+        if others:
+            raise InputError(
+                f"'{self.path}' holds an evaluation with another {' and another '.join(others)}: go on with "
+                "the same, or evaluate anew without --resume"
+            )
+        asked = set(seeds)
+        if beyond := [o.seed for o in self.outcomes if o.seed not in asked]:
+            raise InputError(
+                f"'{self.path}' holds {len(beyond)} episodes that are not asked for, such as seed "
+                f"{beyond[0]}: go on with the same --seed and at least as many --episodes, or evaluate anew "
+                "without --resume"
+            )
+
+
+def read_kept(path: str | Path, versions: Mapping[str, str]) -> KeptEvaluation:
+    """What there is of an evaluation, to go on from.
+
+    Args:
+        path: Its file.
+        versions: Of this program, see `bt_tasksim.core.identity.identity`.
+
+    Raises:
+        InputError: There is none, it is damaged, or it is of another version.
+    """
+    path, journal = Path(path), journal_of(path)
+    if journal.exists():
+        return _from_journal(path, journal, versions)
+    if path.exists():
+        return _from_file(path, versions)
+    raise InputError(f"there is no evaluation in '{path}' to go on from: evaluate without --resume")
+
+
+def _from_file(path: Path, versions: Mapping[str, str]) -> KeptEvaluation:
+    content = parse_json_object(read_bytes(path, f"'{path}'", LARGEST), f"'{path}'")
+    subject = _about(path, content, versions)
+    episodes, seconds = content.get("outcomes"), content.get("seconds")
+    if not isinstance(episodes, list) or outcomes_hash(episodes) != content.get("sha256"):
+        raise _damaged(path, "its episodes are not what was written")
+    return _kept(path, path, subject, list(enumerate(episodes, start=1)), seconds, "episode")
+
+
+def _from_journal(path: Path, journal: Path, versions: Mapping[str, str]) -> KeptEvaluation:
+    lines = read_bytes(journal, f"'{journal}'", LARGEST).split(b"\n")[:-1]  # what follows is half a line
+    entries = [_entry(journal, number, line) for number, line in enumerate(lines, start=1)]
+    if not entries:
+        raise _damaged(journal, "it is empty")
+    subject = _about(journal, entries[0], versions)
+    seconds = next((entry["seconds"] for entry in entries[::-1] if "seconds" in entry), 0.0)
+    episodes = [(number, entry.get("episode")) for number, entry in enumerate(entries[1:], start=2)]
+    return _kept(path, journal, subject, episodes, seconds, "line")
+
+
+def _kept(
+    path: Path, read: Path, subject: Mapping[str, str], episodes: list[Any], seconds: Any, unit: str
+) -> KeptEvaluation:
+    found: dict[int, EpisodeOutcome] = {}
+    for number, data in episodes:
+        try:
+            outcome = EpisodeOutcome.from_data(data)
+            same = outcome.to_data() == data and outcome.seed not in found
+        except (
+            InputError,
+            ArithmeticError,
+            AssertionError,
+            AttributeError,
+            LookupError,
+            TypeError,
+            ValueError,
+        ):
+            same = False
+        if not same:
+            raise _damaged(read, f"{unit} {number} holds no episode")
+        found[outcome.seed] = outcome
+    if not isinstance(seconds, int | float) or not 0.0 <= seconds < float("inf"):
+        raise _damaged(read, "it does not say how long it took")
+    return KeptEvaluation(path, subject, tuple(found.values()), float(seconds))
+
+
+def _about(path: Path, content: Mapping[str, Any], versions: Mapping[str, str]) -> Mapping[str, str]:
+    subject, then = content.get("subject"), content.get("versions")
+    if not isinstance(subject, dict) or not isinstance(then, dict):
+        raise InputError(
+            f"'{path}' does not say what was evaluated, as files of earlier versions do not: evaluate anew, "
+            "without --resume"
+        )
+    if differ := differences(then, versions):
+        raise InputError(
+            f"'{path}' was written by another version ({differ}): go on with the same, or evaluate anew "
+            "without --resume"
+        )
+    return subject
+
+
+def _line(entry: Mapping[str, Any]) -> bytes:
+    return json.dumps({"check": _check(entry), **entry}, allow_nan=False).encode() + b"\n"
+
+
+def _entry(path: Path, number: int, line: bytes) -> dict[str, Any]:
+    try:
+        entry: dict[str, Any] = parse_json_object(line, "it")
+        check = entry.pop("check", None)
+        if check == _check(entry):
+            return entry
+    except InputError:
+        pass
+    raise _damaged(path, f"line {number} is not what was written")
+
+
+def _check(entry: Mapping[str, Any]) -> str:
+    return f"{zlib.crc32(json.dumps(entry).encode()):08x}"
+
+
+def _damaged(path: Path, reason: str) -> InputError:
+    return InputError(f"'{path}' is damaged ({reason}): remove it and evaluate anew")
