@@ -87,6 +87,7 @@ class Cluster(Fleet[StateT]):
             _check_reachable(address)
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
+        self._patience = 1.0  # nothing has begun that must end in order
         self._temporary = tempfile.mkdtemp(prefix="bt-ray-") if address == LOCAL else ""
         self._log: BinaryIO = tempfile.TemporaryFile()  # noqa: SIM115  # until `close`
         try:
@@ -97,6 +98,7 @@ class Cluster(Fleet[StateT]):
             if not self._connection.poll(START):
                 raise MachineError(f"{self._where} did not answer within {START:.0f} s")
             self._receive("ready")
+            self._patience = ENDING + 2.0
         except BaseException:
             self.close(0.0)
             raise
@@ -137,7 +139,7 @@ class Cluster(Fleet[StateT]):
                 self._pipe = None
             if self._process is not None:
                 with contextlib.suppress(subprocess.TimeoutExpired):
-                    self._process.wait(ENDING + 2.0)
+                    self._process.wait(self._patience)
                 _kill_session(self._process.pid)
                 self._process.wait()
                 self._process = None

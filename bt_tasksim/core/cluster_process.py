@@ -221,7 +221,8 @@ class ClusterDriver:
             self._pipe.send(("culprit", error.number))
             raise _ClosedError from error
         self._looked = time.monotonic() - GROW + 1.0  # there may be room soon
-        self._pipe.send(("lost", (actor.node, len(again))))
+        if again:
+            self._pipe.send(("lost", (actor.node, len(again))))
 
 
 def connect(settings: Settings) -> Any:
