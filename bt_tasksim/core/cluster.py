@@ -36,6 +36,8 @@ REACH = 5.0
 """Seconds within which a cluster's address must answer."""
 START = 60.0
 """Seconds within which Ray must have started, or joined the cluster."""
+LONGEST_PLACE = 24
+"""Characters of the path of a folder for temporary files, which is part of the names of Ray's sockets."""
 
 _ADDRESS = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9_.-]+):([0-9]{1,5})")
 _BEGIN = "from bt_tasksim.core.cluster_process import main; main()"
@@ -88,7 +90,7 @@ class Cluster(Fleet[StateT]):
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
         self._patience = 1.0  # nothing has begun that must end in order
-        self._temporary = tempfile.mkdtemp(prefix="bt-ray-") if address == LOCAL else ""
+        self._temporary = tempfile.mkdtemp(prefix="bt-ray-", dir=_short_place()) if address == LOCAL else ""
         self._log: BinaryIO = tempfile.TemporaryFile()  # noqa: SIM115  # until `close`
         try:
             self._start()
@@ -187,6 +189,12 @@ class Cluster(Fleet[StateT]):
         lines = [line.strip() for line in self._log.read().decode(errors="replace").splitlines()]
         said = next((line for line in reversed(lines) if line), "it said nothing")
         return MachineError(f"{self._where} was lost: {said[:300]}")
+
+
+def _short_place() -> str:
+    """Where Ray's folder is: the names of its sockets, some 80 characters longer, may have 107."""
+    usual = tempfile.gettempdir()
+    return usual if len(usual) <= LONGEST_PLACE else "/tmp"
 
 
 def _check_reachable(address: str) -> None:
