@@ -272,7 +272,7 @@ def _runner(job: Job) -> Runner:
     from bt_tasksim.trees.load import load_source
 
     load_all(job.plugins)
-    source = load_source(job.tree, job.robot, job.scene, job.policies)
+    source = load_source(job.tree, job.robot, job.scene, job.policies, job.options.own_world())
     return Runner(source.build(), source.scene, job.options)
 
 

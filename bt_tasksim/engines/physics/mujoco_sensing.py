@@ -1,13 +1,16 @@
-"""What is read from MuJoCo's state: contacts, and the wrench at the wrist."""
+"""What is read from MuJoCo's state: contacts, forces, motions, and the wrench at the wrist."""
 
 from __future__ import annotations
 
+import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.mujoco_contacts import Body
 
@@ -20,41 +23,40 @@ class Near:
     """What is near what at one instant.
 
     Attributes:
-        hand_distance: Metres ``(n_objects,)`` between the robot and each object; infinite out of reach.
-        support: ``(n_objects, n_bodies)`` boolean, see `bt_tasksim.core.world.Hidden`.
+        hand_distance: Metres between the robot and each object; infinite out of reach.
+        support: Objects and the objects and fixtures that they touch, by index.
     """
 
-    hand_distance: Array
-    support: Array
+    hand_distance: list[float]
+    support: set[tuple[int, int]]
 
 
 @dataclass(frozen=True, eq=False)
-class Felt:
-    """Forces at one instant, or their mean.
+class Forces:
+    """Contact forces at one instant, or their mean.
 
     Attributes:
-        tip_force: Contact force ``(n_tips, 3)`` on each fingertip, friction included, base frame, N.
-        hand_force: Sum ``(n_objects,)`` over the robot's links of the magnitude of each one's force on the
-            object, N.
-        wrench: External wrench ``(6,)`` at the tool origin in the tool frame, N and Nm.
+        tips: Force, three numbers, on each fingertip, friction included, base frame, N.
+        hand: Of each object the sum over the robot's links of the magnitude of each one's force on it, N.
     """
 
-    tip_force: Array
-    hand_force: Array
-    wrench: Array
+    tips: list[list[float]]
+    hand: list[float]
 
     @classmethod
-    def mean(cls, samples: Sequence[Felt]) -> Felt:
+    def mean(cls, samples: Sequence[Forces]) -> Forces:
         """The mean of some instants."""
+        n = len(samples)
+        tips = zip(*(sample.tips for sample in samples), strict=True)
+        hands = zip(*(sample.hand for sample in samples), strict=True)
         return cls(
-            np.mean([s.tip_force for s in samples], axis=0),
-            np.mean([s.hand_force for s in samples], axis=0),
-            np.mean([s.wrench for s in samples], axis=0),
+            [[sum(axis) / n for axis in zip(*tip, strict=True)] for tip in tips],
+            [sum(hand) / n for hand in hands],
         )
 
 
 class ContactReader:
-    """Reads the contacts of a model.
+    """Reads the contacts of a model. They are few, and MuJoCo lists them in an order of the state alone.
 
     Args:
         bodies: What each geom belongs to.
@@ -67,15 +69,11 @@ class ContactReader:
     def __init__(
         self, bodies: tuple[Body, ...], geom_body: Array, n_tips: int, n_objects: int, n_fixtures: int
     ) -> None:
-        self._names = [body.name for body in bodies]
-        self._carrier = np.asarray(geom_body)
-        self._n_carriers = int(np.max(self._carrier)) + 1
+        self._bodies = bodies
+        self._carrier: list[int] = np.asarray(geom_body).tolist()
         self._judged = np.array([body.role != "base" for body in bodies])
-        self._robot = np.array([body.role == "link" for body in bodies])
-        self._object = np.array([body.role == "object" for body in bodies])
-        self._index = np.array([body.index for body in bodies])
-        self._tip = np.array([body.tip for body in bodies])
-        self._n_tips, self._n_objects, self._n_bodies = n_tips, n_objects, n_objects + n_fixtures
+        self._robot = [body.role == "link" for body in bodies]
+        self._n_tips, self._n_objects = n_tips, n_objects
 
     def deeper(self, data: mj.MjData, than: float) -> tuple[float, str, str] | None:
         """The deepest overlap in metres and the names of the two bodies, if it is deeper than that.
@@ -91,62 +89,87 @@ class ContactReader:
         if -counted[k] <= than:
             return None
         a, b = geom[k]
-        return -float(counted[k]), self._names[a], self._names[b]
+        return -float(counted[k]), self._bodies[a].name, self._bodies[b].name
 
     def near(self, data: mj.MjData) -> Near:
         """What is near what, from the contacts that were last looked for."""
-        distances = np.full(self._n_objects, np.inf)
-        support = np.zeros((self._n_objects, self._n_bodies), bool)
-        geom, distance = data.contact.geom, data.contact.dist
-        if len(geom):
-            kept = self._judged[geom].all(axis=1)
-            geom, distance = geom[kept], distance[kept]
-            for me, other in ((geom[:, 0], geom[:, 1]), (geom[:, 1], geom[:, 0])):
-                held = self._object[me] & self._robot[other]
-                np.minimum.at(distances, self._index[me[held]], np.maximum(distance[held], 0.0))
-                on = self._object[me] & ~self._robot[other]
-                support[self._index[me[on]], self._index[other[on]]] = True
+        distances = [math.inf] * self._n_objects
+        support: set[tuple[int, int]] = set()
+        for (a, b), distance in zip(data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True):
+            one, two = self._bodies[a], self._bodies[b]
+            if one.role == "base" or two.role == "base":
+                continue
+            for me, other in ((one, two), (two, one)):
+                if me.role != "object":
+                    continue
+                if other.role == "link":
+                    distances[me.index] = min(distances[me.index], max(distance, 0.0))
+                else:
+                    support.add((me.index, other.index))
         return Near(distances, support)
 
-    def forces(self, data: mj.MjData) -> tuple[Array, Array]:
-        """``tip_force`` and ``hand_force`` of `Felt`, from the contacts that forces were last computed for.
+    def forces(self, data: mj.MjData) -> Forces:
+        """The forces of the contacts that forces were last computed for.
 
         With elliptic cones the solver's forces are those along the axes of the contact's frame; its first
         axis points from the first body to the second.
         """
-        tip_force = np.zeros((self._n_tips, 3))
-        by_link = np.zeros((self._n_carriers, self._n_objects, 3))
-        if not len(data.contact.dist):
-            return tip_force, np.zeros(self._n_objects)
-        address, geom = data.contact.efc_address, data.contact.geom
-        kept = (address >= 0) & self._robot[geom].any(axis=1)
-        address, geom = address[kept], geom[kept]
-        if len(geom):
-            frame = data.contact.frame[kept].reshape(-1, 3, 3)
-            force = np.einsum("nij,ni->nj", frame, data.efc_force[address[:, None] + np.arange(3)])
-            for sign, me, other in ((-1.0, geom[:, 0], geom[:, 1]), (1.0, geom[:, 1], geom[:, 0])):
-                tips = self._tip[me] >= 0
-                np.add.at(tip_force, self._tip[me[tips]], sign * force[tips])
-                held = self._object[me] & self._robot[other]
-                np.add.at(by_link, (self._carrier[other[held]], self._index[me[held]]), sign * force[held])
-        return tip_force, np.linalg.norm(by_link, axis=-1).sum(axis=0)
+        tips = [[0.0] * 3 for _ in range(self._n_tips)]
+        by_link: defaultdict[tuple[int, int], list[float]] = defaultdict(lambda: [0.0] * 3)
+        contact, robot = data.contact, self._robot
+        pairs = zip(contact.efc_address.tolist(), contact.geom.tolist(), strict=True)
+        for k, (address, (a, b)) in enumerate(pairs):
+            if address < 0 or not (robot[a] or robot[b]):
+                continue
+            n, s, t = data.efc_force[address : address + 3].tolist()
+            (nx, ny, nz), (sx, sy, sz), (tx, ty, tz) = contact.frame[k].reshape(3, 3).tolist()
+            x, y, z = nx * n + sx * s + tx * t, ny * n + sy * s + ty * t, nz * n + sz * s + tz * t
+            for sign, me, other in ((-1.0, a, b), (1.0, b, a)):
+                body = self._bodies[me]
+                if body.tip >= 0:
+                    _add(tips[body.tip], sign * x, sign * y, sign * z)
+                if body.role == "object" and robot[other]:
+                    _add(by_link[self._carrier[other], body.index], sign * x, sign * y, sign * z)
+        hand = [0.0] * self._n_objects
+        for link, k in sorted(by_link):
+            x, y, z = by_link[link, k]
+            hand[k] += math.sqrt(x * x + y * y + z * z)
+        return Forces(tips, hand)
 
 
-def wrist_wrench(
-    data: mj.MjData, root: int, wrist: int, tool: Sequence[float]
-) -> tuple[list[float], list[float]]:
-    """External force and torque ``(3,)`` each at the tool origin, base frame.
+def _add(total: list[float], x: float, y: float, z: float) -> None:
+    total[0] += x
+    total[1] += y
+    total[2] += z
+
+
+def wrist_wrenches(felt: Array, tool_pose: Array) -> Array:
+    """External wrenches ``(n, 6)`` at the tool origin in the tool frame.
 
     What the hand's own acceleration takes is in them, as a sensor at the wrist has it. MuJoCo gives torque
     and force that the wrist's parent exerts on it, about the robot's centre of mass. The world's on the
     hand is its opposite: nothing here has weight but objects.
 
     Args:
-        data: ``mujoco.MjData`` after ``mj_rnePostConstraint``.
-        root: Number of the robot's root body.
-        wrist: Number of the wrist's body.
-        tool: Position ``(3,)`` of the tool origin.
+        felt: ``(n, 16)``, after ``mj_rnePostConstraint``: torque and force on the wrist's body, the centre
+            of mass of the robot, the pose of the body that carries the tool.
+        tool_pose: Pose ``(7,)`` of the tool in that body.
     """
-    u, v, w, x, y, z = data.cfrc_int[wrist].tolist()
-    rx, ry, rz = (t - c for t, c in zip(tool, data.subtree_com[root].tolist(), strict=True))
-    return [-x, -y, -z], [ry * z - rz * y - u, rz * x - rx * z - v, rx * y - ry * x - w]
+    torque, force, centre, body = felt[:, :3], felt[:, 3:6], felt[:, 6:9], felt[:, 9:]
+    tool = poses.multiply(body, tool_pose)
+    moment = poses.cross(tool[:, :3] - centre, force) - torque
+    back = poses.quat_conjugate(tool[:, 3:])[:, None]
+    return poses.rotate(back, np.stack([-force, moment], axis=1)).reshape(-1, 6)
+
+
+def object_velocities(moving: Array, rotation: Array, com: Array) -> Array:
+    """Velocities ``(n, 6)`` of centres of mass and angular, base frame.
+
+    Args:
+        moving: What MuJoCo has ``(n, 6)``: the origin's velocity in the world's frame and the angular one in
+            the body's.
+        rotation: Of the bodies ``(n, 4)``.
+        com: Centres of mass ``(n, 3)`` in the bodies' frames.
+    """
+    turning, lever = poses.rotate(rotation, moving[:, 3:]), poses.rotate(rotation, com)
+    return np.concatenate([moving[:, :3] + poses.cross(turning, lever), turning], axis=-1)

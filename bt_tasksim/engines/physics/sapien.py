@@ -19,6 +19,7 @@ from bt_tasksim.engines.base import EngineSetup
 from bt_tasksim.engines.physics.sapien_robot import RobotBuilder
 from bt_tasksim.engines.physics.sapien_stepping import SapienWorld
 from bt_tasksim.engines.physics.sapien_world import build_world
+from bt_tasksim.engines.physics.sapien_wrist import external_wrench
 from bt_tasksim.engines.physics.threaded import Layout, SimulatedPhysics, ThreadedBatch
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.robot.description import RobotDescription
@@ -54,9 +55,6 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             ) from error
         super().__init__(robot, worlds, threads)
         self._builder = RobotBuilder(robot)
-        self._stiffness = robot.drive_array("stiffness")
-        self._damping = robot.drive_array("damping")
-        self._limit = robot.drive_array("force_limit")
         self._tip_points = np.array([tip.point for tip in robot.tips])
         self._lever, self._to_tool = np.zeros((worlds, 3)), np.zeros((worlds, 1, 4))
 
@@ -68,11 +66,10 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
         return SapienWorld(world, robot, configuration, len(self.robot.tips))
 
     def _read(self, rows: Array, worlds: list[SapienWorld], layout: Layout) -> tuple[WorldState, Hidden]:
-        """See `ThreadedBatch`. SAPIEN reports no effort of drives, so theirs is the drives' own law."""
+        """See `ThreadedBatch`."""
         k, readings, robot = len(rows), [world.reading for world in worlds], worlds[0].robot
         q = np.concatenate([r.position for r in readings]).reshape(k, -1)[:, robot.index].astype(float)
         v = np.concatenate([r.velocity for r in readings]).reshape(k, -1)[:, robot.index].astype(float)
-        effort = self._stiffness * (self._position[rows] - q) + self._damping * (self._velocity[rows] - v)
         frames = np.array([r.frames for r in readings])
         tool = poses.multiply(frames[:, 0], robot.tool_pose)
         incoming = np.concatenate([r.incoming for r in readings]).reshape(k, -1, 6)[:, robot.wrist]
@@ -84,9 +81,9 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             time=time,
             joint_position=q,
             joint_velocity=v,
-            joint_effort=np.minimum(np.maximum(effort, -self._limit), self._limit),
+            joint_effort=self._effort(rows, q, v),
             tip_force=np.array([touch.tip_force for touch in touches]).reshape(k, -1, 3),
-            wrench=self._wrench(rows, incoming.astype(float)),
+            wrench=external_wrench(incoming.astype(float), self._lever[rows], self._to_tool[rows]),
             tool_pose=tool,
             tips=poses.transform(frames[:, 1:], self._tip_points),
             objects=objects,
@@ -103,16 +100,6 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             tool_pose=tool,
         )
         return state, hidden
-
-    def _wrench(self, rows: Array, incoming: Array) -> Array:
-        """External wrenches ``(k, 6)`` at the tool, from the wrist joint's incoming forces ``(k, 6)``.
-
-        SAPIEN reports the force that the wrist's parent exerts on it in the joint's frame, which may be
-        turned against the link's; at rest the world's force on the hand is its opposite. Moments are moved
-        to the tool origin: t' = t - r x f.
-        """
-        force, moment = incoming[:, :3], poses.cross(self._lever[rows], incoming[:, :3]) - incoming[:, 3:]
-        return poses.rotate(self._to_tool[rows], np.stack([-force, moment], axis=1)).reshape(-1, 6)
 
 
 @register("engine/physics", "sapien")

@@ -7,16 +7,15 @@ from typing import NamedTuple
 
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import JointTarget
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_robot import Robot
 from bt_tasksim.engines.physics.sapien_world import DAMPING, World, floats
 from bt_tasksim.scene.configuration import ActorConfiguration
 
-FALLING = (0.1, 1.5)
-"""Speeds in m/s and rad/s of an object that the hand does not touch, from which steps are `FINE` times
-shorter: a tilted object that lands spins so fast that it would be millimetres deep within one step."""
 FINE = 8
+"""How many times shorter steps are while something falls."""
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
 WATCHED = 4
@@ -24,7 +23,7 @@ WATCHED = 4
 every step; at other times at the period's end."""
 
 
-class Reading(NamedTuple):
+class SapienReading(NamedTuple):
     """What PhysX says of a world at one instant, as it says it: plain numbers cost least here.
 
     Attributes:
@@ -65,7 +64,7 @@ class SapienWorld:
         reading: What was read last.
     """
 
-    reading: Reading
+    reading: SapienReading
 
     def __init__(self, world: World, robot: Robot, configuration: ActorConfiguration, n_tips: int) -> None:
         self.world, self.robot = world, robot
@@ -87,10 +86,10 @@ class SapienWorld:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         return self._reader.deepest_pair
 
-    def advance(self, position: list[float], velocity: list[float]) -> None:
+    def advance(self, target: JointTarget) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         self._last_dt = self._dt
-        if self.robot.drive_to(position, velocity):
+        if self.robot.drive_to(target.position.tolist(), target.velocity.tolist()):
             self._watch = WATCHED
         step = self.world.system.step
         if not self._disturbance.over:
@@ -137,8 +136,7 @@ class SapienWorld:
                 f"SAPIEN's state is no longer finite after {self._time:.2f} s: see the last target"
             )
         self._feel()
-        self._note_motion(moving)
-        self.reading = Reading(
+        self.reading = SapienReading(
             self._time,
             q,
             v,
@@ -158,11 +156,10 @@ class SapienWorld:
             self._watch = WATCHED
         self._touch = now
 
-    def _note_motion(self, moving: list[list[float]]) -> None:
-        """See whether what the hand does not touch falls or rolls; the air alone slows what rolls no more."""
-        free = [v for force, v in zip(self._touch.hand_force, moving, strict=True) if force == 0.0]
-        self._falling = any(math.hypot(*v[:3]) > FALLING[0] or math.hypot(*v[3:]) > FALLING[1] for v in free)
-        rolled, self._rolling = self._rolling, any(math.hypot(*v[3:]) > ROLLING for v in free)
+    def note_motion(self, falling: bool, spin: float) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`; air alone slows what rolls no more."""
+        self._falling = falling
+        rolled, self._rolling = self._rolling, spin > ROLLING
         if rolled and not self._rolling:
             for body in self.world.objects:
                 body.set_angular_damping(DAMPING)

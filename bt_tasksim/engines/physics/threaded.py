@@ -23,6 +23,9 @@ from bt_tasksim.engines.batch import PhysicsBatch
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
+FALLING = (0.1, 1.5)
+"""Speeds in m/s and rad/s of an object that the hand does not touch, from which an engine takes finer steps:
+a tilted object that lands spins so fast that it would be millimetres deep within an ordinary one."""
 ONE = np.zeros(1, int)
 """The row of a batch of one."""
 
@@ -42,11 +45,22 @@ class SimulatedWorld(Protocol):
     def deepest_pair(self) -> tuple[str, str, float, float] | None:
         """Names of the bodies that overlapped most, metres, and seconds; None before any."""
 
-    def advance(self, position: list[float], velocity: list[float]) -> None:
-        """Go on by one control period, with this target of the drives, and take the readings of its end.
+    def advance(self, target: JointTarget) -> None:
+        """Go on by one control period, and take the readings of its end.
+
+        Args:
+            target: Of this world alone, ``(n_joints,)``.
 
         Raises:
             MachineError: The state is no longer finite.
+        """
+
+    def note_motion(self, falling: bool, spin: float) -> None:
+        """How objects that the hand does not touch move, as it was read last.
+
+        Args:
+            falling: One is faster than `FALLING`.
+            spin: The fastest turns at, rad/s.
         """
 
 
@@ -68,7 +82,7 @@ class Layout:
     objects: int
     fixtures: int
 
-    def padded(self, values: Sequence[Any], width: int = 0) -> Array:
+    def padded(self, values: Array | Sequence[Any], width: int = 0) -> Array:
         """What objects have, ``(k, objects)`` or with a ``width`` ``(k, objects, width)``, NaN at the end.
 
         Args:
@@ -108,6 +122,9 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         self.simulated: list[W | None] = [None] * worlds
         self._threads = threads
         self._pool = ThreadPoolExecutor(threads - 1, "physics") if threads > 1 else None
+        self._stiffness = robot.drive_array("stiffness")
+        self._damping = robot.drive_array("damping")
+        self._limit = robot.drive_array("force_limit")
         joints = (worlds, len(robot.joints))
         self._position, self._velocity = np.zeros(joints), np.zeros(joints)
         self._layout = (0, 0)
@@ -127,6 +144,11 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
     @abstractmethod
     def _read(self, rows: Array, worlds: list[W], layout: Layout) -> tuple[WorldState, Hidden]:
         """States ``(k, ...)`` of these worlds, from the readings that they took last."""
+
+    def _effort(self, rows: Array, q: Array, v: Array) -> Array:
+        """Efforts ``(k, n_joints)`` of the drives by their own law, which simulators do not report."""
+        effort = self._stiffness * (self._position[rows] - q) + self._damping * (self._velocity[rows] - v)
+        return np.minimum(np.maximum(effort, -self._limit), self._limit)
 
     # ---- the batch --------------------------------------------------------------------------------------
 
@@ -167,16 +189,16 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         rows, position, velocity = rows[going], position[going], velocity[going]
         self._position[rows], self._velocity[rows] = position, velocity
 
-        def advance(job: tuple[int, list[float], list[float]]) -> None:
+        def advance(job: tuple[int, Array, Array]) -> None:
             row, to, speed = job
             world = self.simulated[row]
             assert world is not None
             try:
-                world.advance(to, speed)
+                world.advance(JointTarget(to, speed))
             except BtTasksimError as error:
                 self.errors[row] = error
 
-        self._share(advance, zip(rows.tolist(), position.tolist(), velocity.tolist(), strict=True))
+        self._share(advance, zip(rows.tolist(), position, velocity, strict=True))
         self._gather(np.array([row for row in rows.tolist() if self.errors[row] is None], int))
 
     def state(self, rows: Array) -> WorldState:
@@ -221,6 +243,14 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             self._state, self._hidden = _room(state, self.worlds), _room(hidden, self.worlds)
         _put(self._state, rows, state)
         _put(self._hidden, rows, hidden)
+        assert state.velocities is not None
+        free = hidden.hand_force == 0.0
+        u, v, w, x, y, z = (np.where(free, state.velocities[..., i], 0.0) for i in range(6))
+        speed, spin = np.sqrt(u * u + v * v + w * w), np.sqrt(x * x + y * y + z * z)
+        falling = ((speed > FALLING[0]) | (spin > FALLING[1])).any(axis=1)
+        fastest = spin.max(axis=1, initial=0.0)
+        for k, world in enumerate(worlds):
+            world.note_motion(bool(falling[k]), float(fastest[k]))
 
 
 class SimulatedPhysics(PhysicsEngine, Generic[W]):

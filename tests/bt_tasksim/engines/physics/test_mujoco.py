@@ -108,9 +108,9 @@ def test_a_period_takes_its_time_whatever_the_frequencies(control, physics):
     target = JointTarget(state.joint_position + 0.01, np.zeros(9))
     for k in range(1, 9):
         state = engine.step(target)
-        assert engine._data.time == pytest.approx(k / control) and float(state.time) == pytest.approx(
-            k / control
-        )
+        assert engine.simulated.data.time == pytest.approx(k / control) and float(
+            state.time
+        ) == pytest.approx(k / control)
 
 
 # ---- friction ---------------------------------------------------------------------------------------------
@@ -157,7 +157,7 @@ def test_two_fingers_hold_as_much_as_friction_and_force_allow(mass, friction, ho
     assert (mass * G < 0.9 * force) == holds
     physics, k = runner.pipeline.physics, 0
     before = poses.multiply(poses.inverse(runner.pipeline.state.tool_pose), runner.pipeline.state.objects[0])
-    data, body = physics._data, physics._world.object_body[k]
+    data, body = physics.simulated.data, physics.simulated.world.object_body[k]
     data.xfrc_applied[body, 2] = -mass * G  # as heavy as that, all at once
     for _ in range(20):
         runner.pipeline.step(Command())
@@ -265,7 +265,7 @@ def test_a_world_that_blew_up_is_an_error_and_does_not_start_anew(tmp_path, monk
     monkeypatch.chdir(tmp_path)  # MuJoCo logs such a thing to the working directory
     still = Still(scene().sample(0), "mujoco")
     still.step(2)
-    still.physics._data.qvel[3] = np.inf
+    still.physics.simulated.data.qvel[3] = np.inf
     with pytest.raises(MachineError, match=r"no longer finite after 0.1"):
         still.step()
 

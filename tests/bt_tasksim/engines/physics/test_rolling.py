@@ -52,8 +52,9 @@ def rolling_cylinder(engine, speed):
         body.set_linear_velocity(velocity)
         body.set_angular_velocity(spin)
     else:
-        data, address = still.physics._data, still.physics._world.object_dof[0]
-        local = data.xmat[still.physics._world.object_body[0]].reshape(3, 3).T @ spin
+        data, world = still.physics.simulated.data, still.physics.simulated.world
+        address = world.object_dof[0]
+        local = data.xmat[world.object_body[0]].reshape(3, 3).T @ spin
         data.qvel[address] = [*velocity, *local]
     return still
 

@@ -18,7 +18,7 @@ from bt_tasksim.scene.scene import Scene
 
 pytestmark = pytest.mark.physical
 
-ENGINES = ("sapien",)
+ENGINES = ("sapien", "mujoco")
 PADDED = {"objects", "velocities", "hand_force", "hand_distance"}
 
 

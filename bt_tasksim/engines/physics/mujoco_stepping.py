@@ -1,0 +1,245 @@
+"""One world of MuJoCo as it goes on: how finely it is stepped, when overlaps are looked for, what is read."""
+
+from __future__ import annotations
+
+import math
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+
+from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import JointTarget
+from bt_tasksim.engines.physics.disturbance import DisturbanceForce
+from bt_tasksim.engines.physics.mujoco_contacts import FINE_STEP, TIMESTEP
+from bt_tasksim.engines.physics.mujoco_model import World, build_world
+from bt_tasksim.engines.physics.mujoco_sensing import ContactReader, Forces, Near, object_velocities
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
+
+WATCHED = 4
+"""Control periods after the hand was moved or a contact came or went, in which overlaps are looked for at
+every step; at other times at the period's end."""
+
+
+class MujocoReading(NamedTuple):
+    """What MuJoCo has of a world at a period's end: positions of this instant, forces felt until then.
+
+    Attributes:
+        time: Seconds since the episode began.
+        position: Of the joints ``(n_joints,)``.
+        velocity: The same.
+        frame_position: Of the bodies that carry the tool and the fingertips ``(1 + n_tips, 3)``.
+        frame_rotation: The same ``(1 + n_tips, 4)``.
+        object_position: ``(n_objects, 3)``.
+        object_rotation: ``(n_objects, 4)``.
+        object_motion: ``(n_objects, 6)``, of the origin in the world's frame and about the object's own axes.
+        object_com: Centres of mass ``(n_objects, 3)`` in the objects' own frames.
+        wrist: Of each of the last steps what `wrist_wrenches` takes, ``(16,)``.
+        tip_force: Force on each fingertip, N, the mean of these steps.
+        hand_force: Force of the robot on each object, N, the mean of these steps.
+        near: What is near what.
+        penetration: The deepest overlap so far, metres.
+    """
+
+    time: float
+    position: Array
+    velocity: Array
+    frame_position: Array
+    frame_rotation: Array
+    object_position: Array
+    object_rotation: Array
+    object_motion: Array
+    object_com: Array
+    wrist: list[list[float]]
+    tip_force: list[list[float]]
+    hand_force: list[float]
+    near: Near
+    penetration: float
+
+
+class MujocoWorld:
+    """A world of MuJoCo, see `bt_tasksim.engines.physics.threaded.SimulatedWorld`.
+
+    Args:
+        mujoco: The library.
+        robot: The robot.
+        configuration: What was drawn.
+        start: Joints ``(n_joints,)`` to begin with.
+
+    Attributes:
+        world: The model, and where things are in its arrays.
+        data: Its ``mujoco.MjData``.
+        reading: What was read last.
+        deepest_pair: See `bt_tasksim.engines.physics.threaded.SimulatedWorld`.
+
+    Raises:
+        InputError: The robot or an object cannot be built.
+    """
+
+    reading: MujocoReading
+
+    def __init__(
+        self, mujoco: ModuleType, robot: RobotDescription, configuration: ActorConfiguration, start: Array
+    ) -> None:
+        self._mujoco = mujoco
+        self.world: World = build_world(mujoco, robot, configuration)
+        self.data = mujoco.MjData(self.world.model)
+        names = [actor.name for actor in configuration.objects]
+        self.n_objects, self.n_fixtures = len(names), len(configuration.fixtures)
+        self._period = 1.0 / configuration.control_frequency
+        self._steps = math.ceil(self._period / TIMESTEP - 1e-9)
+        share = configuration.control_frequency / configuration.physics_frequency
+        self._sensed = min(max(round(self._steps * share), 1), self._steps)
+        self._finer = math.ceil(self._period / self._steps / FINE_STEP - 1e-9)
+        self._periods = 0
+        self._reader = ContactReader(
+            self.world.bodies, self.world.model.geom_bodyid, len(robot.tips), len(names), self.n_fixtures
+        )
+        self._stiffness = robot.drive_array("stiffness")
+        self._damping = robot.drive_array("damping")
+        self._n_arm = len(robot.arm_joints)
+        self._index_bodies(robot)
+        disturbance = configuration.disturbance
+        self._disturbance = DisturbanceForce(disturbance)
+        self._pushed = names.index(disturbance.object) if disturbance is not None else -1
+        self._penetration, self._falling, self._watch = 0.0, False, 0
+        self.deepest_pair: tuple[str, str, float, float] | None = None
+        self._near = Near([math.inf] * self.n_objects, set())
+        self._hand_force = [0.0] * self.n_objects
+        self.data.qpos[self.world.joint_qpos] = start
+        self.data.xfrc_applied[self.world.object_body, 2] = -self.world.weight
+        self._drive_to(JointTarget(start, np.zeros_like(start)))
+        mujoco.mj_forward(self.world.model, self.data)
+        self._samples = [self._feel()]
+        self._read()
+
+    def _index_bodies(self, robot: RobotDescription) -> None:
+        model = self.world.model
+
+        def body(link: str) -> int:
+            return int(model.body(f"robot/{link}").id)
+
+        self._tool_body, self._wrist_body = body(robot.tool_link), body(robot.wrist_link)
+        self._root_body = int(model.body_rootid[self._wrist_body])
+        self._frames = np.array([self._tool_body, *(body(tip.links[0]) for tip in robot.tips)])
+        self._object_com = model.body_ipos[self.world.object_body]
+
+    def _drive_to(self, target: JointTarget) -> None:
+        self._target = target
+        self.data.ctrl[:] = self._stiffness * target.position + self._damping * target.velocity
+
+    # ---- running ----------------------------------------------------------------------------------------
+
+    def advance(self, target: JointTarget) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        if np.any(target.position[self._n_arm :] != self._target.position[self._n_arm :]):
+            self._watch = WATCHED
+        self._drive_to(target)
+        self.world.model.opt.timestep = self._period / self._steps
+        self._samples = []
+        quiet = self._disturbance.over and not self._falling and self._watch == 0
+        if quiet:
+            self._mujoco.mj_step(self.world.model, self.data, self._steps - self._sensed)
+        for k in range(self._steps - self._sensed if quiet else 0, self._steps):
+            self._step(sensed=k >= self._steps - self._sensed)
+        self._watch = max(self._watch - 1, 0)
+        self._periods += 1
+        self._read()
+
+    def note_motion(self, falling: bool, spin: float) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        self._falling = falling
+
+    def _step(self, sensed: bool) -> None:
+        """One ordinary step, in finer ones while something falls or is pushed."""
+        model, data, mj_step = self.world.model, self.data, self._mujoco.mj_step
+        if not self._disturbance.over:
+            k = self._pushed
+            held = self._hand_force[k] > 1.0 and not any(i == k for i, _ in self._near.support)
+            self._disturbance.watch(float(data.time), held)
+            self._falling |= self._disturbance.pushing  # until the period's end, where it is looked at again
+        if self._falling:
+            ordinary = model.opt.timestep
+            model.opt.timestep = ordinary / self._finer
+            for _ in range(self._finer):
+                if self._disturbance.pushing:
+                    self._push()
+                mj_step(model, data)
+                self._read_depth()
+            model.opt.timestep = ordinary
+        else:
+            mj_step(model, data)
+            self._read_depth()
+        if sensed:
+            self._samples.append(self._feel())
+
+    # ---- reading ----------------------------------------------------------------------------------------
+
+    def _feel(self) -> tuple[Forces, list[float]]:
+        """The forces of the last step, and what its wrench at the wrist is computed from."""
+        data = self.data
+        self._mujoco.mj_rnePostConstraint(self.world.model, data)
+        tool = self._tool_body
+        wrist = [
+            *data.cfrc_int[self._wrist_body].tolist(),
+            *data.subtree_com[self._root_body].tolist(),
+            *data.xpos[tool].tolist(),
+            *data.xquat[tool].tolist(),
+        ]
+        return self._reader.forces(data), wrist
+
+    def _read_depth(self) -> None:
+        """Remember the deepest overlap."""
+        found = self._reader.deeper(self.data, self._penetration)
+        if found is not None:
+            self._penetration, a, b = found
+            self.deepest_pair = (a, b, self._penetration, float(self.data.time))
+
+    def _read(self) -> None:
+        """Read the state: positions and distances of this instant, forces as felt since just before."""
+        model, data, world = self.world.model, self.data, self.world
+        if not math.isfinite(float(data.qpos @ data.qpos) + float(data.qvel @ data.qvel)):
+            raise MachineError(
+                f"MuJoCo's state is no longer finite after {data.time:.2f} s: see the last target"
+            )
+        self._mujoco.mj_kinematics(model, data)
+        self._mujoco.mj_comPos(model, data)
+        self._mujoco.mj_collision(model, data)
+        self._read_depth()
+        near, felt = self._reader.near(data), Forces.mean([forces for forces, _ in self._samples])
+        before = [force > 0.0 for force in self._hand_force]
+        if [force > 0.0 for force in felt.hand] != before or near.support != self._near.support:
+            self._watch = WATCHED
+        self._near, self._hand_force = near, felt.hand
+        bodies = world.object_body
+        self.reading = MujocoReading(
+            self._periods * self._period,
+            data.qpos[world.joint_qpos],
+            data.qvel[world.joint_dof],
+            data.xpos[self._frames],
+            data.xquat[self._frames],
+            data.xpos[bodies],
+            data.xquat[bodies],
+            data.qvel[world.object_dof],
+            self._object_com,
+            [wrist for _, wrist in self._samples],
+            felt.tips,
+            felt.hand,
+            near,
+            self._penetration,
+        )
+
+    def _push(self) -> None:
+        """Set the force of the disturbance for the next step."""
+        k, data, world = self._pushed, self.data, self.world
+        touched = self._reader.near(data).hand_distance[k] < math.inf
+        body = world.object_body[k]
+        moving = object_velocities(
+            data.qvel[world.object_dof[k : k + 1]], data.xquat[[body]], self._object_com[k : k + 1]
+        )
+        force = self._disturbance.force(float(data.time), touched, moving[0, :3])
+        lever = data.xpos[body] - data.xipos[body]
+        data.xfrc_applied[body, :3] = force - np.array([0.0, 0.0, world.weight[k]])
+        data.xfrc_applied[body, 3:] = np.cross(lever, force)
