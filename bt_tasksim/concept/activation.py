@@ -17,7 +17,7 @@ from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.functions import ConceptFunctions, any_of, booleans, first_of, sequence_of
 from bt_tasksim.concept.reporting import as_statement
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.concept.status import FAILURE, RUNNING, SUCCESS
+from bt_tasksim.core.batch_leaf import FAILURE, RUNNING, SUCCESS
 from bt_tasksim.core.bundles import merged, taken
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import (
@@ -158,6 +158,14 @@ class Activation:
         if after is not judged.memory:
             self.memory = merged(self.memory, judged.rows, after, context.worlds)
         return statuses
+
+    def going_on(self, rows: Array) -> Judged:
+        """Worlds that `judge` has found to go on at this tick, once more: their decisions have come.
+
+        Args:
+            rows: Which worlds ``(k,)``, ascending.
+        """
+        return self._going(rows, np.full(len(rows), RUNNING, np.int8))
 
     # ---- judging ----------------------------------------------------------------------------------------
 

@@ -124,13 +124,22 @@ class Context:
         for row in rows.tolist():
             self.refused.pop(row, None)
 
-    def advance(self, observation: Observation) -> None:
-        """Go on to the next tick: a new observation ``(N, ...)``, and an empty command."""
+    def advance(self, observation: Observation, rows: Array | None = None) -> None:
+        """Go on to the next tick: a new observation, and an empty command.
+
+        Args:
+            observation: Of all worlds ``(N, ...)``.
+            rows: The worlds ``(k,)`` that have gone on; by default all. The others are as they were, in the
+                middle of a tick.
+        """
         self._observation = observation
         self.times = observation.time
+        rows = self.rows if rows is None else rows
         for part in self._parts.values():
-            part.clear()
-        self.refused.clear()
+            part.clear(rows)
+        if self.refused:
+            for row in rows.tolist():
+                self.refused.pop(row, None)
 
     def write(self, command: Command, rows: Array, leaf: Behaviour) -> None:
         """Write commands ``(k, ...)``, or a part of them, for worlds ``rows (k,)``.
@@ -207,9 +216,14 @@ class _Part:
         self._by: Array = np.full(worlds, NOBODY)
         self._values: Array | None = None
 
-    def clear(self) -> None:
-        if self._values is not None:
+    def clear(self, rows: Array) -> None:
+        if self._values is None:
+            return
+        if len(rows) == self._worlds:
             self._leaves, self._by, self._values = [], np.full(self._worlds, NOBODY), None
+            return
+        self._values = array_namespace(self._values).asarray(self._values, copy=True)
+        self._values[rows], self._by[rows] = np.nan, NOBODY
 
     def writer(self, world: int) -> Behaviour | None:
         number = int(self._by[world])
@@ -224,13 +238,12 @@ class _Part:
             self._values = values
         else:
             if self._values is None:
-                xp = array_namespace(values)
-                self._values = xp.full(
-                    (self._worlds, values.shape[-1]), np.nan, dtype=values.dtype, device=values.device
-                )
+                xp, shape = array_namespace(values), (self._worlds, values.shape[-1])
+                self._values = xp.full(shape, np.nan, dtype=values.dtype, device=values.device)
             self._values[rows] = values
-        self._by[rows] = len(self._leaves)
-        self._leaves.append(leaf)
+        if leaf not in self._leaves:
+            self._leaves.append(leaf)
+        self._by[rows] = self._leaves.index(leaf)
 
     def withdraw(self, leaf: Behaviour, rows: Array) -> None:
         if leaf not in self._leaves or self._values is None:

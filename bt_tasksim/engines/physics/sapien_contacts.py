@@ -40,14 +40,15 @@ class ContactReader:
     Args:
         world: The world, with its robot.
         n_tips: Number of fingertips.
+        skin: Metres at which what touches the hand comes to rest before it.
 
     Attributes:
         penetration: The deepest overlap so far, metres.
         deepest_pair: Names of its bodies, metres, and seconds since the episode began; None before any.
     """
 
-    def __init__(self, world: World, n_tips: int) -> None:
-        self._world, self._n_tips = world, n_tips
+    def __init__(self, world: World, n_tips: int, skin: float = SKIN) -> None:
+        self._world, self._n_tips, self._skin = world, n_tips, skin
         self.penetration = 0.0
         self.deepest_pair: tuple[str, str, float, float] | None = None
 
@@ -111,7 +112,7 @@ class ContactReader:
                 on_tip[j].append([-x, -y, -z])
             if kind_b == "object":
                 on_object[j].append(math.sqrt(x * x + y * y + z * z))
-                distance[j] = min(distance[j], max(separation - SKIN, 0.0))
+                distance[j] = min(distance[j], max(separation - self._skin, 0.0))
         self.penetration = deepest
         # PhysX lists contacts in an order of its own, so sums must not depend on it: `math.fsum` is exact.
         tip_force = [

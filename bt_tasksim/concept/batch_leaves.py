@@ -1,0 +1,110 @@
+"""Concepts and conditions as leaves of a tree that is ticked in many worlds at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept.activation import Activation, no_action
+from bt_tasksim.concept.condition import ConditionNode
+from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.core.batch_leaf import FAILURE, PENDING, SUCCESS, BatchLeaf
+from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.core.poses import Array
+from bt_tasksim.policy.policy import Action
+
+
+class ConceptInBatch(BatchLeaf):
+    """A concept in all worlds of a batch.
+
+    Args:
+        leaf: The concept's leaf in the tree, set up: its policy decides. Under training the ticks of worlds
+            in which a decision is due are PENDING, until `decide` has been told it.
+        context: The batch's.
+    """
+
+    def __init__(self, leaf: ConceptNode, context: Context) -> None:
+        self.leaf, self._context = leaf, context
+        self.activation = Activation(leaf, leaf.model, context)
+        self._motion: Array = np.zeros((context.worlds, leaf.model.actions))
+        self._terminate: Array = np.zeros(context.worlds)
+
+    def tick(self, rows: Array, fresh: Array) -> Array:
+        """See `BatchLeaf.tick`."""
+        order = np.argsort(rows)
+        statuses = np.empty(len(rows), np.int8)
+        statuses[order] = self._tick(rows[order], fresh[order])
+        return statuses
+
+    def _tick(self, rows: Array, fresh: Array) -> Array:
+        activation, leaf = self.activation, self.leaf
+        judged = activation.judge(rows, fresh)
+        if not len(judged.rows):
+            return judged.statuses
+        if not leaf.under_training:
+            return activation.act(judged, leaf.policy_in_use.act(leaf.model, judged.seen, judged.memory))
+        due = np.asarray(leaf.model.decides(judged.seen, judged.memory))
+        if not due.all():
+            free = judged.at(np.flatnonzero(~due))
+            activation.act(free, no_action(free, leaf.model.actions))
+        judged.statuses[judged.going[due]] = PENDING
+        return judged.statuses
+
+    def decide(self, rows: Array, action: Action) -> None:
+        """Say what is to be done in worlds ``rows (k,)`` whose ticks are PENDING before this leaf."""
+        self._motion[rows], self._terminate[rows] = action.motion, action.terminate
+
+    def resume(self, rows: Array) -> Array:
+        """See `BatchLeaf.resume`."""
+        order = np.argsort(rows)
+        there = rows[order]
+        judged = self.activation.going_on(there)
+        statuses = np.empty(len(rows), np.int8)
+        statuses[order] = self.activation.act(judged, Action(self._motion[there], self._terminate[there]))
+        return statuses
+
+    def stop(self, rows: Array) -> None:
+        """See `BatchLeaf.stop`."""
+        self._context.withdraw(self.leaf, rows)
+
+    def outcome(self, row: int) -> Outcome | None:
+        """How it ended when it was last active in a world; None where it runs."""
+        return self.activation.outcomes.get(row)
+
+
+class ConditionInBatch(BatchLeaf):
+    """A condition in all worlds of a batch.
+
+    Args:
+        leaf: The condition's leaf in the tree.
+        context: The batch's.
+    """
+
+    def __init__(self, leaf: ConditionNode, context: Context) -> None:
+        self._leaf, self._context = leaf, context
+        self._failed: dict[int, Outcome] = {}
+
+    def tick(self, rows: Array, fresh: Array) -> Array:
+        """See `BatchLeaf.tick`."""
+        order = np.argsort(rows)
+        seen = self._context.seen(rows[order], np.zeros(len(rows)))
+        holds = np.asarray(self._leaf.model.holds(seen))
+        for k, row in enumerate(rows[order].tolist()):
+            self._failed.pop(row, None)
+            if not holds[k]:
+                self._failed[row] = self._leaf.model.answer(seen, k, False)
+        statuses = np.empty(len(rows), np.int8)
+        statuses[order] = np.where(holds, SUCCESS, FAILURE)
+        return statuses
+
+    def outcome(self, row: int) -> Outcome | None:
+        """The last answer in a world where it was no."""
+        return self._failed.get(row)
+
+
+def leaf_in_batch(leaf: Behaviour, context: Context) -> BatchLeaf | None:
+    """What a leaf of a tree is in a batch; None for one that is neither a concept nor a condition."""
+    if isinstance(leaf, ConceptNode):
+        return ConceptInBatch(leaf, context)
+    return ConditionInBatch(leaf, context) if isinstance(leaf, ConditionNode) else None
