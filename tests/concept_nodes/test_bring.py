@@ -127,7 +127,9 @@ def thing(kind):
 
 def facts(models):
     """What is known of a thing in so many worlds."""
-    return WorldFacts.of([WorldModel((model,), {}, ("a", "b"), 0.08, 0.05) for model in models]).object("thing")
+    return WorldFacts.of([WorldModel((model,), {}, ("a", "b"), 0.08, 0.05) for model in models]).object(
+        "thing"
+    )
 
 
 def random_poses(n):
@@ -143,7 +145,9 @@ def test_standing_poses_are_upright_and_near(kind):
     frame = np.repeat(poses.pose([0.4, 0.1, 0.2], poses.yaw(0.7))[None], 40, axis=0)
     known = facts([model] * 40)
     stands = standing_pose(frame, now, known, 0.03)
-    in_torch = standing_pose(torch.from_numpy(frame), torch.from_numpy(now), known.map(torch.from_numpy), 0.03)
+    in_torch = standing_pose(
+        torch.from_numpy(frame), torch.from_numpy(now), known.map(torch.from_numpy), 0.03
+    )
     assert np.allclose(in_torch.numpy(), stands, atol=1e-12)
     half = model.extent[2] / 2
     assert np.allclose(stands[:, :3], [0.4, 0.1, 0.23 + half])
@@ -164,6 +168,8 @@ def test_things_of_unlike_kinds_stand_in_one_batch_as_each_one_alone(rows_alike)
     frame, height = random_poses(30)[::-1].copy(), np.linspace(0.0, 0.1, 30)
     with np.errstate(all="raise"):
         rows_alike(
-            lambda rows: standing_pose(frame[rows], now[rows], facts([models[k] for k in rows]), height[rows]),
+            lambda rows: standing_pose(
+                frame[rows], now[rows], facts([models[k] for k in rows]), height[rows]
+            ),
             30,
         )

@@ -25,7 +25,9 @@ def seen(toy):
 
 def with_tool(seen, local):
     """The same view, with the tool at a point of the box's frame."""
-    tool = poses.pose(poses.transform(seen.object("box")[0], np.asarray(local, float)), seen.tool[0, 3:])[None]
+    tool = poses.pose(poses.transform(seen.object("box")[0], np.asarray(local, float)), seen.tool[0, 3:])[
+        None
+    ]
     seen.observation = dataclasses.replace(seen.observation, tool_pose=tool)
     return seen
 

@@ -54,7 +54,9 @@ def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
     from bt_tasksim.concept.seen import Known
 
     decisions = [d for d in recorded_run("pick_and_place") if type(d.leaf.model) is Pick]
-    cost = [float(d.leaf.model.sufficient_cost(Known(d.hidden, d.seen.world), d.memory)[0]) for d in decisions]
+    cost = [
+        float(d.leaf.model.sufficient_cost(Known(d.hidden, d.seen.world), d.memory)[0]) for d in decisions
+    ]
     assert cost[0] == 10.0 and cost[-1] == 0.0
 
 

@@ -71,9 +71,7 @@ def test_it_ends_a_little_below_where_the_support_should_be(toy):
     assert stage.tick(400) == Status.SUCCESS
     model = stage.world.model
     half = model.object("cup").extent[2] / 2
-    assert heights(stage)[-1] == pytest.approx(
-        model.place("goal").pose[2] + half - 0.007, abs=1e-3
-    )
+    assert heights(stage)[-1] == pytest.approx(model.place("goal").pose[2] + half - 0.007, abs=1e-3)
     assert np.abs(np.diff([c.tool[:3] for c in stage.world.steps], axis=0)).max() / 0.05 < 0.12 * 1.05
 
 

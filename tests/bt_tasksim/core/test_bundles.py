@@ -34,7 +34,9 @@ def test_parts_are_found_by_name_and_an_array_has_none():
     assert parts(Pair(1, 2)) == {"first": 1, "second": 2}
     assert set(parts(bundle())) == {"path", "count"}, "what is no argument of a dataclass is not a part"
     assert parts({"a": 1}) == {"a": 1} and parts([5, 6]) == {"0": 5, "1": 6} == parts((5, 6))
-    assert parts(np.zeros(3)) is None and parts("text") is None and parts(None) is None and parts(Kept) is None
+    assert (
+        parts(np.zeros(3)) is None and parts("text") is None and parts(None) is None and parts(Kept) is None
+    )
 
 
 def test_a_change_keeps_the_kind_of_every_bundle():

@@ -186,7 +186,7 @@ def test_no_worlds_are_no_batch():
         WorldFacts.of([])
 
 
-# ---- worlds that begin anew ---------------------------------------------------------------------------------
+# ---- worlds that begin anew -------------------------------------------------------------------------------
 
 
 def test_before_any_world_has_begun_nothing_is_known():
