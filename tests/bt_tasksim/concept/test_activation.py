@@ -100,7 +100,9 @@ class Story:
     def __init__(self, worlds, ticks, seed=0):
         rng, shape = np.random.default_rng(seed), (ticks, worlds)
         self.worlds, self.ticks = worlds, ticks
-        self.tool = np.concatenate([rng.uniform(0.1, 0.5, (*shape, 3)), rng.normal(size=(*shape, 4))], axis=-1)
+        self.tool = np.concatenate(
+            [rng.uniform(0.1, 0.5, (*shape, 3)), rng.normal(size=(*shape, 4))], axis=-1
+        )
         self.tool[..., 3:] = poses.normalise(self.tool[..., 3:])
         self.objects = np.concatenate(
             [rng.uniform(0.1, 0.5, (*shape, 2, 3)), rng.normal(size=(*shape, 2, 4))], axis=-1
@@ -163,7 +165,11 @@ def told(story, who, model=None):
         for row, status in zip(rows.tolist(), statuses.tolist(), strict=True):
             outcome = activation.outcomes.get(row)
             command = written.of_world(row).tool
-            memory = [part.tolist() for part in taken(activation.memory, np.array([row]))] if running[row] else None
+            memory = (
+                [part.tolist() for part in taken(activation.memory, np.array([row]))]
+                if running[row]
+                else None
+            )
             goals = [bool(context.reached(g, "cup", np.array([row]))[0]) for g in ("moved", "holding")]
             out[row].append(
                 Told(
@@ -235,7 +241,9 @@ def test_a_time_out_counts_from_the_begin_in_each_world():
     assert [(t.tick, t.status) for t in ends] == [(9, SUCCESS), (10, FAILURE), (11, FAILURE)]
     assert [t.outcome["reason"] for t in ends[1:]] == [TIMED_OUT.name] * 2
     assert ends[1].outcome["numbers"] == {"limit": 0.42}
-    again = [next(t for t in of_world if t.tick > end.tick) for of_world, end in zip(alone, ends, strict=True)]
+    again = [
+        next(t for t in of_world if t.tick > end.tick) for of_world, end in zip(alone, ends, strict=True)
+    ]
     assert [(t.status, t.activations) for t in again] == [(RUNNING, 2)] * 3, "and it begins anew"
 
 
