@@ -222,6 +222,12 @@ class PhysicsEngine(Engine):
         return None
 
     @classmethod
+    def has_batches(cls) -> bool:
+        """It has worlds in batches, see `batch`."""
+        own: object = cls.batch.__func__
+        return own is not PhysicsEngine.batch.__func__
+
+    @classmethod
     def batch(cls, robot: RobotDescription, setup: EngineSetup, worlds: int, threads: int) -> PhysicsBatch:
         """Many worlds of a robot at once.
 
