@@ -23,7 +23,7 @@ FIELDS = tuple(field.name for field in fields(Observation))
 
 
 def why_alone(options: EngineOptions) -> str:
-    """Why worlds with these engines are run one by one, as the end of a sentence; empty where they need not."""
+    """Why worlds with these engines run one by one, as the end of a sentence; empty where they need not."""
     if options.remote or options.safety or options.real_time:
         return "a robot, a guard, real time and engines in other processes are of one world"
     if options.perception != "state":
@@ -120,7 +120,8 @@ class Worlds:
 
         Args:
             tool: Tool targets ``(k, 7)``; rows of NaN, or None, keep their last ones.
-            hand: Hand targets ``(k, 1 + n_synergies)``, likewise; those that lack synergies keep them.
+            hand: Hand targets ``(k, 1 + n_synergies)``, likewise; synergies that are lacking are 0.
+            rows: Which worlds.
 
         Returns:
             The worlds whose targets are out of reach: there the last ones were followed.
