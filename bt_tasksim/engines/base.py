@@ -224,8 +224,7 @@ class PhysicsEngine(Engine):
     @classmethod
     def has_batches(cls) -> bool:
         """It has worlds in batches, see `batch`."""
-        own: object = cls.batch.__func__
-        return own is not PhysicsEngine.batch.__func__
+        return any("batch" in vars(base) for base in cls.__mro__[: cls.__mro__.index(PhysicsEngine)])
 
     @classmethod
     def batch(cls, robot: RobotDescription, setup: EngineSetup, worlds: int, threads: int) -> PhysicsBatch:

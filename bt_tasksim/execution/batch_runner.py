@@ -15,7 +15,7 @@ from bt_tasksim.concept.context import Context, Refusal
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.batch_leaf import RUNNING
-from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.errors import BtTasksimError, InputError, UnreachableError
 from bt_tasksim.core.outcomes import FAILED, OUT_OF_REACH, TIME_OVER, Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, WorldModel
@@ -146,13 +146,9 @@ class BatchRunner:
         yield from self._begin(rested, waiting, stream, begun)
         going = np.setdiff1d(np.flatnonzero(self._phase != IDLE), np.array(begun, int))
         if len(going):
-            parts = (None if part is None else part[going] for part in (written.tool, written.hand))
-            writers = (
-                {row: self.context.tool_writer(row) for row in going.tolist()}
-                if written.tool is not None
-                else {}
-            )
-            unreached = self.worlds.step(*parts, going)
+            tool, hand = (None if part is None else part[going] for part in (written.tool, written.hand))
+            writers = {row: self.context.tool_writer(row) for row in going.tolist()}
+            unreached = self.worlds.step(tool, hand, going)
             self.control_steps += len(going)
             for row in going.tolist():
                 episode = self._episodes[row]
@@ -167,7 +163,7 @@ class BatchRunner:
         if len(seen):
             self.context.advance(self.worlds.observe(seen), seen)
         for miss in unreached:
-            if isinstance(miss.error, InputError):
+            if not isinstance(miss.error, UnreachableError):
                 raise miss.error
             outcome = OUT_OF_REACH(what=miss.error, distance=miss.error.distance, angle=miss.error.angle)
             self.context.refused[miss.row] = Refusal(writers.get(miss.row), outcome)
