@@ -1,16 +1,18 @@
 """What leaves read and write: one writer a part and tick, and what an interrupted leaf wrote is dropped."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from py_trees.behaviours import Failure
 from py_trees.common import Status
 
-from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.context import Context, Refusal, one_world
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp, TimePassed
 from bt_tasksim.core.errors import CommandConflictError, InputError, LeafError
-from bt_tasksim.core.outcomes import INTERRUPTED, TIMED_OUT
-from bt_tasksim.core.world import Command
+from bt_tasksim.core.outcomes import INTERRUPTED, OUT_OF_REACH, TIMED_OUT
+from bt_tasksim.core.world import Command, ObjectModel, WorldModel
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.trees import fallback, parallel, reactive_fallback, sequence
 
@@ -140,3 +142,165 @@ def test_names_are_resolved_or_refused_with_the_nearest(toy, act):
         seen.object("bax")
     with pytest.raises(InputError, match="no place 'gaol' in the scene; did you mean 'goal'"):
         seen.place("gaol")
+
+
+# ---- several worlds ---------------------------------------------------------------------------------------
+
+ROBOT = load_robot("panda")
+
+
+def world(name="cup"):
+    return WorldModel(
+        (ObjectModel(name, "cup", (0.1, 0.1, 0.1), 0, ((0.0, 1, 0),), (0.05,)),), {}, ("l", "r"), 0.08, 0.05
+    )
+
+
+@pytest.fixture
+def three(act):
+    """A context of three worlds at their first tick, and two leaves."""
+    context = Context(ROBOT, 3)
+    context.begin([world(), world(), world()])
+    context.advance(observed(3))
+    return context, act("a"), act("b")
+
+
+def observed(n, time=0.0):
+    rng = np.random.default_rng(3)
+    return SimpleNamespace(
+        time=np.full(n, time) + np.arange(n),
+        tool_pose=rng.normal(size=(n, 7)),
+        objects=rng.normal(size=(n, 2, 7)),
+    )
+
+
+def rows(*numbers):
+    return np.array(numbers)
+
+
+def tools(*heights):
+    return Command(tool=np.array([[0.0, 0, height, 1, 0, 0, 0] for height in heights]))
+
+
+def test_leaves_write_in_their_own_worlds(three):
+    context, a, b = three
+    context.write(tools(0.1, 0.3), rows(0, 2), a)
+    context.write(Command(hand=np.array([[0.5]])), rows(1), b)
+    context.write(tools(0.2), rows(1), b)
+    found = context.written
+    assert found.tool[:, 2].tolist() == [0.1, 0.2, 0.3]
+    assert [found.of_world(k).hand is None for k in range(3)] == [True, False, True]
+    assert found.of_world(1).hand.tolist() == [0.5]
+    assert [context.tool_writer(k) for k in range(3)] == [a, b, a]
+    context.advance(observed(3, 0.05))
+    assert context.written.tool is None and context.tool_writer(1) is None
+
+
+def test_a_conflict_in_one_world_is_a_conflict_and_apart_they_are_none(three):
+    context, a, b = three
+    context.write(tools(0.1, 0.2), rows(0, 1), a)
+    context.write(tools(0.3), rows(2), b)
+    with pytest.raises(CommandConflictError, match="two leaves command the tool in one tick: 'b' and 'a'"):
+        context.write(tools(0.4), rows(2), a)
+    with pytest.raises(CommandConflictError, match="'a' and 'b'"):
+        context.write(tools(0.4, 0.5), rows(1, 2), b)
+
+
+def test_what_is_withdrawn_in_one_world_stays_in_the_others(three):
+    context, a, b = three
+    given = tools(0.1, 0.2, 0.3)
+    context.write(given, rows(0, 1, 2), a)
+    context.withdraw(a, rows(1))
+    context.withdraw(b, rows(0))
+    context.write(tools(0.9), rows(1), b)
+    assert context.written.tool[:, 2].tolist() == [0.1, 0.9, 0.3]
+    assert [context.tool_writer(k) for k in range(3)] == [a, b, a]
+    assert given.tool[:, 2].tolist() == [0.1, 0.2, 0.3], "what was given is not changed"
+    context.withdraw(b, rows(1))
+    assert context.written.of_world(1) == Command() and context.written.of_world(2).tool[2] == 0.3
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_target_that_is_not_finite_in_one_world_is_said_with_its_leaf(three, value):
+    context, a, b = three
+    context.write(tools(0.1, 0.2), rows(0, 1), a)
+    context.write(tools(value), rows(2), b)
+    with pytest.raises(LeafError, match="leaf 'b' commands a tool target that is not finite"):
+        _ = context.written
+    context.withdraw(b, rows(2))
+    assert context.written.of_world(2) == Command()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        Command(tool=np.zeros(7)), Command(tool=np.zeros((3, 7))), Command(tool=np.zeros((2, 6))),
+        Command(hand=np.zeros(2)), Command(hand=np.zeros((1, 1))), Command(hand=np.zeros((2, 0))),
+    ],
+)  # fmt: skip
+def test_a_target_without_a_row_for_each_of_its_worlds_is_refused(three, command):
+    context, a, _ = three
+    with pytest.raises(
+        LeafError, match=r"leaf 'a' \(conftest.py:\d+\) commands (tool|hand)=.* of each world"
+    ):
+        context.write(command, rows(0, 2), a)
+    assert context.written.of_world(0) == Command()
+
+
+def test_goals_are_each_worlds_own(three):
+    context, _, _ = three
+    context.reach("holding", "cup", rows(0, 2))
+    context.end("holding", "cup", rows(2))
+    context.reach("holding", "box", rows(1))
+    everywhere = rows(0, 1, 2)
+    assert context.reached("holding", "cup", everywhere).tolist() == [True, False, False]
+    assert context.reached("holding", "box", rows(2, 1)).tolist() == [False, True]
+    context.reach("holding", "cup", everywhere)
+    context.begin([world("box")], rows(1))
+    assert context.reached("holding", "cup", everywhere).tolist() == [True, False, True]
+    assert context.reached("holding", "box", everywhere).tolist() == [False] * 3
+
+
+def test_a_world_that_begins_anew_forgets_its_refusal_and_has_other_objects(three):
+    context, a, _ = three
+    refusal = Refusal(a, OUT_OF_REACH(what="it", distance=0.1, angle=0.0))
+    context.refused.update({0: refusal, 2: refusal})
+    context.begin([world("box")], rows(2))
+    assert list(context.refused) == [0]
+    assert context.world.object("box").present.tolist() == [False, False, True]
+    context.advance(observed(3))
+    assert not context.refused
+
+
+def test_what_is_seen_of_some_worlds_is_theirs(three):
+    context, _, _ = three
+    context.begin([world("box"), world()], rows(1, 2))
+    whole, some = context.seen(context.rows, np.arange(3.0)), context.seen(rows(0, 2), np.array([0.5, 0.7]))
+    assert np.array_equal(some.tool, whole.tool[[0, 2]]) and some.elapsed.tolist() == [0.5, 0.7]
+    for name, column in (("cup", 0), ("box", 1)):
+        assert np.array_equal(whole.object(name), context.observation.objects[:, column])
+        assert np.array_equal(some.object(name), whole.object(name)[[0, 2]])
+    assert (
+        some.model("cup").present.tolist() == [True, True]
+        and some.model("box").present.tolist() == [False] * 2
+    )
+    again = whole.at(rows(0, 2))
+    assert np.array_equal(again.tool, some.tool) and again.elapsed.tolist() == [0.0, 2.0]
+    assert again.model("box").present.tolist() == [False] * 2
+    assert context.times.tolist() == [0.0, 1.0, 2.0] and context.now == 0.0
+
+
+def test_worlds_in_the_middle_of_a_tick_keep_what_was_written(three):
+    context, a, b = three
+    context.write(tools(0.1, 0.2, 0.3), rows(0, 1, 2), a)
+    context.refused[0] = context.refused[1] = Refusal(a, OUT_OF_REACH(what="it", distance=0.1, angle=0.0))
+    context.advance(observed(3), rows(1, 2))
+    assert context.tool_writer(0) is a and context.tool_writer(1) is None and list(context.refused) == [0]
+    context.write(tools(0.9), rows(2), b)
+    found = context.written
+    assert [found.of_world(k).tool is None for k in range(3)] == [False, True, False]
+    assert found.tool[0, 2] == 0.1 and found.tool[2, 2] == 0.9
+
+
+def test_a_single_world_has_an_axis_of_its_own():
+    bundle = one_world(SimpleNamespace(tool_pose=np.arange(7.0), time=np.float64(2.0)))
+    assert bundle.tool_pose.shape == (1, 7) and bundle.time.tolist() == [2.0]

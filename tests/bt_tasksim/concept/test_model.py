@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.concept.activation import LOST_TICKS
-from bt_tasksim.concept.condition import Condition
-from bt_tasksim.concept.leaf import ONE
+from bt_tasksim.concept.condition import Condition, ConditionNode
+from bt_tasksim.concept.leaf import ONE, ConceptNode
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Metres, ObjectName
-from bt_tasksim.concept_nodes import Grasp, TimePassed, catalogue
+from bt_tasksim.concept_nodes import Bring, Grasp, TimePassed, catalogue
 from bt_tasksim.core.errors import InputError, LeafError
 from bt_tasksim.core.outcomes import (
     CANNOT_START,
@@ -28,7 +29,7 @@ from bt_tasksim.core.outcomes import (
 from bt_tasksim.core.units import METRES, SECONDS
 from bt_tasksim.core.world import Command
 from bt_tasksim.policy.policy import Action
-from bt_tasksim.trees import reactive_fallback, repeat, retry, sequence
+from bt_tasksim.trees import force_success, reactive_fallback, repeat, retry, sequence
 
 
 def test_success_writes_nothing_and_the_next_sibling_acts_in_the_same_tick(toy, act):
@@ -334,3 +335,81 @@ def test_a_hand_target_that_is_no_row_of_numbers_is_said_with_its_line(toy, monk
         toy(Closing("cup")).tick()
     monkeypatch.setattr(Closing, "hand", [[0.5]])
     assert toy(Closing("cup")).runner.tick().hand.tolist() == [0.5], "a list will do"
+
+
+# ---- models as values -------------------------------------------------------------------------------------
+
+
+def test_a_call_makes_a_leaf_and_value_makes_the_model_alone():
+    leaf, model = Careful("cup", name="mine", timeout=3), Careful.value("cup", timeout=3)
+    assert isinstance(leaf, Behaviour) and isinstance(leaf, ConceptNode) and not isinstance(leaf, Careful)
+    assert isinstance(model, Careful) and not isinstance(model, Behaviour)
+    assert type(leaf.model) is Careful and leaf.model == model and leaf.name == "mine"
+    assert (type(leaf).__name__, type(leaf).__doc__) == ("Careful", Careful.__doc__)
+    assert type(leaf) is Careful.leaf_class is type(Careful("box"))
+    assert type(Heights("cup")) is not type(leaf) and Heights.leaf_class.model_class is Heights
+
+
+def test_a_condition_is_a_value_and_its_call_a_leaf():
+    leaf = TimePassed(2.0, name="later")
+    assert isinstance(leaf, ConditionNode) and not isinstance(leaf, ConceptNode)
+    assert isinstance(leaf.model, TimePassed) and leaf.model == TimePassed.value(duration=2.0)
+    assert (
+        leaf.arguments() == {"duration": 2.0, "name": "later"}
+        and TimePassed(**leaf.arguments()).name == "later"
+    )
+
+
+def test_models_are_equal_by_class_and_values_and_so_are_their_hashes():
+    one, same = Careful.value("cup", limit=0.5), Careful.value(limit=0.5, target="cup")
+    assert one == same and hash(one) == hash(same) and len({one, same}) == 1
+    assert one == Careful.value("cup", limit=0.5, timeout=None)
+    for other in (
+        Careful.value("box", limit=0.5), Careful.value("cup"), Careful.value("cup", limit=0.5, timeout=3),
+        Careful.value("cup", limit=0.5, tolerance=0.1), Heights.value("cup", limit=0.5),
+        Careful.value("cup", limit=0.5, uncertainty={"limit": 0.01}), Careful("cup", limit=0.5), "cup", None,
+    ):  # fmt: skip
+        assert one != other
+    assert Careful("cup") != Careful("cup"), "leaves are nodes of a tree, and no values"
+    assert Careful("cup").model == Careful("cup").model
+
+
+def test_arguments_make_an_equal_model_and_are_as_few_as_will_do():
+    model = Careful.value("cup", limit=1, timeout=3, uncertainty={"limit": 0.01})
+    assert model.arguments() == {"target": "cup", "timeout": 3, "uncertainty": {"limit": 0.01}}
+    assert Careful.value(**model.arguments()) == model and Careful.value("cup").arguments() == {
+        "target": "cup"
+    }
+    assert repr(Careful.value("cup", limit=0.5)) == "Careful(target='cup', limit=0.5)"
+    leaf = Careful("cup", policy="programmed")
+    assert leaf.arguments() == {"target": "cup", "policy": "programmed"}
+    assert Careful(**leaf.arguments()).model == leaf.model
+
+
+def test_neither_a_name_nor_a_policy_is_the_models():
+    for wrong in ({"name": "mine"}, {"policy": "programmed"}):
+        with pytest.raises(InputError, match=f"careful has no parameter '{next(iter(wrong))}'"):
+            Careful.value("cup", **wrong)
+
+
+@pytest.mark.parametrize("make", [ConceptModel, ConceptModel.value, Condition, Condition.value])
+def test_abstract_models_are_refused(make):
+    with pytest.raises(TypeError, match="abstract"):
+        make()
+
+
+def test_a_contradiction_is_refused_when_the_value_is_made():
+    for make in (Bring, Bring.value):
+        with pytest.raises(InputError, match="bring: give either 'to' or 'position'"):
+            make("cup")
+
+
+def test_one_model_in_several_leaves_runs_apart(toy):
+    """A model holds nothing of a run: what changes is the leaf's."""
+    first, second = Careful("cup", name="first", timeout=0.2), Careful("cup", name="second")
+    second._model = first.model
+    before = dict(vars(first.model))
+    stage = toy(sequence("root", force_success(first), second))
+    assert stage.tick(8) == Status.RUNNING
+    assert (first.activations, second.activations) == (1, 1) and first.outcome.is_a(TIMED_OUT)
+    assert vars(first.model) == before

@@ -4,15 +4,18 @@ import json
 import math
 import pickle
 
+import numpy as np
 import pytest
 from defusedxml import ElementTree
 
+from bt_tasksim.concept.limit import Limit
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import (
     CANNOT_START,
     DONE,
     TIMED_OUT,
     Form,
+    Possible,
     outcome_from_data,
     reason_named,
     reason_of,
@@ -76,6 +79,61 @@ def test_what_was_measured_is_a_detail_and_no_cause():
 def test_a_missing_or_an_unknown_number_is_refused(values):
     with pytest.raises(TypeError, match="takes limit"):
         TIMED_OUT(**values)
+
+
+# ---- statements about several worlds ----------------------------------------------------------------------
+
+
+def test_a_statement_about_a_batch_says_of_each_world_what_it_would_say_of_it_alone(slipped):
+    ways, turns, names = np.array([0.03, 0.01, np.nan]), np.array([0.1, 0.2, 0.3]), ("cup", "box", "nut")
+    many = slipped(object=names, way=ways, turn=turns)
+    for k in range(3):
+        alone = slipped(object=names[k], way=float(ways[k]), turn=float(turns[k]))
+        one = many.at(k)
+        assert type(one) is type(alone) and one.to_data() == alone.to_data()
+        assert one.sentence == alone.sentence and type(one.numbers["way"]) is float
+        assert pickle.loads(pickle.dumps(one)).sentence == alone.sentence
+
+
+def test_what_is_the_same_in_all_worlds_is_said_once(slipped):
+    many = slipped(object="cup", way=np.array([0.03, 0.01]), turn=0.5)
+    assert [many.at(k) for k in (0, 1)] == [slipped(object="cup", way=way, turn=0.5) for way in (0.03, 0.01)]
+    plain = TIMED_OUT(limit=2.0)
+    assert plain.at(7) == plain
+
+
+def test_details_are_of_the_same_world(slipped):
+    measured = Form("{force} at the wrist", {"force": NEWTONS})(force=np.array([1.0, 2.0]))
+    many = CANNOT_START(slipped(measured, object=("cup", "box"), way=np.array([0.03, 0.01]), turn=0.0))
+    one = many.at(1)
+    assert one.detail.names == {"object": "box"} and one.cause.detail.numbers == {"force": 2.0}
+    assert one.sentence.endswith("2 N at the wrist")
+
+
+def test_an_outcome_is_possible_where_it_applies(slipped):
+    way = np.array([0.03, 0.001, 0.05])
+    possible = slipped.where(way > 0.02, object=("a", "b", "c"), way=way, turn=0.0)
+    assert isinstance(possible, Possible) and possible.applies.tolist() == [True, False, True]
+    assert possible.at(2) == slipped(object="c", way=0.05, turn=0.0)
+    with pytest.raises(TypeError, match="takes way, turn, object"):
+        slipped.where(way > 0.02, way=way, turn=0.0)
+
+
+def test_a_limit_applies_where_it_is_exceeded_and_counts(slipped):
+    heavy = register_reason(
+        "test_heavy", "{object} weighs {value}, more than {limit}", value=NEWTONS, limit=NEWTONS
+    )
+    value, limits = np.array([5.0, 5.0, 1.0, np.nan]), np.array([2.0, 6.0, 2.0, 2.0])
+    names = {"object": "nut"}
+    assert Limit(heavy, value, 2.0, names).applies.tolist() == [True, True, False, False]
+    limit = Limit(heavy, value, limits, names, counts=np.array([True, True, True, True]))
+    assert limit.applies.tolist() == [True, False, False, False]
+    assert limit.at(0) == heavy(object="nut", value=5.0, limit=2.0)
+    assert limit.at(1) == heavy(object="nut", value=5.0, limit=6.0)
+    later = Limit(heavy, value, 2.0, names, counts=np.array([False, True, True, True]))
+    assert later.applies.tolist() == [False, True, False, False]
+    with pytest.raises(TypeError, match="takes value, limit, object"):
+        Limit(heavy, value, 2.0).at(0)
 
 
 def test_codes_and_names_lead_back_to_the_reason(slipped):

@@ -152,6 +152,15 @@ FUNCTIONS = {
     "rotate": (poses.rotate, Q, V),
     "multiply": (poses.multiply, P, P),
     "inverse": (poses.inverse, P),
+    "relative": (poses.relative, P, P),
+    "localise": (poses.localise, P, V),
+    "shifted": (poses.shifted, P, V),
+    "unit": (poses.unit, V),
+    "norm": (poses.norm, P),
+    "dot": (poses.dot, Q, Q),
+    "tilt": (poses.tilt, Q),
+    "tilt against another": (poses.tilt, Q, Q),
+    "apply": (lambda q, v: poses.apply(poses.to_matrix(q), v), Q, V),
     "transform": (poses.transform, P, V),
     "normalise": (lambda q: poses.normalise(3.0 * q), Q),
     "rotation_vector": (poses.rotation_vector, Q),
@@ -186,6 +195,31 @@ def test_one_batch_and_torch_compute_the_same(name, seed):
         assert np.allclose(one, in_torch[index].numpy(), rtol=0, atol=TIGHT)
     if name != "from_matrix":  # its sign may flip where two candidates are equally long
         assert np.allclose(whole, single.numpy(), rtol=0, atol=2e-5)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_row_is_the_same_bits_in_any_company_and_however_it_lies_in_memory(rows_alike, name):
+    function, *parts = FUNCTIONS[name]
+    batch = np.random.default_rng(4).uniform(-3.0, 3.0, (len(parts), 37, 7))
+    batch[..., 3:] = poses.normalise(batch[..., 3:])
+    slices = [batch[i][..., part] for i, part in enumerate(parts)]
+    copies = [np.ascontiguousarray(part) for part in slices]
+    columns = [np.asfortranarray(part) for part in slices]
+    spread = [np.repeat(part, 2, axis=-1)[..., ::2] for part in slices]
+    whole = rows_alike(lambda rows: function(*(part[rows] for part in slices)), 37)
+    for lying in (slices, copies, columns, spread):
+        assert np.array_equal(function(*lying), whole)
+        for k in range(0, 37, 6):
+            assert np.array_equal(function(*(part[k : k + 1] for part in lying)), whole[k : k + 1])
+
+
+def test_relative_and_localise_are_what_their_names_say():
+    a, b = np.random.default_rng(5).normal(size=(2, 20, 7))
+    a[:, 3:], b[:, 3:] = poses.normalise(a[:, 3:]), poses.normalise(b[:, 3:])
+    assert np.allclose(poses.relative(a, b), poses.multiply(poses.inverse(a), b), atol=1e-12)
+    assert np.allclose(poses.localise(a, poses.transform(a, b[:, :3])), b[:, :3], atol=1e-12)
+    moved = poses.shifted(a, b[:, :3])
+    assert np.array_equal(moved[:, :3], a[:, :3] + b[:, :3]) and np.array_equal(moved[:, 3:], a[:, 3:])
 
 
 def test_batch_dimensions_broadcast():

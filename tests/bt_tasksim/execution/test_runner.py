@@ -12,6 +12,7 @@ from py_trees.behaviours import Failure, Running
 from py_trees.common import Status
 from py_trees.decorators import Inverter
 
+from bt_tasksim.concept.context import one_world
 from bt_tasksim.concept.reporting import speaker
 from bt_tasksim.concept_nodes import Pick, Wait
 from bt_tasksim.core.errors import InputError, LeafError, UnreachableError
@@ -35,7 +36,7 @@ def runner_of(scenario="pick_and_place", **options):
 def finished(stage, **settings):
     for key, value in settings.items():
         setattr(stage.runner, key, value)
-    return stage.runner.finish(stage.runner.scene.sample(0), stage.context.world)
+    return stage.runner.finish(stage.runner.scene.sample(0), stage.world.model)
 
 
 # ---- one episode ------------------------------------------------------------------------------------------
@@ -150,7 +151,7 @@ def test_a_leaf_that_was_not_set_up_says_how_to():
 
 def test_records_hold_every_tick(toy, act):
     stage, steps = toy(act("move", ticks=3)), []
-    stage.runner.finish(stage.runner.scene.sample(0), stage.context.world, record=steps.append)
+    stage.runner.finish(stage.runner.scene.sample(0), stage.world.model, record=steps.append)
     assert [float(s.observation.time) for s in steps] == pytest.approx([0, 0.05, 0.1, 0.15])
     assert [s.tree_status for s in steps] == [Status.RUNNING] * 3 + [Status.SUCCESS]
     assert steps[0].command.tool is not None and steps[3].command == Command()
@@ -271,7 +272,7 @@ def states(runner, seed):
         yield runner.pipeline.state
         if runner.tree.status != Status.RUNNING:
             return
-        runner.context.advance(runner.pipeline.step(runner.context.command))
+        runner.context.advance(one_world(runner.pipeline.step(runner.context.command)))
 
 
 def same(a, b):

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import resolve_policy
-from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept_nodes import Grasp, Pick, Place
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.execution.runner import Runner
@@ -40,7 +39,7 @@ class Model:
     actions = 2
 
     def programmed_motion(self, seen, memory):
-        return np.array([seen, memory])
+        return np.stack([seen, memory], axis=-1)
 
     def done(self, seen, memory):
         return seen == memory
@@ -57,15 +56,14 @@ class Seen:
         self.tool = np.asarray(tool, float)
 
 
-def _resolved(leaf: ConceptModel, robot):
-    return resolve_policy(leaf, leaf.name, robot)
+def _resolved(leaf, robot):
+    return resolve_policy(leaf, robot)
 
 
 def test_the_programmed_policy_is_the_concepts_own():
-    action = ProgrammedPolicy().act(Model(), 2.0, 2.0)
+    action = ProgrammedPolicy().act(Model(), np.array([2.0, 2.0]), np.array([2.0, 1.0]))
     assert isinstance(action, Action)
-    assert action.motion.tolist() == [2.0, 2.0] and action.terminate is True
-    assert ProgrammedPolicy().act(Model(), 2.0, 1.0).terminate is False
+    assert action.motion.tolist() == [[2.0, 2.0], [2.0, 1.0]] and action.terminate.tolist() == [True, False]
 
 
 def test_a_learned_policy_clips_its_motion_and_its_last_output_says_done():
@@ -99,9 +97,10 @@ def test_a_learned_policy_decides_only_where_the_concept_asks():
     batch = policy.act(Model(), Seen(rows), asked)
     assert batch.motion.tolist() == [[0.5, 0.25], [0.0, 0.0], [0.5, 0.25]]
     assert batch.terminate.tolist() == [True, False, False]
-    for row, free, motion, done in zip(rows, asked, batch.motion, batch.terminate, strict=True):
-        one = policy.act(Model(), Seen(row), free)
-        assert one.motion.tolist() == motion.tolist() and bool(one.terminate) == done
+    for k in range(len(rows)):
+        one = policy.act(Model(), Seen(rows[[k]]), asked[[k]])
+        assert np.array_equal(one.motion, batch.motion[[k]])
+        assert np.array_equal(one.terminate, batch.terminate[[k]])
 
 
 # ---- names ------------------------------------------------------------------------------------------------
@@ -212,7 +211,7 @@ def test_a_policy_of_an_older_layout(policy, monkeypatch):
 def test_results_name_the_policy_of_each_leaf(toy, act):
     stage = toy(act("move"))
     configuration = stage.runner.scene.sample(0)
-    result = stage.runner.finish(configuration, stage.context.world)
+    result = stage.runner.finish(configuration, stage.world.model)
     assert result.policies == {"move": "programmed"}
 
 

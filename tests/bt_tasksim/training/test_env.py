@@ -27,6 +27,7 @@ from toys import (
 
 from bt_tasksim.concept_nodes import Wait
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
+from bt_tasksim.core.outcomes import PRECONDITION_UNMET
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import LearnedPolicy
 from bt_tasksim.training.env import REDRAWS, EpisodeEnv, find_train
@@ -117,7 +118,7 @@ def test_the_leaf_acts_once_a_period_and_only_when_told(env_of, nest, before):
         assert leaf.log == ["begin", *expected] and len(expected) >= 5
         assert info["is_success"] and info["follower"] == "SUCCESS", info["why"]
         leaf.log.clear()
-        leaf.activations = 0
+        leaf.activation.activations[:] = 0
         features, _ = env.reset()
     assert env.redrawn == 0
 
@@ -255,7 +256,7 @@ def test_an_attempt_that_could_not_begin_is_passed_over(env_of):
         """Cannot start before the tool is low."""
 
         def initial_state(self, seen):
-            return "" if seen.tool[2] < 0.34 else "the tool is too high"
+            return PRECONDITION_UNMET.where(seen.tool[:, 2] >= 0.34, text="the tool is too high")
 
     env = env_of(retry(3, sequence("s", fallback("f", Train(Picky()), force_failure(Move(0.3))))))
     _, _, _, info = play(env, honest)
@@ -446,7 +447,7 @@ def test_features_that_do_not_fit_their_layout_are_refused(env_of):
         """Says too little."""
 
         def features(self, seen, memory):
-            return np.zeros(2)
+            return np.zeros((len(seen.tool), 2))
 
     with pytest.raises(InputError, match=r"'wrong 0.45': features\(\) gives \(2,\), layout\(\) says \(3,\)"):
         env_of(Train(Wrong())).reset(seed=0)

@@ -42,7 +42,8 @@ def signal(env):
 def honest(env):
     """The reference motion, and done when the concept's own goal is seen."""
     decision = env.unwrapped.decision
-    return signal(env) if decision.leaf.done(decision.seen, decision.memory) else idle(env)
+    done = decision.leaf.model.done(decision.seen, decision.memory)[0]
+    return signal(env) if done else idle(env)
 
 
 def away(env):
