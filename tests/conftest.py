@@ -131,6 +131,12 @@ class ToyWorld:
     def hidden(self) -> Hidden | None:
         return None
 
+    def verdict(self) -> None:
+        return None
+
+    def worlds(self, scene: Scene) -> Scene:
+        return scene
+
     real = False
 
     def stop(self, why: str) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 from bt_tasksim.core.registry import parts
 from bt_tasksim.core.resources import asset
 from bt_tasksim.core.typed_file import Model, record_model
+from bt_tasksim.engines.maniskill.schema import EnvironmentFile
 from bt_tasksim.hardware.ros.schema import CellFile
 from bt_tasksim.hardware.twin.gap_schema import GapFile
 from bt_tasksim.robot.schema import RobotFile
@@ -28,6 +29,7 @@ MODELS: dict[str, Callable[[], type[Model]]] = {
     "robot": lambda: RobotFile,
     "scene": lambda: SceneFile,
     "fixture": lambda: FixtureFile,
+    "maniskill": lambda: EnvironmentFile,
     "settings": lambda: record_model(TrainConfig),
     "twin": lambda: GapFile,
     "ros": lambda: CellFile,

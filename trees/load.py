@@ -21,7 +21,7 @@ from bt_tasksim.core.former import advice
 from bt_tasksim.core.plugins import line_in
 from bt_tasksim.policy.policy import concept_name
 from bt_tasksim.robot.description import load_robot
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import Scene, WorldSource
 from bt_tasksim.trees.check import check_tree
 
 Leaves = dict[str, type[ConceptModel] | type[Condition]]
@@ -44,7 +44,7 @@ class TreeSource:
 
     name: str
     build: Callable[[], Behaviour]
-    scene: Scene
+    scene: WorldSource
 
 
 def scenarios() -> list[str]:
@@ -59,6 +59,7 @@ def load_source(
     robot: str | None = None,
     scene: str | None = None,
     policies: Iterable[tuple[str, str]] = (),
+    world: WorldSource | None = None,
 ) -> TreeSource:
     """The tree and scene that a name stands for.
 
@@ -67,27 +68,32 @@ def load_source(
         robot: Name or file of the robot; by default the scene's own.
         scene: Name of a scenario whose scene is taken, or path of a scene file; by default the tree's own.
         policies: Concepts and the policies that their leaves take, see `with_policies`.
+        world: The world that the engines bring, which then is the scene.
 
     Raises:
         InputError: There is no such tree, scene or robot, the file is no good, or its ``scene`` does not
-            take the robot that is named.
+            take the robot that is named, or a scene is named beside the engines' own world.
         NoSceneError: The tree says nothing of its scene, and none is named.
     """
     path = Path(tree)
     if robot is not None:
         load_robot(robot)
+    if world is not None and scene is not None:
+        raise InputError(f"the engines bring a world of their own, '{world.name}': leave --scene away")
+    if world is not None and robot is not None:
+        world = world.with_robot(robot)
     if path.suffix == ".py":
         module = _module(path)
         build = _function(module, "build", path)
         build = functools.partial(_called, build, path)
         own = getattr(module, "scene", None)
-        source = TreeSource(
-            path.stem, build, _scene(scene, robot) if scene or own is None else _made(own, robot, path)
-        )
+        if world is None:
+            world = _scene(scene, robot) if scene or own is None else _made(own, robot, path)
+        source = TreeSource(path.stem, build, world)
     elif path.suffix == ".xml":
-        source = _from_xml(path, robot, scene)
+        source = _from_xml(path, robot, scene, world)
     else:
-        source = TreeSource(tree, _scenario(tree).build, _scene(scene or tree, robot))
+        source = TreeSource(tree, _scenario(tree).build, world or _scene(scene or tree, robot))
     if path.suffix == ".xml":
         from bt_tasksim.trees.xml_reader import load_tree_with_lines
 
@@ -159,7 +165,9 @@ def _built_with(build: Callable[[], Behaviour], wanted: Mapping[str, str]) -> Be
     return root
 
 
-def check_names(root: Behaviour, scene: Scene, where: Callable[[Behaviour], str] = lambda leaf: "") -> None:
+def check_names(
+    root: Behaviour, scene: WorldSource, where: Callable[[Behaviour], str] = lambda leaf: ""
+) -> None:
     """Check that every object and place that the tree names is in the scene.
 
     Args:
@@ -170,10 +178,7 @@ def check_names(root: Behaviour, scene: Scene, where: Callable[[Behaviour], str]
     Raises:
         InputError: One is not; says which leaf names it and what there is.
     """
-    from bt_tasksim.scene.fixtures import load_fixture
-
-    objects = set(scene.objects)
-    places = {p.name for f in scene.fixtures for p in load_fixture(f).places} | {s.name for s in scene.spots}
+    objects, places = set(scene.object_names), set(scene.place_names)
     for leaf in root.iterate():
         if not isinstance(leaf, ConceptModel | Condition):
             continue
@@ -244,10 +249,12 @@ def _checked(root: Any, tree: str) -> Behaviour:
     return root
 
 
-def _from_xml(path: Path, robot: str | None, scene: str | None) -> TreeSource:
+def _from_xml(path: Path, robot: str | None, scene: str | None, world: WorldSource | None) -> TreeSource:
     from bt_tasksim.trees.xml_reader import load_tree, scene_of_tree
 
     root = load_tree(path)
+    if world is not None:
+        return TreeSource(path.stem, lambda: load_tree(path), world)
     named = scene or scene_of_tree(path)
     if named is None:
         fitting = [name for name in scenarios() if _fits(root, _scene(name, robot))]

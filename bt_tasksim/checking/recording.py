@@ -18,7 +18,7 @@ from bt_tasksim.core.world import Hidden
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.policy.policy import Action, Decidable, Policy, ProgrammedPolicy, ViewT
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import WorldSource
 
 LONGEST = 60.0
 """Seconds of a run, at most."""
@@ -97,7 +97,7 @@ class Spy:
 
 def record(
     tree: Behaviour,
-    scene: Scene,
+    scene: WorldSource,
     watched: Sequence[type[ConceptModel]] | None = None,
     seeds: Sequence[int] = (1,),
     explore: bool = False,

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from bt_tasksim.execution.pipelines import EngineOptions
     from bt_tasksim.execution.result import Result
     from bt_tasksim.report.video import Film
-    from bt_tasksim.scene.scene import Scene
+    from bt_tasksim.scene.scene import WorldSource
 
 
 def run_into(
     folder: Path,
     tree: Behaviour,
-    scene: Scene,
+    scene: WorldSource,
     seed: int,
     engines: EngineOptions,
     name: str,

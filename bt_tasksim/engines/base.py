@@ -26,6 +26,8 @@ from bt_tasksim.core.world import Command, Hidden, JointTarget, Observation, Wor
 from bt_tasksim.engines.images import Image
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.scene import WorldSource
+from bt_tasksim.scene.success import Verdict
 
 if TYPE_CHECKING:
     from bt_tasksim.engines.batch import PhysicsBatch
@@ -188,6 +190,38 @@ class PhysicsEngine(Engine):
     role = "physics"
 
     @classmethod
+    def own_world(cls, name: str) -> WorldSource | None:
+        """The world that an engine of this name brings; None, the default, where it builds any scene.
+
+        Args:
+            name: The engine's name, and what follows it after a colon.
+
+        Raises:
+            InputError: There is no such world.
+        """
+        return None
+
+    def worlds(self, scene: WorldSource) -> WorldSource:
+        """Where the worlds of runs in a scene come from; by default the scene draws them itself.
+
+        Raises:
+            InputError: This engine cannot build this scene.
+        """
+        return scene
+
+    def rendering(self) -> RenderingEngine | None:
+        """What draws the world of this engine; None, the default, where any rendering engine does."""
+        return None
+
+    def verdict(self) -> Verdict | None:
+        """What became of the run, now that the tree has ended, where the engine itself says what success is.
+
+        Returns:
+            The verdict; None, the default, where the scene's goal says it.
+        """
+        return None
+
+    @classmethod
     def batch(cls, robot: RobotDescription, setup: EngineSetup, worlds: int, threads: int) -> PhysicsBatch:
         """Many worlds of a robot at once.
 
@@ -303,6 +337,18 @@ class PhysicsWrapper(PhysicsEngine):
     def served_name(self) -> str:
         """See `Engine.served_name`."""
         return self.inner.served_name
+
+    def worlds(self, scene: WorldSource) -> WorldSource:
+        """See `PhysicsEngine.worlds`."""
+        return self.inner.worlds(scene)
+
+    def rendering(self) -> RenderingEngine | None:
+        """See `PhysicsEngine.rendering`."""
+        return self.inner.rendering()
+
+    def verdict(self) -> Verdict | None:
+        """See `PhysicsEngine.verdict`."""
+        return self.inner.verdict()
 
     def reset(self, configuration: ActorConfiguration) -> WorldState:
         """See `PhysicsEngine.reset`."""

@@ -28,6 +28,8 @@ from bt_tasksim.engines.base import (
 from bt_tasksim.engines.clock import Clock, FreeClock, Timing
 from bt_tasksim.engines.images import Image
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.scene import WorldSource
+from bt_tasksim.scene.success import Verdict
 
 SAME_PLACE = (2e-3, 2e-2)
 """m and rad by which the tool's poses of kinematics and physics may differ at a reset."""
@@ -59,6 +61,10 @@ class EnginePipeline:
         self.clock = clock or FreeClock()
         self.state: WorldState | None = None
         self.commanded: Command = Command()
+
+    def worlds(self, scene: WorldSource) -> WorldSource:
+        """Where the worlds of runs in a scene come from, see `PhysicsEngine.worlds`."""
+        return self.physics.worlds(scene)
 
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> Observation:
         """Begin an episode; returns its first observation."""
@@ -96,6 +102,10 @@ class EnginePipeline:
     def hidden(self) -> Hidden | None:
         """The physics state, in simulation."""
         return self.physics.hidden()
+
+    def verdict(self) -> Verdict | None:
+        """What became of the run, where the physics engine itself says it."""
+        return self.physics.verdict()
 
     def unseen(self) -> dict[str, str]:
         """Why perception has never seen an object, one sentence each, by the object's name."""

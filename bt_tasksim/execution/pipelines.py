@@ -28,6 +28,7 @@ from bt_tasksim.hardware.safety.guard import Guard
 from bt_tasksim.hardware.safety.guarded_robot import GuardedRobot
 from bt_tasksim.hardware.safety.guarded_simulation import GuardedSimulation
 from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.scene import WorldSource
 
 _E = TypeVar("_E", bound=Engine)
 
@@ -86,6 +87,15 @@ class EngineOptions:
     def real(self) -> bool:
         """The physics engine is a real robot."""
         return engine_class("physics", self.engines).real
+
+    def own_world(self) -> WorldSource | None:
+        """The world that the physics engine brings; None where it builds any scene.
+
+        Raises:
+            InputError: There is no such world.
+        """
+        found = engine_class("physics", self.engines)
+        return found.own_world(self.engines) if issubclass(found, PhysicsEngine) else None
 
     @property
     def remote(self) -> bool:
@@ -167,7 +177,10 @@ def build_pipeline(robot: RobotDescription, options: EngineOptions) -> EnginePip
             physics = keep(PhysicsEngine.named(robot, options.setup("physics", images)))
             rendering = None
             if options.rendering or images:
-                rendering = keep(RenderingEngine.named(robot, options.setup("rendering")))
+                rendering = physics.rendering()
+                if rendering is None:
+                    rendering = RenderingEngine.named(robot, options.setup("rendering"))
+                keep(rendering)
             clock: Clock = FreeClock()
             if options.safety:
                 physics = GuardedSimulation(physics, _guard(robot))

@@ -94,7 +94,9 @@ def replay(
     compared = comparable(recorded.demonstration, tuple(COMPARED), where)
     root = tree if tree is not None else _tree(recorded.tree, given, where)
     take_policies(root, recorded, given, where, trusted=tree is not None)
-    runner = Runner(root, Scene(recorded.configuration.robot), recorded.options, longest=recorded.longest)
+    own, robot = recorded.options.own_world(), recorded.configuration.robot
+    scene = Scene(robot) if own is None else own.with_robot(robot)
+    runner = Runner(root, scene, recorded.options, longest=recorded.longest)
     recorder = RunRecorder(runner, recorded.scenario)
     try:
         world = runner.reset(recorded.configuration)

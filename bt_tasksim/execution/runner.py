@@ -18,7 +18,7 @@ from py_trees.common import Status
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.reporting import as_statement, speaker, whole_outcome
-from bt_tasksim.core.errors import BtTasksimError, LeafError, UnreachableError
+from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
 from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import (
     FAILED,
@@ -37,7 +37,7 @@ from bt_tasksim.execution.result import Result
 from bt_tasksim.hardware.safety.stop import SafetyStop
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.scene.success import Verdict, at_rest, evaluate_success
 
 NOT_JUDGED = register_reason("not_judged", "the tree succeeded; there is no ground truth to judge it by")
@@ -65,7 +65,7 @@ class Runner:
 
     Args:
         tree: The tree's root.
-        scene: The scene.
+        scene: The scene; None for the world that the engines bring.
         options: Which engines; by default those of `EngineOptions`.
         pipeline: A pipeline of one's own, instead of ``options``.
         longest: Seconds of an episode after which it is stopped.
@@ -77,7 +77,7 @@ class Runner:
     def __init__(
         self,
         tree: Behaviour,
-        scene: Scene,
+        scene: WorldSource | None = None,
         options: EngineOptions | None = None,
         pipeline: EnginePipeline | None = None,
         longest: float = LONGEST,
@@ -85,10 +85,14 @@ class Runner:
         from bt_tasksim.trees.check import check_tree
 
         check_tree(tree)
-        self.tree, self.scene, self.longest = tree, scene, longest
         self.options = options or EngineOptions()
+        if scene is None:
+            scene = self.options.own_world()
+        if scene is None:
+            raise InputError(f"'{self.options.engines}' brings no world of its own: name a scene")
         self.robot = load_robot(scene.robot)
         self.pipeline = pipeline or build_pipeline(self.robot, self.options)
+        self.tree, self.scene, self.longest = tree, self.pipeline.worlds(scene), longest
         self.context = Context(self.robot)
         self.configuration: ActorConfiguration | None = None
         for node in tree.iterate():
@@ -275,6 +279,9 @@ class Runner:
         self, configuration: ActorConfiguration, world: WorldModel, record: Callable[[Step], None] | None
     ) -> Verdict | None:
         pipeline = self.pipeline
+        own = pipeline.verdict()
+        if own is not None:
+            return own
         hidden = pipeline.hidden()
         if hidden is None:
             return None

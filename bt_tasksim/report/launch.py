@@ -17,7 +17,7 @@ from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report.video import Film, VideoRecorder
 from bt_tasksim.report.write import FILES, VIDEO, write_run
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.trees.load import with_policies
 
 _ENGINES = tuple(f.name for f in dataclasses.fields(EngineOptions))
@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 
 def run(
     tree: Behaviour,
-    scene: Scene,
+    scene: WorldSource | None = None,
     seed: int = 0,
     *,
     video: str | Path | bool | None = None,
@@ -42,7 +42,7 @@ def run(
 
     Args:
         tree: The tree's root.
-        scene: The scene.
+        scene: The scene; None for the world that the engines bring.
         seed: Seed of the draw.
         video: Path of a video to write; or True, for ``run.mp4`` in the folder ``out``.
         out: Folder that keeps the run, as ``bt-tasksim run --out`` does: result, log, picture of the tree and

@@ -21,7 +21,7 @@ from bt_tasksim.execution.runner import Runner, Step
 from bt_tasksim.report.report import NO_VIDEO, write_report
 from bt_tasksim.report.tree_picture import tree_svg
 from bt_tasksim.report.video import Film, VideoRecorder
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import WorldSource
 
 RESULT, LOG, TREE, VIDEO, REPORT = "result.json", "run.h5", "tree.svg", "run.mp4", "report.html"
 FILES = (RESULT, LOG, TREE, VIDEO, REPORT)
@@ -111,7 +111,9 @@ def write_run(
     return result, RunFiles(Path(folder), paths, remarks)
 
 
-def filming_runner(tree: Behaviour, scene: Scene, options: EngineOptions | None = None) -> tuple[Runner, str]:
+def filming_runner(
+    tree: Behaviour, scene: WorldSource, options: EngineOptions | None = None
+) -> tuple[Runner, str]:
     """A runner that can draw; where this machine cannot, one that does not.
 
     Args:

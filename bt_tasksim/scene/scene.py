@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 from bt_tasksim.core.errors import FieldError, InputError, nearest, within
 from bt_tasksim.core.names import check_name
@@ -16,6 +17,40 @@ from bt_tasksim.scene import sampling
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor, check_seed, generator
 from bt_tasksim.scene.fixtures import load_fixture
 from bt_tasksim.scene.specs import Goal, HandStart, ObjectSpec, SpotSpec, object_spec
+
+
+class WorldSource(Protocol):
+    """Where worlds come from: a `Scene`, or an engine that brings a world of its own."""
+
+    @property
+    def name(self) -> str:
+        """Its name in results."""
+
+    @property
+    def robot(self) -> str:
+        """Name of the robot, or path of its data file."""
+
+    @property
+    def stages(self) -> Sequence[CurriculumStage]:
+        """The curriculum of a training, in order."""
+
+    @property
+    def object_names(self) -> Collection[str]:
+        """Names of the objects, which trees may name."""
+
+    @property
+    def place_names(self) -> Collection[str]:
+        """Names of the places, which trees may name."""
+
+    def with_robot(self, robot: str) -> WorldSource:
+        """The same with another robot.
+
+        Raises:
+            InputError: It cannot be there.
+        """
+
+    def sample(self, seed: int, stream: str = "evaluation", stage: int | None = None) -> ActorConfiguration:
+        """Draw one world, see `Scene.sample`."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +162,17 @@ class Scene:
                     f"the scene's {where[0]} names '{wanted}', which is not in it{nearest(wanted, known)}",
                     *where,
                 )
+
+    @property
+    def object_names(self) -> Collection[str]:
+        """Names of its objects."""
+        return self.objects.keys()
+
+    @property
+    def place_names(self) -> Collection[str]:
+        """Names of the places of its fixtures, and of its spots."""
+        of_fixtures = {place.name for name in self.fixtures for place in load_fixture(name).places}
+        return of_fixtures | {spot.name for spot in self.spots}
 
     def with_robot(self, robot: str) -> Scene:
         """The same scene with another robot."""

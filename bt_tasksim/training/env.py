@@ -20,7 +20,7 @@ from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import LONGEST, Runner
 from bt_tasksim.policy.policy import Action, Policy, split_action
 from bt_tasksim.robot.description import RobotDescription
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.episodes import Episode
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.transitions import Transitions
@@ -69,7 +69,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
     def __init__(
         self,
         tree: Behaviour,
-        scene: Scene,
+        scene: WorldSource,
         train: str | None = None,
         options: EngineOptions | None = None,
         reward: Reward | None = None,
@@ -90,7 +90,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         for leaf in concepts_in(tree):
             if policies and leaf.name in policies and leaf not in self.learners:
                 leaf.use(policies[leaf.name])
-        self.tree, self.scene = tree, scene
+        self.tree, self.scene = tree, self.runner.scene
         self.reward = reward or Reward()
         self.stream, self.stage, self.render_mode = stream, stage, render_mode
         self.layout = shared_layout(self.train, self.learners, self.runner.robot)

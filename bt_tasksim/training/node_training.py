@@ -23,7 +23,7 @@ from bt_tasksim.policy.files import CHECKPOINT, PolicyCard, load_policy, save_po
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import LearnedPolicy, Policy
 from bt_tasksim.robot.description import load_robot
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.checkpoint import (
     Facts,
     check_same,
@@ -59,7 +59,7 @@ class TrainingTask:
     """
 
     tree: Behaviour
-    scene: Scene
+    scene: WorldSource
     options: EngineOptions
     workers: int
     name: str

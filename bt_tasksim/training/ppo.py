@@ -18,7 +18,7 @@ from bt_tasksim.policy.files import CHECKPOINT, training_folder
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import LearnedPolicy, Policy
 from bt_tasksim.robot.description import load_robot
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.env import find_train, shared_layout
 from bt_tasksim.training.node_training import NodeTraining, TrainingTask
@@ -31,7 +31,7 @@ FINE_TUNING = 0.25
 
 def train(
     tree: Behaviour,
-    scene: Scene,
+    scene: WorldSource,
     steps: int | None = None,
     out: str | Path | None = None,
     config: TrainConfig | None = None,

@@ -19,6 +19,7 @@ from bt_tasksim.core.interrupts import terminable
 from bt_tasksim.core.locks import LockedError
 from bt_tasksim.core.plugins import loaded
 from bt_tasksim.core.typed_file import record_model, validate
+from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.policy.files import CHECKPOINT, training_folder
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
@@ -32,6 +33,7 @@ class Request:
         tree: Name or file of the tree.
         scene: Name or file of the scene, or None for the tree's own.
         robot: Name or file of the robot, or None for the scene's own.
+        engines: Name of the physics engine, or None for the usual one.
         out: The policy's folder, or None for `default_out`.
         steps: Decisions, or None for the settings' own.
         seed: Seed, or None for the settings' own.
@@ -44,6 +46,7 @@ class Request:
     tree: str
     scene: str | None = None
     robot: str | None = None
+    engines: str | None = None
     out: Path | None = None
     steps: int | None = None
     seed: int | None = None
@@ -57,7 +60,7 @@ class Request:
         out = ["bt-tasksim", "train", self.tree]
         for plugin in loaded():
             out += ["--plugin", plugin]
-        for name in ("scene", "robot", "out", "steps", "seed", "workers", "settings"):
+        for name in ("scene", "robot", "engines", "out", "steps", "seed", "workers", "settings"):
             value = getattr(self, name)
             if value is not None:
                 out += [f"--{name}", str(value)]
@@ -81,7 +84,10 @@ def run(request: Request, report: Callable[[Progress], None]) -> str:
     config = load_settings(request.settings)
     changes = {name: getattr(request, name) for name in ("steps", "seed")}
     config = dataclasses.replace(config, **{k: v for k, v in changes.items() if v is not None})
-    source = load_source(request.tree, request.robot, request.scene)
+    options = EngineOptions(noise="original")
+    if request.engines is not None:
+        options = dataclasses.replace(options, engines=request.engines)
+    source = load_source(request.tree, request.robot, request.scene, world=options.own_world())
     out = request.out or default_out(source.name, source.scene.robot)
     ppo, find_train = _ppo()
     tree = source.build()
@@ -95,6 +101,7 @@ def run(request: Request, report: Callable[[Progress], None]) -> str:
                 source.scene,
                 out=out,
                 config=config,
+                options=options,
                 workers=request.workers,
                 resume=request.resume,
                 backward=request.backward,

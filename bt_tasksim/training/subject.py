@@ -17,12 +17,12 @@ from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.run_log import tree_text
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.fixtures import load_fixture
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import Scene, WorldSource
 from bt_tasksim.trees.walk import nodes_of
 
 
 def training_subject(
-    tree: Behaviour, scene: Scene, layouts: Mapping[str, Any], node: str, options: EngineOptions
+    tree: Behaviour, scene: WorldSource, layouts: Mapping[str, Any], node: str, options: EngineOptions
 ) -> dict[str, str]:
     """What a training is of, as hashes by name.
 
@@ -43,7 +43,7 @@ def training_subject(
 
 def evaluation_subject(
     tree: Behaviour,
-    scene: Scene,
+    scene: WorldSource,
     options: EngineOptions,
     policies: Mapping[str, str],
     files: Mapping[str, str],
@@ -73,11 +73,14 @@ def _tree(tree: Behaviour) -> Any:
     return tree_text(tree) or [[type(n).__qualname__, n.name, len(n.children)] for n in nodes_of(tree)]
 
 
-def _world(scene: Scene) -> dict[str, str]:
-    world = {
-        "scene": _plain(dataclasses.replace(scene, robot="", name="")),
-        "fixtures": [_plain(load_fixture(name)) for name in scene.fixtures],
-    }
+def _world(scene: WorldSource) -> dict[str, str]:
+    if isinstance(scene, Scene):
+        world = {
+            "scene": _plain(dataclasses.replace(scene, robot="", name="")),
+            "fixtures": [_plain(load_fixture(name)) for name in scene.fixtures],
+        }
+    else:
+        world = {"source": scene.name, "names": [*sorted(scene.object_names), *sorted(scene.place_names)]}
     source = load_robot(scene.robot).source
     return {"scene": _hash(world), "robot": hashlib.sha256(source.read_bytes()).hexdigest()}
 

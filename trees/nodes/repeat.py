@@ -11,7 +11,8 @@ from bt_tasksim.core.outcomes import Form
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
-from bt_tasksim.trees.nodes.rounds import Rounds
+from bt_tasksim.trees.nodes.batch import SUCCESS, Place
+from bt_tasksim.trees.nodes.rounds import BatchRounds, Rounds
 
 ROUND_OF = Form("round {round} of {rounds} done", {"round": COUNT, "rounds": COUNT})
 ROUND = Form("round {round} done", {"round": COUNT})
@@ -76,3 +77,7 @@ class RepeatKind(NodeKind[Repeat]):
         """See `NodeKind.describe`."""
         often = "without end" if node.times < 0 else f"{node.times} times"
         return f"{self.label} {often}"
+
+    def compiled(self, node: Repeat, place: Place) -> BatchRounds:
+        """See `NodeKind.compiled`."""
+        return BatchRounds(place, node.limit, again_on=SUCCESS)

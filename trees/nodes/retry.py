@@ -14,8 +14,9 @@ from bt_tasksim.core.outcomes import Outcome, Statement, register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
+from bt_tasksim.trees.nodes.batch import FAILURE, Place
 from bt_tasksim.trees.nodes.pass_through import said_below
-from bt_tasksim.trees.nodes.rounds import Rounds
+from bt_tasksim.trees.nodes.rounds import BatchRounds, Rounds
 
 ATTEMPT_FAILED = register_reason(
     "attempt_failed", "attempt {attempt} of {attempts} failed{before}", attempt=COUNT, attempts=COUNT
@@ -123,3 +124,7 @@ class RetryUntilSuccessfulKind(NodeKind[Retry]):
         """See `NodeKind.describe`."""
         often = "without end" if node.attempts < 0 else f"up to {node.attempts} times"
         return f"{self.label} {often}"
+
+    def compiled(self, node: Retry, place: Place) -> BatchRounds:
+        """See `NodeKind.compiled`."""
+        return BatchRounds(place, node.limit, again_on=FAILURE)

@@ -32,8 +32,9 @@ def run(
     """Run a tree once."""
     from bt_tasksim.cli.running import run_into
 
-    source = tree.load(policies(engines.policy))
+    tree.load_nodes()
     options = engines.options(rendering=film.video, real_time=real_time)
+    source = tree.load(policies(engines.policy), options.own_world())
     parts = [source.name, Path(source.scene.robot).stem, str(seed)]
     if options.perception != "state":
         parts.insert(2, options.perception.partition(":")[0])

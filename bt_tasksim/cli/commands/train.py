@@ -32,6 +32,12 @@ def train(
             parser=arguments.workers, metavar="W", help="Worker processes.  [default: one for each core]"
         ),
     ] = None,
+    engines: Annotated[
+        str | None,
+        typer.Option(
+            metavar="E", help="Physics: sapien, mujoco, maniskill:ENV or a plugin's.  [default: sapien]"
+        ),
+    ] = None,
     seed: Annotated[
         int | None, typer.Option(parser=arguments.seed, metavar="S", help="Seed.  [default: 0]")
     ] = None,
@@ -51,6 +57,7 @@ def train(
         tree=tree.tree,
         scene=tree.scene,
         robot=tree.robot,
+        engines=engines,
         out=out,
         steps=steps,
         seed=seed,

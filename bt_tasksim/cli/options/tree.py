@@ -11,6 +11,7 @@ import typer
 from bt_tasksim.cli.options import completion
 
 if TYPE_CHECKING:
+    from bt_tasksim.scene.scene import WorldSource
     from bt_tasksim.trees.load import TreeSource
 
 
@@ -44,11 +45,12 @@ class TreeOptions:
     ] = None
     nodes: Annotated[str | None, typer.Option(metavar="F.py", hidden=True, help="As --plugin.")] = None
 
-    def load(self, policies: Iterable[tuple[str, str]] = ()) -> TreeSource:
+    def load(self, policies: Iterable[tuple[str, str]] = (), world: WorldSource | None = None) -> TreeSource:
         """The tree and its scene.
 
         Args:
             policies: Concepts and the policies that their leaves take, whatever the tree says.
+            world: The world that the engines bring, which then is the scene.
 
         Raises:
             InputError: There is no such tree, scene, robot or plugin, or one of them is no good.
@@ -56,7 +58,7 @@ class TreeOptions:
         from bt_tasksim.trees.load import load_source
 
         self.load_nodes()
-        return load_source(self.tree, self.robot, self.scene, policies)
+        return load_source(self.tree, self.robot, self.scene, policies, world)
 
     def load_nodes(self) -> None:
         """Load the plugin that was named in the old way.

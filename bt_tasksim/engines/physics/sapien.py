@@ -21,6 +21,7 @@ from bt_tasksim.engines.base import EngineSetup
 from bt_tasksim.engines.physics.sapien_robot import RobotBuilder
 from bt_tasksim.engines.physics.sapien_stepping import SapienWorld
 from bt_tasksim.engines.physics.sapien_world import build_world
+from bt_tasksim.engines.physics.sapien_wrist import external_wrench
 from bt_tasksim.engines.physics.threaded import Layout, SimulatedPhysics, ThreadedBatch
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.robot.description import RobotDescription
@@ -86,7 +87,7 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             joint_velocity=v,
             joint_effort=self._effort(rows, q, v),
             tip_force=np.array([touch.tip_force for touch in touches]).reshape(k, -1, 3),
-            wrench=self._wrench(rows, incoming.astype(float)),
+            wrench=external_wrench(incoming.astype(float), self._lever[rows], self._to_tool[rows]),
             tool_pose=tool,
             tips=poses.transform(frames[:, 1:], self._tip_points),
             objects=objects,
@@ -103,16 +104,6 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             tool_pose=tool,
         )
         return state, hidden
-
-    def _wrench(self, rows: Array, incoming: Array) -> Array:
-        """External wrenches ``(k, 6)`` at the tool, from the wrist joint's incoming forces ``(k, 6)``.
-
-        SAPIEN reports the force that the wrist's parent exerts on it in the joint's frame, which may be
-        turned against the link's; at rest the world's force on the hand is its opposite. Moments are moved
-        to the tool origin: t' = t - r x f.
-        """
-        force, moment = incoming[:, :3], poses.cross(self._lever[rows], incoming[:, :3]) - incoming[:, 3:]
-        return poses.rotate(self._to_tool[rows], np.stack([-force, moment], axis=1)).reshape(-1, 6)
 
 
 def _poses(found: Iterable[tuple[float, ...]]) -> Array:

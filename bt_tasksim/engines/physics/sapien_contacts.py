@@ -46,6 +46,7 @@ class ContactReader:
     Args:
         world: The world, with its robot.
         n_tips: Number of fingertips.
+        skin: Metres at which what touches the hand comes to rest before it.
 
     Attributes:
         penetration: The deepest overlap so far, metres.
@@ -53,8 +54,8 @@ class ContactReader:
         nothing: What is read where nothing touches anything.
     """
 
-    def __init__(self, world: World, n_tips: int) -> None:
-        self._world, self._n_tips = world, n_tips
+    def __init__(self, world: World, n_tips: int, skin: float = SKIN) -> None:
+        self._world, self._n_tips, self._skin = world, n_tips, skin
         n = len(world.objects)
         self.nothing = Touch([[0.0] * 3] * n_tips, [0.0] * n, [math.inf] * n, set(), [False] * n)
         self.penetration = 0.0
@@ -119,7 +120,7 @@ class ContactReader:
                 on_tip[j].append((-x, -y, -z))
             if kind_b == "object":
                 on_object[j].append(math.sqrt(x * x + y * y + z * z))
-                distance[j] = min(distance[j], max(separation - SKIN, 0.0))
+                distance[j] = min(distance[j], max(separation - self._skin, 0.0))
         # PhysX lists contacts in an order of its own, so sums must not depend on it: `math.fsum` is exact.
         try:
             tip_force = [

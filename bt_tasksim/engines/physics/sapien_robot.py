@@ -10,6 +10,7 @@ import numpy as np
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.sapien_world import CONTACT_OFFSET, World, array, sapien_pose
+from bt_tasksim.engines.physics.sapien_wrist import wrist_frame
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.urdf_links import links_below, load_links, root_pose, still_links
 from bt_tasksim.robot.urdf_visuals import load_collisions
@@ -26,7 +27,6 @@ millimetres for one step, and kicks what is light."""
 FAST = 0.6
 """Share of the hand's own speed from which it closes fast."""
 _ARM_BIT = 1 << 8  # shapes that share a bit of group 2 do not collide with each other
-_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 class RobotBuilder:
@@ -120,12 +120,8 @@ class Robot:
         tool_link, self.tool_pose = links[tool_frame[0]], np.array(tool_frame[1], float)
         self.frames = [tool_link, *(links[tip.links[0]] for tip in robot.tips)]
         self.wrist = [link.name for link in articulation.get_links()].index(robot.wrist_link)
-        wrist = links[robot.wrist_link]
-        joint = next(j for j in articulation.get_joints() if j.child_link == wrist)
-        frame = poses.multiply(array(wrist.entity_pose), array(joint.pose_in_child))
         tool = poses.multiply(array(tool_link.entity_pose), self.tool_pose)
-        in_joint = poses.multiply(poses.inverse(frame), tool)
-        self.lever, self.to_tool = in_joint[:3], in_joint[3:] * _CONJUGATE
+        self.lever, self.to_tool = wrist_frame(articulation, links[robot.wrist_link], tool)
 
     def _set_drives(self, robot: RobotDescription, joint_position: Array) -> None:
         articulation = self.articulation

@@ -1,0 +1,21 @@
+"""ManiSkill's PickCube-v1: take the cube to a goal in the air, and hold it there.
+
+bt-tasksim evaluate examples/maniskill/pick_cube.py --engines maniskill:PickCube-v1
+"""
+
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Wait
+from bt_tasksim.trees import sequence
+
+
+def build() -> Behaviour:
+    """The tree."""
+    return sequence(
+        "pick cube",
+        Grasp("cube"),
+        Pick("cube", distance=0.05),
+        # A hover of 12 mm keeps goals on the table in reach of the planner, which keeps as much clearance.
+        Bring("cube", to="goal", hover=0.012),
+        Wait(0.3),
+    )
