@@ -69,7 +69,7 @@ class SapienWorld:
         self._dt = self._last_dt = 1.0 / configuration.physics_frequency
         self._substeps = configuration.physics_frequency // configuration.control_frequency
         self._time = 0.0
-        self._falling = self._rolling = False
+        self._falling = self._rolling = self._asleep = False
         self._watch = WATCHED
         self._reader = ContactReader(world, n_tips)
         self._touch = self._reader.nothing
@@ -125,22 +125,27 @@ class SapienWorld:
 
     def _read(self) -> None:
         articulation, bodies = self.robot.articulation, self.world.objects
-        self._feel()
+        slept, self._asleep = self._asleep, all(body.is_sleeping for body in bodies)
+        still = slept and self._asleep
+        self._feel(still)
+        if not still:
+            self._objects = [floats(body.entity_pose) for body in bodies]
+            self._velocities = [v for body in bodies for v in (body.linear_velocity, body.angular_velocity)]
         self.reading = SapienReading(
             self._time,
             articulation.get_qpos(),
             articulation.get_qvel(),
             articulation.get_link_incoming_joint_forces(),
             [floats(link.entity_pose) for link in self.robot.frames],
-            [floats(body.entity_pose) for body in bodies],
-            [velocity for b in bodies for velocity in (b.linear_velocity, b.angular_velocity)],
+            self._objects,
+            self._velocities,
             self._touch,
             self._reader.penetration,
         )
 
-    def _feel(self) -> None:
+    def _feel(self, asleep: bool = False) -> None:
         """Read what touches what; look closely for some time where that has changed."""
-        before, now = self._touch, self._reader.read(self._time, self._last_dt)
+        before, now = self._touch, self._reader.read(self._time, self._last_dt, asleep)
         if now.touched != before.touched or now.support != before.support:
             self._watch = WATCHED
         self._touch = now
