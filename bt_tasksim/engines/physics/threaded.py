@@ -165,24 +165,25 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
 
     def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> None:
         """See `PhysicsBatch.reset`."""
-        robot = self.robot
-        built: list[int] = []
-        for row, configuration in zip(np.asarray(rows).tolist(), configurations, strict=True):
+        robot, rows = self.robot, np.asarray(rows, int)
+
+        def build(job: tuple[int, ActorConfiguration]) -> None:
+            row, configuration = job
             start = np.array(configuration.joint_position or np.concatenate([robot.rest, robot.hand_open]))
-            self.errors[row] = None
+            self._position[row], self._velocity[row] = start, 0.0
+            self.simulated[row] = self.errors[row] = None
             try:
                 self.simulated[row] = self._build(row, configuration, start)
             except BtTasksimError as error:
-                self.simulated[row], self.errors[row] = None, error
-                continue
-            self._position[row], self._velocity[row] = start, 0.0
-            built.append(row)
-        fresh = [world for row in built if (world := self.simulated[row]) is not None]
+                self.errors[row] = error
+
+        self._share(build, zip(rows.tolist(), configurations, strict=True))
+        fresh = [world for row in rows.tolist() if (world := self.simulated[row]) is not None]
         self._widen(
             max((world.n_objects for world in fresh), default=0),
             max((world.n_fixtures for world in fresh), default=0),
         )
-        self._gather(np.array(built, int))
+        self._gather(np.array([row for row in rows.tolist() if self.errors[row] is None], int))
 
     def step(self, target: JointTarget, rows: Array) -> None:
         """See `PhysicsBatch.step`."""
