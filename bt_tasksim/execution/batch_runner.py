@@ -26,7 +26,7 @@ from bt_tasksim.execution.runner import LONGEST, NOT_JUDGED, SETTLE, Runner
 from bt_tasksim.execution.worlds import Worlds, hidden_of
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
-from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.scene.success import AT_REST, evaluate_success
 
 QUIET = 4
@@ -70,7 +70,7 @@ class BatchRunner:
     def __init__(
         self,
         build: Callable[[], Behaviour],
-        scene: Scene,
+        scene: WorldSource,
         options: EngineOptions | None = None,
         worlds: int = 64,
         threads: int = 1,
