@@ -51,6 +51,11 @@ def workers(text: str | int) -> int:
     return whole(text, 1, MOST_WORKERS)
 
 
+def batch(text: str | int) -> int:
+    """How many worlds at once."""
+    return whole(text, 1, MOST_EPISODES)
+
+
 def steps(text: str | int) -> int:
     """How many decisions."""
     return whole(text, 1, MOST_STEPS)

@@ -32,12 +32,6 @@ class ConceptInBatch(BatchLeaf):
 
     def tick(self, rows: Array, fresh: Array) -> Array:
         """See `BatchLeaf.tick`."""
-        order = np.argsort(rows)
-        statuses = np.empty(len(rows), np.int8)
-        statuses[order] = self._tick(rows[order], fresh[order])
-        return statuses
-
-    def _tick(self, rows: Array, fresh: Array) -> Array:
         activation, leaf = self.activation, self.leaf
         judged = activation.judge(rows, fresh)
         if not len(judged.rows):
@@ -57,12 +51,8 @@ class ConceptInBatch(BatchLeaf):
 
     def resume(self, rows: Array) -> Array:
         """See `BatchLeaf.resume`."""
-        order = np.argsort(rows)
-        there = rows[order]
-        judged = self.activation.going_on(there)
-        statuses = np.empty(len(rows), np.int8)
-        statuses[order] = self.activation.act(judged, Action(self._motion[there], self._terminate[there]))
-        return statuses
+        judged = self.activation.going_on(rows)
+        return self.activation.act(judged, Action(self._motion[rows], self._terminate[rows]))
 
     def stop(self, rows: Array) -> None:
         """See `BatchLeaf.stop`."""
@@ -87,16 +77,13 @@ class ConditionInBatch(BatchLeaf):
 
     def tick(self, rows: Array, fresh: Array) -> Array:
         """See `BatchLeaf.tick`."""
-        order = np.argsort(rows)
-        seen = self._context.seen(rows[order], np.zeros(len(rows)))
+        seen = self._context.seen(rows, np.zeros(len(rows)))
         holds = np.asarray(self._leaf.model.holds(seen))
-        for k, row in enumerate(rows[order].tolist()):
+        for k, row in enumerate(rows.tolist()):
             self._failed.pop(row, None)
             if not holds[k]:
                 self._failed[row] = self._leaf.model.answer(seen, k, False)
-        statuses = np.empty(len(rows), np.int8)
-        statuses[order] = np.where(holds, SUCCESS, FAILURE)
-        return statuses
+        return np.where(holds, SUCCESS, FAILURE).astype(np.int8)
 
     def outcome(self, row: int) -> Outcome | None:
         """The last answer in a world where it was no."""

@@ -1,10 +1,8 @@
-"""Statuses of behaviours as small numbers, for arrays with one status a world."""
+"""Statuses of behaviours as numbers, as a batch has them, and as py_trees has them."""
 
 from __future__ import annotations
 
 from py_trees.common import Status
 
-INVALID, RUNNING, SUCCESS, FAILURE = range(4)
 STATUSES = (Status.INVALID, Status.RUNNING, Status.SUCCESS, Status.FAILURE)
-"""py_trees' own, by number."""
-CODES = {status: code for code, status in enumerate(STATUSES)}
+"""py_trees' statuses, by the numbers of `bt_tasksim.core.batch_leaf`."""

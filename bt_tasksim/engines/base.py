@@ -222,6 +222,11 @@ class PhysicsEngine(Engine):
         return None
 
     @classmethod
+    def has_batches(cls) -> bool:
+        """It has worlds in batches, see `batch`."""
+        return any("batch" in vars(base) for base in cls.__mro__[: cls.__mro__.index(PhysicsEngine)])
+
+    @classmethod
     def batch(cls, robot: RobotDescription, setup: EngineSetup, worlds: int, threads: int) -> PhysicsBatch:
         """Many worlds of a robot at once.
 

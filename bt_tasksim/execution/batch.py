@@ -18,6 +18,7 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.concept.context import Context
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, PENDING, RUNNING, BatchLeaf
 from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.leaf_errors import leaf_error
 from bt_tasksim.execution.world_by_world import Copies, WorldByWorld
@@ -90,8 +91,10 @@ class BatchTree:
         self._resume: dict[int, int] = {}
         self._listeners: dict[int, tuple[int, Callable[[Array], None]]] = {}
         self._at: tuple[int, Array] | None = None
+        self._spoke = np.full(worlds, -1)
         children, self._ends = _shape(tree)
         self.compiled: dict[int, BatchNode | BatchLeaf] = {}
+        self._parent = {below: node for node, under in enumerate(children) for below in under}
         self._compile(children, leaves, Copies(tree, worlds, build, contexts))
         self._may_be_invalid = any(isinstance(c, WorldByWorld) for c in self.compiled.values())
 
@@ -186,6 +189,33 @@ class BatchTree:
                 listener(rows[heard])
         self._status_of[node][rows] = INVALID
 
+    def speaks(self, node: int, rows: Array) -> None:
+        """A node has something to say; for nodes, see `trees.nodes.batch.Batch`."""
+        self._spoke[np.asarray(rows)] = node
+
+    def said(self, row: int) -> tuple[str, Outcome | None]:
+        """Name of the node that spoke last in a world, and what it says; for nodes, too."""
+        number = int(self._spoke[row])
+        if number < 0:
+            return "", None
+        return self.nodes[number].name, self.compiled[number].outcome(row)
+
+    def whole_outcome(self, row: int) -> tuple[Behaviour | None, Outcome | None]:
+        """Of a world in which the tree has ended: the node that made it end so, and why.
+
+        See `bt_tasksim.concept.reporting.whole_outcome`.
+        """
+        number = int(self._spoke[row])
+        if number < 0:
+            return None, None
+        outcome = self.compiled[number].outcome(row)
+        above = self._parent.get(number)
+        while outcome is not None and above is not None:
+            node = self.compiled[above]
+            outcome = node.seen_from_here(row, outcome) if isinstance(node, BatchNode) else outcome
+            above = self._parent.get(above)
+        return self.nodes[number], outcome
+
     def _send(self, event: int, parcel: tuple[Array, ...]) -> None:
         if event in self._inbox:
             self._inbox[event].append(parcel)
@@ -258,6 +288,7 @@ class BatchTree:
             if not len(rows):
                 return
         self._status_of[node][rows] = status
+        self._spoke[np.asarray(rows)] = node
         self._handlers[self._leave[node]](rows, status)
 
     def _compile(

@@ -9,11 +9,10 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Self
 
 from py_trees.common import Status
 
@@ -26,19 +25,23 @@ from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import outcome_of_error
 from bt_tasksim.core.plugins import load_plugin, loaded
 from bt_tasksim.core.workers import Workers
+from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
+from bt_tasksim.execution.result import Result
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.execution.worlds import WORLD_MEMORY, check_memory, most_worlds, why_alone
 from bt_tasksim.scene.configuration import check_seed
 from bt_tasksim.training.evaluation_file import EvaluationFile, KeptEvaluation
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
-
-if TYPE_CHECKING:
-    from bt_tasksim.execution.runner import Runner
-
 
 SHARE = 16
 """Episodes that a member of a fleet takes at a time; a lost one loses the one that it was at."""
 MEMORY = 500_000_000
 """Bytes that an actor of a cluster needs, of which 320 MB were measured (600 MB with camera images)."""
+BATCH = 64
+"""Worlds that run at once, unless somebody says otherwise."""
+SHARES = 8
+"""Episodes for each world of a batch that a member takes at a time: at a share's end its worlds run empty."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,11 @@ class Job:
         options: Which engines.
         policies: Concepts and the policies that their leaves take, whatever the tree itself says.
         plugins: Plugins that the process loads first, by default those of this process.
+        batch: How many worlds are run at once in each process. Outcomes do not depend on it.
+        threads: How many threads step them.
+
+    Raises:
+        InputError: There is no world or thread, or these engines have no worlds in batches.
     """
 
     tree: str
@@ -60,6 +68,26 @@ class Job:
     options: EngineOptions = field(default_factory=EngineOptions)
     policies: tuple[tuple[str, str], ...] = ()
     plugins: tuple[str, ...] = field(default_factory=loaded)
+    batch: int = 1
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        if self.batch < 1 or self.threads < 1:
+            raise InputError(
+                f"a batch has one world and one thread at least, found {self.batch}, {self.threads}"
+            )
+        if self.batch > 1 and (alone := why_alone(self.options)):
+            raise InputError(f"these episodes cannot be run in a batch: {alone}")
+
+
+def usual_batch(options: EngineOptions, processes: int = 1) -> int:
+    """How many worlds a process runs at once where nobody says it: what there is room for, and no more.
+
+    Args:
+        options: The engines; those that have no worlds in batches run one.
+        processes: How many such processes there are on this machine.
+    """
+    return 1 if why_alone(options) else max(1, min(BATCH, most_worlds() // processes))
 
 
 class EvaluationInterrupted(KeyboardInterrupt):  # as KeyboardInterrupt, which it is
@@ -129,8 +157,11 @@ def evaluate(
         check_seed(seed)
     started = time.perf_counter() - (kept.seconds if kept is not None else 0.0)
     versions = identity()  # before anybody edits a file
-    runner = _runner(job)  # errors show here, before any process starts
-    with closing(runner.pipeline):  # what serves one client at a time is free for the next one
+    if cluster is None:
+        check_memory(job.batch * (workers or 1))
+    player = Player(job)  # errors show here, before any process starts
+    runner = player.runner
+    with player:
         engines, perception = result_names(job.options, runner.pipeline)
         subject = _subject(job, runner, stream)
         if kept is not None:
@@ -165,8 +196,9 @@ def evaluate(
                     progress(outcome)
             with terminable():
                 if todo:
-                    with _fleet(job, runner, subject, workers, cluster, len(todo)) as fleet:
-                        for _, outcome in fleet.spread(partial(episodes, stream=stream), todo, SHARE):
+                    with _fleet(job, player, subject, workers, cluster, len(todo)) as fleet:
+                        share = max(SHARE, SHARES * job.batch)
+                        for _, outcome in fleet.spread(partial(play, stream=stream), todo, share):
                             ended(outcome)
             if keep is not None:
                 keep.end(evaluation())
@@ -187,48 +219,93 @@ def evaluate(
 
 
 def _fleet(
-    job: Job, runner: Runner, subject: dict[str, str], workers: int | None, cluster: str | None, most: int
-) -> Fleet[Runner]:
+    job: Job, player: Player, subject: dict[str, str], workers: int | None, cluster: str | None, most: int
+) -> Fleet[Player]:
     """What runs the episodes, of which there are so many."""
-    make = partial(_same_runner, job, subject)
+    make = partial(_same_player, job, subject)
     count = None if workers is None else min(workers, most)
     if cluster is not None:
-        return Cluster(make, cluster, count, MEMORY)
+        return Cluster(make, cluster, count, MEMORY + job.batch * WORLD_MEMORY)
     if count in (None, 1):
-        return Here(runner)
+        return Here(player)
     return Workers(make, count, "spawn")
 
 
-def _same_runner(job: Job, subject: dict[str, str]) -> Runner:
-    """A runner of its own for a member of a fleet, whose files may be others than those of this machine."""
-    runner = _runner(job)
+def _same_player(job: Job, subject: dict[str, str]) -> Player:
+    """A player of its own for a member of a fleet, whose files may be others than those of this machine."""
+    player = Player(job)
     stream = subject["stream of draws"]
-    found = _subject(job, runner, stream)
+    found = _subject(job, player.runner, stream)
     if others := [name for name in subject if found[name] != subject[name]]:
         raise InputError(f"another {' and another '.join(others)} is found there: have the same files there")
-    return runner
+    return player
 
 
-def episodes(
-    runner: Runner, seeds: Sequence[int], stream: str = "evaluation"
-) -> Iterator[tuple[int, EpisodeOutcome]]:
-    """Run a share of an evaluation; every member of a fleet does this.
+class Player:
+    """Plays the episodes of an evaluation: what each member of a fleet keeps.
 
     Args:
-        runner: The runner.
-        seeds: Seeds of the episodes.
-        stream: Stream of draws.
+        job: What to run.
 
-    Yields:
-        Index and outcome of each episode as it ends, whatever the order.
+    Attributes:
+        runner: Runs one world, and knows scene, robot and policies.
 
     Raises:
-        InputError: See `episode`, as for the others.
-        LostEngine: An engine in another process has gone away.
-        MachineError: A robot has failed.
+        InputError: The tree, scene, robot or engines are no good.
     """
-    for index, seed in enumerate(seeds):
-        yield index, episode(runner, seed, stream)
+
+    def __init__(self, job: Job) -> None:
+        from bt_tasksim.trees.load import load_source
+
+        load_all(job.plugins)
+        source = load_source(job.tree, job.robot, job.scene, job.policies, job.options.own_world())
+        self._job, self._build = job, source.build
+        self.runner = Runner(source.build(), source.scene, job.options)
+        self._batch: BatchRunner | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let go of the engines: what serves one client at a time is free for the next one."""
+        self.runner.pipeline.close()
+        if self._batch is not None:
+            self._batch.close()
+
+    def play(self, seeds: Sequence[int], stream: str) -> Iterator[tuple[int, EpisodeOutcome]]:
+        """One episode for each seed, in batches where there can be.
+
+        Args:
+            seeds: Seeds of the episodes.
+            stream: Stream of draws.
+
+        Yields:
+            Index and outcome of each episode as it ends, whatever the order.
+
+        Raises:
+            InputError: Tree or scene are no good.
+            LostEngine: An engine in another process has gone away.
+            MachineError: A robot has failed.
+        """
+        if self._job.batch == 1 or len(seeds) == 1:
+            for index, seed in enumerate(seeds):
+                yield index, episode(self.runner, seed, stream)
+            return
+        if self._batch is None:
+            job, scene = self._job, self.runner.scene
+            worlds = min(job.batch, len(seeds))
+            self._batch = BatchRunner(self._build, scene, job.options, worlds, job.threads)
+        index_of = {seed: index for index, seed in enumerate(seeds)}
+        for seed, found in self._batch.run(seeds, stream):
+            if isinstance(found, InputError):
+                raise found
+            outcome = _unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else _outcome(found)
+            yield index_of[seed], outcome
+
+
+def play(player: Player, seeds: Sequence[int], stream: str) -> Iterator[tuple[int, EpisodeOutcome]]:
+    """A share of an evaluation, see `Player.play`; every member of a fleet does this."""
+    return player.play(seeds, stream)
 
 
 def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOutcome:
@@ -240,21 +317,28 @@ def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOut
         MachineError: A robot has failed.
     """
     started = time.perf_counter()
-    nan = float("nan")
     try:
-        result = runner.run(seed, stream)
+        return _outcome(runner.run(seed, stream))
     except InputError:
         raise
     except BtTasksimError as error:
         if isinstance(error, MachineError) and (isinstance(error, LostEngine) or runner.options.real):
             raise  # an engine that is not there any more, or a robot, says nothing about the tree
-        return EpisodeOutcome(
-            seed, False, Status.INVALID.name, "", outcome_of_error(error), 0, nan, nan, nan,
-            time.perf_counter() - started,
-        )  # fmt: skip
-    v = result.verdict
+        return _unfinished(seed, error, time.perf_counter() - started)
+
+
+def _unfinished(seed: int, error: BtTasksimError, seconds: float) -> EpisodeOutcome:
+    """An episode that an error has ended."""
+    nan = float("nan")
+    outcome = outcome_of_error(error)
+    return EpisodeOutcome(seed, False, Status.INVALID.name, "", outcome, 0, nan, nan, nan, seconds)
+
+
+def _outcome(result: Result) -> EpisodeOutcome:
+    """A result, in short."""
+    v, nan = result.verdict, float("nan")
     return EpisodeOutcome(
-        seed=seed,
+        seed=result.seed,
         success=result.success,
         status=result.status.name,
         leaf=result.leaf,
@@ -265,15 +349,6 @@ def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOut
         penetration=nan if v is None else v.penetration,
         wall_time=result.wall_time,
     )
-
-
-def _runner(job: Job) -> Runner:
-    from bt_tasksim.execution.runner import Runner
-    from bt_tasksim.trees.load import load_source
-
-    load_all(job.plugins)
-    source = load_source(job.tree, job.robot, job.scene, job.policies, job.options.own_world())
-    return Runner(source.build(), source.scene, job.options)
 
 
 def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:

@@ -20,6 +20,7 @@ import array_api_compat.numpy
 import numpy as np
 
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, RUNNING, SUCCESS
+from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array, array_namespace
 
 __all__ = [
@@ -96,6 +97,12 @@ class Batch(Protocol):
     def stop_node(self, node: int, rows: Array) -> None:
         """Stop a node, as py_trees' ``stop(INVALID)``."""
 
+    def speaks(self, node: int, rows: Array) -> None:
+        """A node is the last one, so far, that has something to say on how the tree ends in these worlds."""
+
+    def said(self, row: int) -> tuple[str, Outcome | None]:
+        """Name of the node that spoke last in a world, and what it says."""
+
 
 @dataclass(frozen=True)
 class Place:
@@ -136,6 +143,14 @@ class BatchNode(abc.ABC):
             rows: The worlds.
             status: ``(k,)`` what it ended with.
         """
+
+    def outcome(self, row: int) -> Outcome | None:
+        """How it ended by itself in a world when it was last active; None where a child of it says so."""
+        return None
+
+    def seen_from_here(self, row: int, outcome: Outcome) -> Outcome:
+        """What a failure below comes to here, see `bt_tasksim.concept.reporting.Reporting`."""
+        return outcome
 
     def stopped(self, rows: Array) -> None:  # noqa: B027  # most have nothing to do
         """It is stopped in worlds where it was RUNNING."""

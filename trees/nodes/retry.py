@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.reporting import outcome_of, speaker
 from bt_tasksim.core.outcomes import Outcome, Statement, register_reason
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
@@ -72,11 +73,59 @@ class Retry(Rounds):
         return self._failed(outcome) if self.rounds > 1 else outcome
 
     def _failed(self, why: Statement | None) -> Outcome:
-        before = self.causes[: self.rounds - 1]
-        said = f" (before it: {summary(before)})" if before else ""
-        if self.attempts > 0:
-            return ATTEMPT_FAILED(why, attempt=self.rounds, attempts=self.attempts, before=said)
-        return ENDLESS_ATTEMPT_FAILED(why, attempt=self.rounds, before=said)
+        return attempt_failed(why, self.rounds, self.attempts, self.causes)
+
+
+def attempt_failed(why: Statement | None, attempt: int, attempts: int, causes: Sequence[Cause]) -> Outcome:
+    """The failure of an attempt, with the causes of those before it.
+
+    Args:
+        why: What it says.
+        attempt: Which one, from 1.
+        attempts: How many there may be, or -1.
+        causes: Of all attempts so far, in their order.
+    """
+    before = causes[: attempt - 1]
+    said = f" (before it: {summary(before)})" if before else ""
+    if attempts > 0:
+        return ATTEMPT_FAILED(why, attempt=attempt, attempts=attempts, before=said)
+    return ENDLESS_ATTEMPT_FAILED(why, attempt=attempt, before=said)
+
+
+class BatchRetry(BatchRounds):
+    """`Retry` in many worlds at once.
+
+    Args:
+        place: Where it stands.
+        attempts: How often, or -1.
+    """
+
+    def __init__(self, place: Place, attempts: int) -> None:
+        super().__init__(place, attempts, again_on=FAILURE)
+        self._causes: dict[int, list[Cause]] = {}
+
+    def tick(self, rows: Array) -> None:
+        """On to the child; what was noted of an earlier activation is forgotten."""
+        if self._causes:
+            for row in self.begins(rows).tolist():
+                self._causes.pop(row, None)
+        super().tick(rows)
+
+    def round_ended(self, rows: Array) -> None:
+        """Note why."""
+        for row in rows.tolist():
+            name, outcome = self.batch.said(row)
+            if outcome is not None:
+                cause = outcome.cause
+                found = Cause(name, cause.reason.name, cause.own_sentence)
+                self._causes.setdefault(row, []).append(found)
+
+    def seen_from_here(self, row: int, outcome: Outcome) -> Outcome:
+        """See `Retry.seen_from_here`."""
+        rounds = int(self.rounds[row])
+        if rounds <= 1:
+            return outcome
+        return attempt_failed(outcome, rounds, self.limit, self._causes.get(row, []))
 
 
 def summary(causes: Sequence[Cause]) -> str:
@@ -125,6 +174,6 @@ class RetryUntilSuccessfulKind(NodeKind[Retry]):
         often = "without end" if node.attempts < 0 else f"up to {node.attempts} times"
         return f"{self.label} {often}"
 
-    def compiled(self, node: Retry, place: Place) -> BatchRounds:
+    def compiled(self, node: Retry, place: Place) -> BatchRetry:
         """See `NodeKind.compiled`."""
-        return BatchRounds(place, node.limit, again_on=FAILURE)
+        return BatchRetry(place, node.limit)

@@ -83,6 +83,9 @@ class BatchRounds(BatchNode):
         self.began = self.arrays.full(False, "bool")
         """``(N,)`` the child began in this tick."""
 
+    def round_ended(self, rows: Array) -> None:
+        """A round has ended in these worlds; by default nothing is noted of it."""
+
     def tick(self, rows: Array) -> None:
         """On to the child."""
         self.rounds[self.begins(rows)] = 0
@@ -96,6 +99,7 @@ class BatchRounds(BatchNode):
         if not len(again):
             return
         self.rounds[again] += 1
+        self.round_ended(again)
         (enough,), (again,) = self.split(self.rounds[again] == self.limit, again)
         self.end(enough, self.again_on)
         (wait,), (again,) = self.split(self.began[again], again)

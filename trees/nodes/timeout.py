@@ -14,7 +14,7 @@ from py_trees.common import Status
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import not_set_up
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import TIMED_OUT
+from bt_tasksim.core.outcomes import TIMED_OUT, Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
@@ -130,6 +130,10 @@ class BatchTimeout(PassesOn):
         self.started = self.arrays.full(0.0, "float64")
         """``(N,)`` when the child began."""
 
+    def outcome(self, row: int) -> Outcome:
+        """See `BatchNode.outcome`."""
+        return TIMED_OUT(limit=self.seconds)
+
     def tick(self, rows: Array) -> None:
         """On to the child, unless its time is over."""
         now, running = self.batch.now[rows], self.place.status[rows] == RUNNING
@@ -137,5 +141,6 @@ class BatchTimeout(PassesOn):
         self.started[rows] = self.xp.where(running, self.started[rows], now)
         (late,), (rows,) = self.split(over, rows)
         self.stop_child(0, late)
+        self.batch.speaks(self.place.node, late)
         self.end(late, FAILURE)
         self.tick_child(0, rows)

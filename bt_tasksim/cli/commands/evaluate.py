@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,6 +40,15 @@ def evaluate(
             show_default="1; of a cluster what it has room for",
         ),
     ] = None,
+    batch: Annotated[
+        int | None,
+        typer.Option(
+            parser=arguments.batch,
+            metavar="N",
+            help="Worlds that run at once in each process.",
+            show_default="64, or what memory has room for",
+        ),
+    ] = None,
     cluster: Annotated[
         str | None,
         typer.Option(metavar="A", help="Run on a Ray cluster: local, or its address HOST:PORT."),
@@ -63,7 +73,17 @@ def evaluate(
     check_targets([json_], (tree.tree, tree.scene, tree.robot))
     tree.load_nodes()
     chosen = policies(engines.policy)
-    job = evaluation.Job(tree.tree, tree.scene, tree.robot, engines.options(), chosen)
+    options = engines.options()
+    alone_here = cluster is None and workers in (None, 1)
+    job = evaluation.Job(
+        tree.tree,
+        tree.scene,
+        tree.robot,
+        options,
+        chosen,
+        batch=evaluation.usual_batch(options, workers or 1) if batch is None else batch,
+        threads=os.cpu_count() or 1 if alone_here else 1,
+    )
     keep = None if json_ is None else EvaluationFile(json_)
 
     def tell(found: Evaluation) -> None:

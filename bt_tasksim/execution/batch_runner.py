@@ -1,0 +1,314 @@
+"""Episodes of one tree in many worlds at once: each world takes the next seed when its episode has ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_tasksim.concept.batch_leaves import leaf_in_batch
+from bt_tasksim.concept.context import Context, Refusal
+from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.concept.status import STATUSES
+from bt_tasksim.core.batch_leaf import RUNNING
+from bt_tasksim.core.errors import BtTasksimError, InputError, UnreachableError
+from bt_tasksim.core.outcomes import FAILED, OUT_OF_REACH, TIME_OVER, Outcome
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Hidden, WorldModel
+from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.result import Result
+from bt_tasksim.execution.runner import LONGEST, NOT_JUDGED, SETTLE, Runner
+from bt_tasksim.execution.worlds import Worlds, hidden_of
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.scene import WorldSource
+from bt_tasksim.scene.success import AT_REST, evaluate_success
+
+QUIET = 4
+"""Control periods in a row in which everything is at rest, after which an outcome is judged."""
+IDLE, TICKING, SETTLING = range(3)
+
+
+@dataclass
+class _Episode:
+    """An episode in one of the worlds."""
+
+    seed: int
+    configuration: ActorConfiguration
+    world: WorldModel
+    began: float
+    status: Status = Status.INVALID
+    outcome: Outcome | None = None
+    leaf: str = ""
+    steps: int = 0
+    sim_time: float = 0.0
+
+
+class BatchRunner:
+    """Runs one tree in one scene, in many worlds at once.
+
+    What becomes of a seed does not depend on the others, nor on how many worlds or threads there are: it is
+    what `Runner` makes of it.
+
+    Args:
+        build: Makes the tree.
+        scene: The scene.
+        options: Which engines, see `bt_tasksim.execution.worlds.why_alone`.
+        worlds: How many worlds, N.
+        threads: How many threads step them.
+        longest: Seconds of an episode after which it is stopped.
+
+    Raises:
+        InputError: The tree, the scene or the options do not fit, or there are no worlds or threads.
+    """
+
+    def __init__(
+        self,
+        build: Callable[[], Behaviour],
+        scene: WorldSource,
+        options: EngineOptions | None = None,
+        worlds: int = 64,
+        threads: int = 1,
+        longest: float = LONGEST,
+    ) -> None:
+        if worlds < 1 or threads < 1:
+            raise InputError(f"a batch has one world and one thread at least, found {worlds} and {threads}")
+        self.scene, self.longest, self.options = scene, longest, options or EngineOptions()
+        self._build = build
+        self.robot = load_robot(scene.robot)
+        self.tree = build()
+        self.worlds = Worlds(self.robot, self.options, worlds, threads)
+        self.context = Context(self.robot, worlds)
+        self.context.hidden = self.worlds.hidden
+        for node in self.tree.iterate():
+            node.setup(context=self.context)
+        self.batch = BatchTree(self.tree, worlds, lambda leaf: leaf_in_batch(leaf, self.context))
+        self._episodes: list[_Episode | None] = [None] * worlds
+        self._phase = np.full(worlds, IDLE)
+        self._quiet, self._left = np.zeros(worlds, int), np.zeros(worlds, int)
+        self.control_steps = 0
+        """Control periods of all worlds so far, those included in which things come to rest."""
+
+    @property
+    def policies(self) -> dict[str, str]:
+        """Policy in use by leaf."""
+        leaves = (leaf for leaf in self.tree.iterate() if isinstance(leaf, ConceptNode))
+        return {leaf.name: leaf.policy_in_use.name for leaf in leaves}
+
+    def run(
+        self, seeds: Iterable[int], stream: str = "evaluation"
+    ) -> Iterator[tuple[int, Result | BtTasksimError]]:
+        """One episode for each seed.
+
+        Args:
+            seeds: Seeds of the draws.
+            stream: Stream of draws.
+
+        Yields:
+            A seed and what became of it, in the order in which episodes end; an error where there is no
+            result.
+
+        Raises:
+            InputError: The scene or the tree is no good.
+        """
+        waiting = iter(seeds)
+        try:
+            yield from self._fill(waiting, stream)
+            while (self._phase != IDLE).any():
+                yield from self._period(waiting, stream)
+        finally:
+            self._phase[:] = IDLE
+            self.batch.reset(np.arange(self.context.worlds))
+
+    def close(self) -> None:
+        """Let go of worlds and threads."""
+        self.worlds.close()
+
+    # ---- one control period ------------------------------------------------------------------------------
+
+    def _period(self, waiting: Iterator[int], stream: str) -> Iterator[tuple[int, Result | BtTasksimError]]:
+        """Tick, judge what has come to rest, begin anew there, and let all others go on by one period."""
+        try:
+            self._tick()
+            written = self.context.written
+        except BtTasksimError as error:
+            yield from self._alone(error, stream)
+            yield from self._fill(waiting, stream)
+            return
+        rested = self._rested()
+        yield from self._judged(rested)
+        begun: list[int] = []
+        yield from self._begin(rested, waiting, stream, begun)
+        going = np.setdiff1d(np.flatnonzero(self._phase != IDLE), np.array(begun, int))
+        if len(going):
+            tool, hand = (None if part is None else part[going] for part in (written.tool, written.hand))
+            writers = {row: self.context.tool_writer(row) for row in going.tolist()}
+            unreached = self.worlds.step(tool, hand, going)
+            self.control_steps += len(going)
+            for row in going.tolist():
+                episode = self._episodes[row]
+                if episode is not None and self._phase[row] == TICKING:
+                    episode.steps += 1
+            self._left[going] -= 1
+            yield from self._broken(going)
+            going = going[self._phase[going] != IDLE]
+        else:
+            unreached, writers = [], {}
+        seen = np.union1d(going, np.array(begun, int))
+        if len(seen):
+            self.context.advance(self.worlds.observe(seen), seen)
+        for miss in unreached:
+            if not isinstance(miss.error, UnreachableError):
+                raise miss.error
+            outcome = OUT_OF_REACH(what=miss.error, distance=miss.error.distance, angle=miss.error.angle)
+            self.context.refused[miss.row] = Refusal(writers.get(miss.row), outcome)
+
+    def _tick(self) -> None:
+        """Tick all worlds whose tree has not ended; those whose tree ends now come to rest."""
+        rows = np.flatnonzero(self._phase == TICKING)
+        if not len(rows):
+            return
+        status = self.batch.tick(rows, self.context.times[rows])
+        for k, row in enumerate(rows.tolist()):
+            episode = self._episodes[row]
+            assert episode is not None
+            if status[k] != RUNNING:
+                self._ended(row, episode, STATUSES[int(status[k])])
+            elif episode.steps >= round(self.longest * episode.configuration.control_frequency):
+                self.batch.reset(np.array([row]))
+                episode.outcome = TIME_OVER(limit=self.longest)
+                self._settle(row, episode)
+
+    def _ended(self, row: int, episode: _Episode, status: Status) -> None:
+        episode.status = status
+        if status == Status.FAILURE:
+            node, outcome = self.batch.whole_outcome(row)
+            episode.outcome = outcome or FAILED(text="the tree failed, and no node says why")
+            episode.leaf = "" if node is None else node.name
+        self._settle(row, episode)
+
+    def _settle(self, row: int, episode: _Episode) -> None:
+        episode.sim_time = float(self.context.times[row])
+        self._phase[row], self._quiet[row] = SETTLING, 0
+        self._left[row] = round(SETTLE * episode.configuration.control_frequency)
+
+    def _rested(self) -> Array:
+        """The worlds whose outcome is to be judged now."""
+        rows = np.flatnonzero(self._phase == SETTLING)
+        if not len(rows):
+            return rows
+        velocities = self.worlds.physics.hidden(rows).velocities
+        fast = (np.linalg.norm(velocities[..., :3], axis=-1) >= AT_REST[0] / 2) | (
+            np.linalg.norm(velocities[..., 3:], axis=-1) >= AT_REST[1] / 2
+        )
+        self._quiet[rows] = np.where(fast.any(axis=1), 0, self._quiet[rows] + 1)
+        return rows[(self._quiet[rows] >= QUIET) | (self._left[rows] <= 0)]
+
+    def _judged(self, rows: Array) -> Iterator[tuple[int, Result | BtTasksimError]]:
+        """The results of worlds that have come to rest."""
+        if not len(rows):
+            return
+        hidden = self.worlds.physics.hidden(rows)
+        for k, row in enumerate(rows.tolist()):
+            episode = self._episodes[row]
+            assert episode is not None
+            self._phase[row], self._episodes[row] = IDLE, None
+            yield episode.seed, self._result(episode, hidden, k)
+
+    def _result(self, episode: _Episode, hidden: Hidden, row: int) -> Result:
+        drawn, status = episode.configuration, episode.status
+        state = hidden_of(hidden, row, len(drawn.objects), len(drawn.fixtures))
+        verdict = evaluate_success(drawn, episode.world, state)
+        outcome = verdict.outcome if status == Status.SUCCESS else episode.outcome
+        return Result(
+            status=status,
+            success=status == Status.SUCCESS and verdict.success,
+            outcome=outcome or NOT_JUDGED(),
+            leaf=episode.leaf,
+            verdict=verdict,
+            seed=episode.seed,
+            control_steps=episode.steps,
+            sim_time=episode.sim_time,
+            wall_time=time.perf_counter() - episode.began,
+            policies=self.policies,
+            configuration=drawn,
+        )
+
+    # ---- beginning and breaking off ---------------------------------------------------------------------
+
+    def _fill(self, waiting: Iterator[int], stream: str) -> Iterator[tuple[int, Result | BtTasksimError]]:
+        """Begin in all worlds that are idle, and look."""
+        begun: list[int] = []
+        yield from self._begin(np.flatnonzero(self._phase == IDLE), waiting, stream, begun)
+        if begun:
+            rows = np.array(sorted(begun))
+            self.context.advance(self.worlds.observe(rows), rows)
+
+    def _begin(
+        self, rows: Array, waiting: Iterator[int], stream: str, begun: list[int]
+    ) -> Iterator[tuple[int, Result | BtTasksimError]]:
+        """Begin the next seeds in worlds ``rows``; those that have begun are added to ``begun``."""
+        free = rows.tolist()
+        while free:
+            drawn = [(row, seed) for row, seed in zip(free, waiting)]  # noqa: B905  # seeds may be fewer
+            if not drawn:
+                return
+            worlds = [self.scene.sample(seed, stream) for _, seed in drawn]
+            self._episodes_of(drawn, worlds)
+            taken = np.array([row for row, _ in drawn])
+            failed = self.worlds.reset(taken, worlds)
+            for row, seed in drawn:
+                if row in failed:
+                    self._phase[row], self._episodes[row] = IDLE, None
+                    yield seed, failed[row]
+                else:
+                    begun.append(row)
+            free = [row for row, _ in drawn if row in failed]
+
+    def _episodes_of(self, drawn: Sequence[tuple[int, int]], worlds: Sequence[ActorConfiguration]) -> None:
+        tips = [tip.name for tip in self.robot.tips]
+        models = [world.world_model(tips, self.robot.opening) for world in worlds]
+        rows = np.array([row for row, _ in drawn])
+        self.batch.reset(rows)
+        self.context.begin(models, rows)
+        now = time.perf_counter()
+        for (row, seed), configuration, model in zip(drawn, worlds, models, strict=True):
+            self._episodes[row] = _Episode(seed, configuration, model, now)
+            self._phase[row] = TICKING
+
+    def _broken(self, rows: Array) -> Iterator[tuple[int, Result | BtTasksimError]]:
+        """The worlds that have failed in the last step."""
+        for row, error in self.worlds.errors(rows).items():
+            episode = self._episodes[row]
+            assert episode is not None
+            self.batch.reset(np.array([row]))
+            self._phase[row], self._episodes[row] = IDLE, None
+            yield episode.seed, error
+
+    def _alone(self, error: BtTasksimError, stream: str) -> Iterator[tuple[int, Result | BtTasksimError]]:
+        """A leaf has raised in one of the worlds: all that were under way are run again, one by one.
+
+        Raises:
+            InputError: It was the tree or the scene that is no good.
+        """
+        if isinstance(error, InputError):
+            raise error
+        seeds = [episode.seed for episode in self._episodes if episode is not None]
+        self.batch.reset(np.arange(self.context.worlds))
+        self._phase[:], self._episodes = IDLE, [None] * self.context.worlds
+        runner = Runner(self._build(), self.scene, self.options, longest=self.longest)
+        try:
+            for seed in seeds:
+                try:
+                    yield seed, runner.run(seed, stream)
+                except InputError:
+                    raise
+                except BtTasksimError as found:
+                    yield seed, found
+        finally:
+            runner.pipeline.close()

@@ -1,0 +1,224 @@
+"""The pipeline of a batch: kinematics, physics and post-process of many simulated worlds at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from bt_tasksim.core.available_memory import available_memory
+from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Command, Hidden, Observation
+from bt_tasksim.engines.base import PhysicsEngine, engine_class
+from bt_tasksim.engines.kinematics.batch import BatchKinematics
+from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.engines.perception.noise import noise_model
+from bt_tasksim.engines.perception.state import BatchState
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.configuration import ActorConfiguration
+
+WORLD_MEMORY = 3_000_000
+"""Bytes that a world takes, of which 1.6 to 2.4 million were measured with one object."""
+FIELDS = tuple(field.name for field in fields(Observation))
+
+
+def why_alone(options: EngineOptions) -> str:
+    """Why worlds with these engines run one by one, as the end of a sentence; empty where they need not."""
+    if options.remote or options.safety or options.real_time:
+        return "a robot, a guard, real time and engines in other processes are of one world"
+    if options.perception != "state":
+        return f"perception '{options.perception}' works on pictures, one world at a time"
+    if options.kinematics != "pinocchio":
+        return f"the kinematics engine '{options.kinematics}' has no worlds in batches"
+    physics = engine_class("physics", options.engines)
+    if not issubclass(physics, PhysicsEngine) or not physics.has_batches():
+        return f"the physics engine '{options.engines}' has no worlds in batches"
+    return "a film is of one world" if options.rendering else ""
+
+
+def check_memory(worlds: int) -> None:
+    """Refuse more worlds than this machine has room for.
+
+    Raises:
+        InputError: It has not; says how many fit.
+    """
+    room = most_worlds()
+    if worlds > room:
+        raise InputError(f"a batch of {worlds} worlds does not fit into this machine's memory; {room} do")
+
+
+def most_worlds() -> int:
+    """How many worlds this machine has room for, one at least."""
+    return max(1, int(0.8 * available_memory() / WORLD_MEMORY))
+
+
+@dataclass(frozen=True)
+class Unreached:
+    """A command that could not be carried out, in one world.
+
+    Attributes:
+        row: The world.
+        error: Why.
+    """
+
+    row: int
+    error: BtTasksimError
+
+
+class Worlds:
+    """Worlds of one robot, which begin, go on and fail one by one; see `PhysicsBatch`.
+
+    Args:
+        robot: The robot.
+        options: The engines; see `why_alone` for those that have no batches.
+        count: How many worlds.
+        threads: How many threads step them.
+
+    Raises:
+        InputError: An engine has no worlds in batches, or is none for this robot.
+        MachineError: An engine cannot start.
+    """
+
+    def __init__(self, robot: RobotDescription, options: EngineOptions, count: int, threads: int) -> None:
+        alone = why_alone(options)
+        if alone:
+            raise InputError(f"these worlds cannot be run in a batch: {alone}")
+        check_memory(count)
+        self.count, self._robot = count, robot
+        engine = engine_class("physics", options.engines)
+        assert issubclass(engine, PhysicsEngine), "why_alone has seen to it"
+        self.physics = engine.batch(robot, options.setup("physics"), count, threads)
+        self.kinematics = BatchKinematics.of(robot, count)
+        self._arm = PinocchioKinematics(robot)
+        self._perception = BatchState(robot, count, noise_model(options.noise))
+        self._tool: Array = np.full((count, 7), np.nan)
+        self._hand: Array = np.full((count, 1 + len(robot.synergies)), np.nan)
+        self.observation: Observation | None = None
+        """What was last seen of all worlds ``(N, ...)``."""
+
+    def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> dict[int, BtTasksimError]:
+        """Fresh worlds at these rows ``(k,)``; `observe` comes next.
+
+        Returns:
+            Why some of them could not begin, by row.
+        """
+        failed: dict[int, BtTasksimError] = {}
+        placed = []
+        for row, configuration in zip(rows.tolist(), configurations, strict=True):
+            if configuration.hand_start:
+                try:
+                    joints = self._arm.joints_of_hand_start(configuration.hand_start)
+                except BtTasksimError as error:
+                    failed[row], joints = error, ()
+                configuration = replace(configuration, joint_position=joints)
+            placed.append(configuration)
+        self.physics.reset(rows, placed)
+        self.kinematics.reset(rows, placed)
+        self._perception.reset(rows, placed)
+        self._tool[rows], self._hand[rows] = np.nan, np.nan
+        return failed | self.errors(rows)
+
+    def errors(self, rows: Array) -> dict[int, BtTasksimError]:
+        """Why worlds have failed, by row."""
+        found = ((row, self.physics.errors[row]) for row in rows.tolist())
+        return {row: error for row, error in found if error is not None}
+
+    def observe(self, rows: Array) -> Observation:
+        """What is seen now: of worlds ``rows (k,)`` anew, of the others as it was."""
+        seen = self._perception.observe(self.physics.state(rows), rows if len(rows) < self.count else None)
+        before = self.observation
+        if before is not None and len(rows) < self.count:
+            seen = _merged(before, rows, seen)
+        self.observation = seen
+        return seen
+
+    def step(self, tool: Array | None, hand: Array | None, rows: Array) -> list[Unreached]:
+        """One control period in worlds ``rows (k,)``.
+
+        Args:
+            tool: Tool targets ``(k, 7)``; rows of NaN, or None, keep their last ones.
+            hand: Hand targets ``(k, 1 + n_synergies)``, likewise; synergies that are lacking are 0.
+            rows: Which worlds.
+
+        Returns:
+            The worlds whose targets are out of reach: there the last ones were followed.
+        """
+        asked_tool, asked_hand = self._tool[rows], self._hand[rows]
+        if tool is not None:
+            asked_tool = np.where(np.isnan(tool), asked_tool, tool)
+        if hand is not None:
+            asked_hand = _hands(asked_hand, hand)
+        state = self.physics.state(rows)
+        target, failures = self.kinematics.solve(Command(asked_tool, asked_hand), state, rows)
+        unreached: list[Unreached] = []
+        if failures:
+            failed = np.flatnonzero(failures.mask)
+            for k in failed.tolist():
+                error = failures.error(k)
+                assert error is not None
+                unreached.append(Unreached(int(rows[k]), error))
+            asked_tool[failed], asked_hand[failed] = self._tool[rows[failed]], self._hand[rows[failed]]
+            state = self.physics.state(rows[failed])
+            kept = Command(asked_tool[failed], asked_hand[failed])
+            again, _ = self.kinematics.solve(kept, state, rows[failed])
+            position, velocity = target.position.copy(), target.velocity.copy()
+            position[failed], velocity[failed] = again.position, again.velocity
+            target = replace(target, position=position, velocity=velocity)
+        self._tool[rows], self._hand[rows] = asked_tool, asked_hand
+        self.physics.step(target, rows)
+        return unreached
+
+    def hidden(self) -> Hidden:
+        """What only a simulator knows of all worlds ``(N, ...)``."""
+        return self.physics.hidden(np.arange(self.count))
+
+    def close(self) -> None:
+        """Let go of worlds and threads."""
+        self.physics.close()
+
+
+def _hands(last: Array, hand: Array) -> Array:
+    """Hand targets ``(k, 1 + n_synergies)`` with those that are asked anew, which may lack synergies."""
+    out, given = last.copy(), ~np.isnan(hand[:, 0])
+    out[given, : hand.shape[1]] = hand[given]
+    out[given] = np.where(np.isnan(out[given]), 0.0, out[given])
+    return out
+
+
+def _merged(before: Observation, rows: Array, seen: Observation) -> Observation:
+    """Observations of all worlds, with some of them seen anew."""
+    out = {}
+    for name in FIELDS:
+        old, new = getattr(before, name), getattr(seen, name)
+        if old.shape[1:] != new.shape[1:]:
+            raise InputError("the worlds of a batch should hold equally many objects")
+        merged = old.copy()
+        merged[rows] = new
+        out[name] = merged
+    return Observation(**out)
+
+
+def hidden_of(hidden: Hidden, row: int, objects: int, fixtures: int) -> Hidden:
+    """The hidden state of one world of a batch, without what other worlds have more.
+
+    Args:
+        hidden: Of all worlds ``(N, ...)``.
+        row: Which world.
+        objects: How many objects it has.
+        fixtures: How many fixtures it has.
+    """
+    most = hidden.objects.shape[1]
+    columns = [*range(objects), *range(most, most + fixtures)]
+    return Hidden(
+        time=hidden.time[row],
+        objects=hidden.objects[row, :objects],
+        velocities=hidden.velocities[row, :objects],
+        hand_force=hidden.hand_force[row, :objects],
+        hand_distance=hidden.hand_distance[row, :objects],
+        support=hidden.support[row, :objects][:, columns],
+        penetration=hidden.penetration[row],
+        tool_pose=hidden.tool_pose[row],
+    )
