@@ -29,7 +29,9 @@ N = 36
 
 def place(name, at, access, kind="board"):
     exit = np.array([0.0, 0.0, 1.0]) if kind == "bin" else np.array([-1.0, 0.0, 0.0])
-    return PlaceModel(name, kind, poses.pose(at), (0.5, 0.6), (0.0, 0.0), 0.35, np.array(access), exit, "f", 0.3)
+    return PlaceModel(
+        name, kind, poses.pose(at), (0.5, 0.6), (0.0, 0.0), 0.35, np.array(access), exit, "f", 0.3
+    )
 
 
 PLACES = {
@@ -42,7 +44,9 @@ SETS = (("table",), ("shelf", "table"), (), ("bin", "table", "shelf"))
 
 def world(k):
     kind = KINDS[k % len(KINDS)]
-    size = (0.06, 0.06, 0.06) if kind == "cube" else (0.05, 0.05 if kind in ("cylinder", "cup") else 0.07, 0.1)
+    size = (
+        (0.06, 0.06, 0.06) if kind == "cube" else (0.05, 0.05 if kind in ("cylinder", "cup") else 0.07, 0.1)
+    )
     if k % 11 == 10:  # too wide for the hand in every way
         size = (0.12, 0.12, 0.12)
     model = object_model("thing", kind, ShapeSize(size, (1.0, 1.0), None))
@@ -133,7 +137,9 @@ def test_a_grasp_is_at_the_object_and_the_tool_comes_as_its_place_says(seen_of):
     expected = np.where(stands.found[:, None], stands.place.access, [0.0, 0.0, -1.0])
     assert np.allclose(poses.z_axis(goal[:, 3:]), expected, atol=1e-9)
     assert 3 < stands.found.sum() < N
-    assert (poses.norm(np.cross(goal[:, :3] - thing[:, :3], expected)) < 1e-9).all(), "straight along the approach"
+    assert (poses.norm(np.cross(goal[:, :3] - thing[:, :3], expected)) < 1e-9).all(), (
+        "straight along the approach"
+    )
 
 
 def test_where_no_world_has_a_place_nothing_stands_on_one(seen_of):

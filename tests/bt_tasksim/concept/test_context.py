@@ -249,7 +249,10 @@ def test_a_target_without_a_row_for_each_of_its_worlds_is_refused(three, command
 @pytest.mark.parametrize("first", [0, 1])
 def test_a_hand_with_synergies_in_one_world_and_without_in_another(three, first):
     context, a, b = three
-    writes = [(Command(hand=np.array([[0.5]])), rows(0), a), (Command(hand=np.array([[0.6, 0.2]])), rows(1), b)]
+    writes = [
+        (Command(hand=np.array([[0.5]])), rows(0), a),
+        (Command(hand=np.array([[0.6, 0.2]])), rows(1), b),
+    ]
     for write in (writes[first], writes[1 - first]):
         context.write(*write)
     found = context.written
