@@ -155,7 +155,11 @@ class Context:
 
     def tool_writer(self, world: int = 0) -> Behaviour | None:
         """The leaf that has commanded the tool in this tick, in one world."""
-        return self._parts["tool"].writer(world)
+        return self.writer_of("tool", world)
+
+    def writer_of(self, part: str, world: int = 0) -> Behaviour | None:
+        """The leaf that has written a part of the command, ``tool`` or ``hand``, in this tick."""
+        return self._parts[part].writer(world)
 
     def withdraw(self, leaf: Behaviour, rows: Array) -> None:
         """Drop what a leaf has written in this tick: it was interrupted, and others may act instead."""
@@ -310,4 +314,10 @@ def _conflict(part: str, first: Behaviour, second: Behaviour) -> CommandConflict
 def one_world(bundle: _T) -> _T:
     """An observation, or a hidden state, of a single world, which has no axis of worlds, with one."""
     found: _T = Rows(bundle, lambda values: np.asarray(values)[None])  # type: ignore[assignment]
+    return found
+
+
+def only_world(bundle: _T, world: int) -> _T:
+    """One world of an observation ``(N, ...)``, or of a hidden state, as that of a batch of one."""
+    found: _T = Rows(bundle, lambda values: values[world : world + 1])  # type: ignore[assignment]
     return found
