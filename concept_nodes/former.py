@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.concept import model
 from bt_tasksim.concept.functions import MemoryT
+from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import holding as held
 from bt_tasksim.core.bundles import mapped
@@ -51,7 +51,7 @@ def _worlds(seen: Seen) -> list[OneWorld]:
     return [OneWorld(seen.at(np.array([k]))) for k in range(seen.tool.shape[0])]
 
 
-class ConceptModel(model.ConceptModel[MemoryT]):
+class OneWorldConcept(ConceptModel[MemoryT]):
     """A concept whose own `initial_state`, `begin` and `explain` are asked in one world after the other."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
