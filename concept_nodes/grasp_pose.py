@@ -152,6 +152,8 @@ def _closing_axes(
         _across_anything(pose, approach),
     )
     none = ~xp.any(counts, axis=1)[:, None]
+    # Those that do not count may lie along the approach, across which nothing can be said of them.
+    axes = xp.where(counts[..., None], axes, otherwise[:, None])
     return (
         xp.concat([axes, otherwise[:, None, :]], axis=1),
         xp.concat([rank, 0.0 * one], axis=1),

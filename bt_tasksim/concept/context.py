@@ -244,6 +244,8 @@ class _Part:
             if self._values is None:
                 xp, shape = array_namespace(values), (self._worlds, values.shape[-1])
                 self._values = xp.full(shape, np.nan, dtype=values.dtype, device=values.device)
+            width = max(self._values.shape[-1], values.shape[-1])
+            self._values, values = _widened(self._values, width), _widened(values, width)
             self._values[rows] = values
         if leaf not in self._leaves:
             self._leaves.append(leaf)
@@ -284,6 +286,16 @@ class _Part:
         raise LeafError(
             f"leaf '{leaf.name}'{where} commands {self._name}={shown(repr(values))}: {WANTED[self._name]}"
         )
+
+
+def _widened(values: Array, width: int) -> Array:
+    """Targets ``(k, n)`` with so many numbers: a hand target without synergies has them at zero."""
+    missing = width - values.shape[-1]
+    if not missing:
+        return values
+    xp = array_namespace(values)
+    nothing = xp.zeros((values.shape[0], missing), dtype=values.dtype, device=values.device)
+    return xp.concat([values, nothing], axis=-1)
 
 
 WANTED = {

@@ -224,7 +224,7 @@ class BatchRunner:
     def _ended(self, row: int, episode: _Episode, status: Status) -> None:
         episode.status = status
         if status == Status.FAILURE:
-            node, outcome = self.batch.whole_outcome(row)
+            node, outcome = self.batch.speaker(row), self.batch.outcome(row)
             episode.outcome = outcome or FAILED(text="the tree failed, and no node says why")
             episode.leaf = "" if node is None else node.name
         self._settle(row, episode)

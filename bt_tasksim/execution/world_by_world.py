@@ -73,9 +73,9 @@ class WorldByWorld(BatchLeaf):
             self.copies[row].stop(Status.INVALID)
 
     def outcome(self, row: int) -> Outcome | None:
-        """See `BatchLeaf.outcome`: what the one says of the nodes of a world that made it end so."""
-        said = speaker(self.copies[row])
-        return None if said is None else outcome_of(said)
+        """See `BatchLeaf.outcome`: what the node says that was decided last."""
+        found = speaker(self.copies[row])
+        return None if found is None else outcome_of(found)
 
     def _go_on(self, row: int, ticks: Generator[Behaviour | Decision, None, None]) -> int:
         for said in ticks:

@@ -83,14 +83,20 @@ class BatchRounds(BatchNode):
         self.began = self.arrays.full(False, "bool")
         """``(N,)`` the child began in this tick."""
 
-    def round_ended(self, rows: Array) -> None:
-        """A round has ended in these worlds; by default nothing is noted of it."""
-
     def tick(self, rows: Array) -> None:
         """On to the child."""
-        self.rounds[self.begins(rows)] = 0
+        begins = self.begins(rows)
+        if len(begins):
+            self.rounds[begins] = 0
+            self.count_anew(begins)
         self.began[rows] = self.place.child_status[0][rows] != RUNNING
         self.tick_child(0, rows)
+
+    def count_anew(self, rows: Array) -> None:  # a repeat remembers nothing
+        """It begins in worlds."""
+
+    def round_ended(self, rows: Array) -> None:
+        """A round has ended in worlds, and is counted."""
 
     def after(self, child: int, rows: Array, status: Array) -> None:
         """Back, or to the child anew."""
