@@ -116,14 +116,16 @@ FORMER: Mapping[str, str] = {
 """Modules of version 0.1 and what they became, both without ``bt_tasksim.``; where one was cut up, a name is
 looked for beside it, too, and then everywhere."""
 
-ONE_WORLD: Mapping[str, tuple[str, ...]] = {
-    "bt_tasksim": ("ConceptModel",),
-    "bt_tasksim.concept": ("ConceptModel",),
-    "bt_tasksim.motion": ("plan",),
-    "concept_nodes.holding": ("holding", "not_held"),
-    "bt_tasksim.concept_nodes.holding": ("holding", "not_held"),
+_HELD = {"holding": "holding", "not_held": "not_held"}
+ONE_WORLD: Mapping[str, Mapping[str, str]] = {
+    "bt_tasksim": {"ConceptModel": "OneWorldConcept"},
+    "bt_tasksim.concept": {"ConceptModel": "OneWorldConcept"},
+    "bt_tasksim.motion": {"plan": "plan"},
+    "concept_nodes.holding": _HELD,
+    "bt_tasksim.concept_nodes.holding": _HELD,
 }
-"""What concepts of version 0.1 call in functions that they wrote for one world, by the module of then."""
+"""What concepts of version 0.1 are and call where they were written for one world, by the module of then, and
+its name today."""
 ONE_WORLD_HOME = "concept_nodes.former"
 """Where it is."""
 
@@ -203,8 +205,8 @@ def _from(node: ast.ImportFrom, where: str, unknown: list[str], former: bool) ->
     homes: dict[str, list[str]] = {}
     for alias in node.names:
         home, name = _home(node.module, alias.name)
-        if former and name in ONE_WORLD.get(node.module, ()):
-            home = ONE_WORLD_HOME
+        if former and name in (today := ONE_WORLD.get(node.module, {})):
+            home, name = ONE_WORLD_HOME, today[name]
         if home is None:
             unknown.append(f"{where}: nothing of today defines '{alias.name}' of '{node.module}'")
             home = _moved(node.module) or node.module
