@@ -27,7 +27,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim import trees
-from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.condition import Condition, ConditionNode
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.reporting import speaker, whole_outcome
 from bt_tasksim.core.batch_leaf import FAILURE, PENDING, RUNNING, SUCCESS, BatchLeaf
@@ -165,7 +165,7 @@ def _shape(rng: np.random.Generator, depth: int, budget: list[int]) -> Any:
     return (str(rng.choice(COMPOSITES)), children)
 
 
-class Leaf(Condition):
+class Leaf(ConditionNode):
     """A leaf that answers by a script and writes down what happens to it; py_trees' form."""
 
     def __init__(self) -> None:
@@ -176,10 +176,6 @@ class Leaf(Condition):
 
     def setup(self, **kwargs: Any) -> None:
         """Nothing."""
-
-    def holds(self, seen: Any) -> Any:
-        """Not asked."""
-        raise NotImplementedError
 
     def initialise(self) -> None:
         """Write it down."""
@@ -199,6 +195,16 @@ class Leaf(Condition):
             self.log.append(f"{type(self).__name__} halted")
 
 
+class Question(Condition):
+    """What such a leaf is a leaf of."""
+
+    leaf_base = Leaf
+
+    def holds(self, seen: Any) -> Any:
+        """Not asked."""
+        raise NotImplementedError
+
+
 def said(answer: int, asked: int) -> Outcome | None:
     """What a leaf says about its so-manieth answer."""
     if answer == RUNNING:
@@ -207,9 +213,9 @@ def said(answer: int, asked: int) -> Outcome | None:
 
 
 @functools.cache
-def leaf_class(number: int) -> type[Leaf]:
+def question(number: int) -> type[Question]:
     """The class of a leaf, by its number from left to right: its name is its name in XML."""
-    return type(f"L{number}", (Leaf,), {"__doc__": "A leaf of its own."})
+    return type(f"L{number}", (Question,), {"__doc__": "A leaf of its own."})
 
 
 def build(shape: Any) -> Behaviour:
@@ -220,7 +226,7 @@ def build(shape: Any) -> Behaviour:
         kind, *rest = part
         if kind == "leaf":
             count[0] += 1
-            return leaf_class(count[0] - 1)()
+            return question(count[0] - 1)()
         if kind in ("retry", "repeat", "timeout"):
             return getattr(trees, kind)(rest[0], node(rest[1]))
         if kind == "parallel":
@@ -251,9 +257,9 @@ def by_py_trees(case: Case) -> Trace:
             log.clear()
             if anew:
                 tree.stop(Status.INVALID)
-                context.now = 0.0
+                context.times = np.zeros(1)
             tree.tick_once()
-            context.now += PERIOD
+            context.times = context.times + PERIOD
             why = whole_outcome(found) if tree.status == Status.FAILURE and (found := speaker(tree)) else None
             ticks.append((list(log), [CODES[n.status] for n in nodes], why))
         out.append(ticks)
@@ -376,7 +382,7 @@ def by_executor(
             tree.reset(rows_of(anew))
             now[anew] = 0.0
             for world in free:
-                contexts[world].now = now[world]
+                contexts[world].times = now[[world]]
             took(free, tree.tick(rows_of(free), batch_xp.asarray(now[free])))
         stand = np.flatnonzero(waits)
         stand = rng.permutation(stand[rng.random(len(stand)) < rng.choice([0.5, 1.0])])

@@ -189,7 +189,9 @@ class SweepLeaf(ConceptNode):
         lasts: Seconds.
     """
 
-    trouble = property(lambda self: self.model.trouble, lambda self, call: setattr(self.model, "trouble", call))
+    trouble = property(
+        lambda self: self.model.trouble, lambda self, call: setattr(self.model, "trouble", call)
+    )
     lasts = property(lambda self: self.model.lasts, lambda self, lasts: setattr(self.model, "lasts", lasts))
 
     def __init__(self, **settings: Any) -> None:
