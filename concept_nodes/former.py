@@ -17,7 +17,7 @@ from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import holding as held
 from bt_tasksim.core.bundles import mapped
-from bt_tasksim.core.facts import Facts
+from bt_tasksim.core.facts import FactArrays
 from bt_tasksim.core.outcomes import PRECONDITION_UNMET, TEXT, Possible, Statement
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.planning import reference_motion
@@ -42,7 +42,7 @@ class OneWorld:
 
 
 def _without(value: Any) -> Any:
-    if isinstance(value, Facts):
+    if isinstance(value, FactArrays):
         return value.map(lambda values: np.asarray(values)[0])
     return np.asarray(value)[0] if getattr(value, "ndim", 0) else value
 

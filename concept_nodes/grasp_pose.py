@@ -153,7 +153,7 @@ def _closing_axes(
     )
     none = ~xp.any(counts, axis=1)[:, None]
     # Those that do not count may lie along the approach, across which nothing can be said of them.
-    axes = xp.where(counts[..., None], axes, otherwise[:, None])
+    axes = xp.where(counts[..., None], axes, otherwise[:, None, :])
     return (
         xp.concat([axes, otherwise[:, None, :]], axis=1),
         xp.concat([rank, 0.0 * one], axis=1),

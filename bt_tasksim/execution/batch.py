@@ -25,7 +25,7 @@ from bt_tasksim.execution.leaf_errors import leaf_error
 from bt_tasksim.execution.world_by_world import Copies, WorldByWorld
 from bt_tasksim.trees.check import check_tree
 from bt_tasksim.trees.nodes.base import NodeKind
-from bt_tasksim.trees.nodes.batch import Arrays, BatchNode, Place
+from bt_tasksim.trees.nodes.batch import Arrays, BatchNode, NodePlace
 from bt_tasksim.trees.nodes.subtree import SubTree
 from bt_tasksim.trees.nodes.subtree import compiled as compiled_subtree
 from bt_tasksim.trees.vocabulary import node_kinds
@@ -314,7 +314,7 @@ class BatchTree:
     def _known(self, node: int, children: tuple[int, ...], kinds: list[NodeKind[Any]]) -> BatchNode | None:
         behaviour = self.nodes[node]
         below = tuple(self._status_of[c] for c in children)
-        place = Place(self, node, self._status_of[node], children, below)
+        place = NodePlace(self, node, self._status_of[node], children, below)
         if type(behaviour) is SubTree:
             return compiled_subtree(behaviour, place)
         kind = next((kind for kind in kinds if kind.describes(behaviour)), None)

@@ -24,7 +24,7 @@ from bt_tasksim.core.outcomes import TEXT, Outcome, Statement
 from bt_tasksim.core.poses import Array, array_namespace
 
 __all__ = [
-    "FAILURE", "INVALID", "RUNNING", "SUCCESS", "Arrays", "Batch", "BatchNode", "PassesOn", "Place",
+    "FAILURE", "INVALID", "RUNNING", "SUCCESS", "Arrays", "Batch", "BatchNode", "PassesOn", "NodePlace",
 ]  # fmt: skip
 
 
@@ -122,7 +122,7 @@ class Reasons(Protocol):
 
 
 @dataclass(frozen=True)
-class Place:
+class NodePlace:
     """Where a node stands in a batch.
 
     Attributes:
@@ -143,7 +143,7 @@ class Place:
 class BatchNode(abc.ABC):
     """A control node or decorator in all worlds of a batch. Worlds are rows ``(k,)`` of different numbers."""
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: NodePlace) -> None:
         self.place, self.batch, self.arrays = place, place.batch, place.batch.arrays
         self.xp = self.arrays.xp
 
@@ -235,7 +235,7 @@ class PassesOn(BatchNode):
     """
 
     def __init__(
-        self, place: Place, instead: dict[int, int] | None = None, words: dict[int, str] | None = None
+        self, place: NodePlace, instead: dict[int, int] | None = None, words: dict[int, str] | None = None
     ) -> None:
         super().__init__(place)
         self.instead, self.words = instead or {}, words or {}

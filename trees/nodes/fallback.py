@@ -10,7 +10,7 @@ from py_trees.composites import Selector
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, SUCCESS, BatchNode, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, SUCCESS, BatchNode, NodePlace
 
 
 def fallback(name: str, *children: Behaviour) -> Selector:
@@ -40,7 +40,7 @@ class FallbackKind(NodeKind[Selector]):
         """See `NodeKind.make`."""
         return fallback(name, *children)
 
-    def compiled(self, node: Selector, place: Place) -> BatchSelector:
+    def compiled(self, node: Selector, place: NodePlace) -> BatchSelector:
         """See `NodeKind.compiled`."""
         return BatchSelector(place, memory=True)
 
@@ -53,7 +53,7 @@ class BatchSelector(BatchNode):
         memory: Whether it goes on where it stood.
     """
 
-    def __init__(self, place: Place, memory: bool) -> None:
+    def __init__(self, place: NodePlace, memory: bool) -> None:
         super().__init__(place)
         self.memory, self.last = memory, len(place.children) - 1
         self.stands_at = self.arrays.indices(len(place.children))

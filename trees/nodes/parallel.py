@@ -15,7 +15,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, SUCCESS, BatchNode, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, SUCCESS, BatchNode, NodePlace
 from bt_tasksim.trees.nodes.pass_through import said_below
 
 CHILDREN_FAILED = register_reason(
@@ -151,7 +151,7 @@ class ParallelKind(NodeKind[Parallel]):
             text += f", {_of(node.failure_count, total)} failed ends it"
         return text
 
-    def compiled(self, node: Parallel, place: Place) -> BatchParallel:
+    def compiled(self, node: Parallel, place: NodePlace) -> BatchParallel:
         """See `NodeKind.compiled`."""
         return BatchParallel(place, *node.counts())
 
@@ -165,7 +165,7 @@ class BatchParallel(BatchNode):
         allowed: Failures with which it fails.
     """
 
-    def __init__(self, place: Place, needed: int, allowed: int) -> None:
+    def __init__(self, place: NodePlace, needed: int, allowed: int) -> None:
         super().__init__(place)
         self.needed, self.allowed, self.total = needed, allowed, len(place.children)
         self.finished = self.arrays.full(False, "bool", self.total)

@@ -11,7 +11,7 @@ from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, NodePlace
 from bt_tasksim.trees.nodes.rounds import BatchRounds, Rounds
 
 ROUND_OF = Form("round {round} of {rounds} done", {"round": COUNT, "rounds": COUNT})
@@ -80,7 +80,7 @@ class RepeatKind(NodeKind[Repeat]):
         often = "without end" if node.times < 0 else f"{node.times} times"
         return f"{self.label} {often}"
 
-    def compiled(self, node: Repeat, place: Place) -> BatchRepeat:
+    def compiled(self, node: Repeat, place: NodePlace) -> BatchRepeat:
         """See `NodeKind.compiled`."""
         return BatchRepeat(place, node.limit, again_on=SUCCESS)
 

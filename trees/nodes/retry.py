@@ -15,7 +15,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, NodePlace
 from bt_tasksim.trees.nodes.pass_through import said_below
 from bt_tasksim.trees.nodes.rounds import BatchRounds, Rounds
 
@@ -136,7 +136,7 @@ class RetryUntilSuccessfulKind(NodeKind[Retry]):
         often = "without end" if node.attempts < 0 else f"up to {node.attempts} times"
         return f"{self.label} {often}"
 
-    def compiled(self, node: Retry, place: Place) -> BatchRetry:
+    def compiled(self, node: Retry, place: NodePlace) -> BatchRetry:
         """See `NodeKind.compiled`."""
         return BatchRetry(place, node.limit, again_on=FAILURE)
 
@@ -144,7 +144,7 @@ class RetryUntilSuccessfulKind(NodeKind[Retry]):
 class BatchRetry(BatchRounds):
     """`Retry` in many worlds at once; why attempts failed is kept world by world."""
 
-    def __init__(self, place: Place, limit: int, again_on: int) -> None:
+    def __init__(self, place: NodePlace, limit: int, again_on: int) -> None:
         super().__init__(place, limit, again_on)
         self._causes: dict[int, list[Cause]] = {}
         self._why: dict[int, Statement | None] = {}

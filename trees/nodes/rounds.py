@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.trees.nodes.batch import RUNNING, BatchNode, Place
+from bt_tasksim.trees.nodes.batch import RUNNING, BatchNode, NodePlace
 from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick, said_below
 
 
@@ -75,7 +75,7 @@ class BatchRounds(BatchNode):
         again_on: The status after which another round begins.
     """
 
-    def __init__(self, place: Place, limit: int, again_on: int) -> None:
+    def __init__(self, place: NodePlace, limit: int, again_on: int) -> None:
         super().__init__(place)
         self.limit, self.again_on = limit, again_on
         self.rounds = self.arrays.full(0, "int64")

@@ -10,7 +10,7 @@ from py_trees.composites import Sequence
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
-from bt_tasksim.trees.nodes.batch import INVALID, SUCCESS, BatchNode, Place
+from bt_tasksim.trees.nodes.batch import INVALID, SUCCESS, BatchNode, NodePlace
 
 
 def sequence(name: str, *children: Behaviour) -> Sequence:
@@ -40,7 +40,7 @@ class SequenceKind(NodeKind[Sequence]):
         """See `NodeKind.make`."""
         return sequence(name, *children)
 
-    def compiled(self, node: Sequence, place: Place) -> BatchSequence:
+    def compiled(self, node: Sequence, place: NodePlace) -> BatchSequence:
         """See `NodeKind.compiled`."""
         return BatchSequence(place, memory=True)
 
@@ -53,7 +53,7 @@ class BatchSequence(BatchNode):
         memory: Whether it goes on where it stood.
     """
 
-    def __init__(self, place: Place, memory: bool) -> None:
+    def __init__(self, place: NodePlace, memory: bool) -> None:
         super().__init__(place)
         self.memory, self.last = memory, len(place.children) - 1
         self.stands_at = self.arrays.indices(len(place.children))

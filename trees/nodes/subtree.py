@@ -7,7 +7,7 @@ from py_trees.common import Status
 
 from bt_tasksim.core.outcomes import Statement
 from bt_tasksim.trees.nodes.base import free_children
-from bt_tasksim.trees.nodes.batch import PassesOn, Place
+from bt_tasksim.trees.nodes.batch import NodePlace, PassesOn
 from bt_tasksim.trees.nodes.pass_through import PassThrough, said_by
 
 
@@ -29,7 +29,7 @@ def subtree(name: str, root: Behaviour) -> SubTree:
     return SubTree(name, free_children(name, (root,))[0])
 
 
-def compiled(node: SubTree, place: Place) -> BatchSubTree:
+def compiled(node: SubTree, place: NodePlace) -> BatchSubTree:
     """See `NodeKind.compiled`: a subtree is no kind of node, since its form in XML is another."""
     return BatchSubTree(place)
 

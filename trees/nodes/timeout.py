@@ -18,7 +18,7 @@ from bt_tasksim.core.outcomes import TIMED_OUT, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, PassesOn, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, NodePlace, PassesOn
 from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick, said_below
 
 SLACK = 1e-9
@@ -111,7 +111,7 @@ class TimeoutKind(NodeKind[Timeout]):
         """See `NodeKind.describe`."""
         return f"{self.label} {node.seconds:g} s"
 
-    def compiled(self, node: Timeout, place: Place) -> BatchTimeout:
+    def compiled(self, node: Timeout, place: NodePlace) -> BatchTimeout:
         """See `NodeKind.compiled`."""
         return BatchTimeout(place, node.seconds)
 
@@ -124,7 +124,7 @@ class BatchTimeout(PassesOn):
         seconds: The child's time.
     """
 
-    def __init__(self, place: Place, seconds: float) -> None:
+    def __init__(self, place: NodePlace, seconds: float) -> None:
         super().__init__(place)
         self.seconds = seconds
         self.started = self.arrays.full(0.0, "float64")
