@@ -5,7 +5,7 @@ bt-tasksim evaluate examples/maniskill/stack_cube.py --engines maniskill:StackCu
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place, Release
+from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place, Release, Wait
 from bt_tasksim.trees import sequence
 
 
@@ -18,4 +18,5 @@ def build() -> Behaviour:
         Bring("cubeA", to="cubeB", hover=0.03),
         Place("cubeA", on="cubeB"),
         Release("cubeA", retreat=0.05),
+        Wait(0.5),  # a cube that was let go of rocks a little
     )

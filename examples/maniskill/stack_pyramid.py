@@ -5,7 +5,7 @@ bt-tasksim evaluate examples/maniskill/stack_pyramid.py --engines maniskill:Stac
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place, Release
+from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place, Release, Wait
 from bt_tasksim.trees import sequence
 
 
@@ -23,4 +23,4 @@ def put(cube: str, place: str) -> Behaviour:
 
 def build() -> Behaviour:
     """The tree."""
-    return sequence("stack pyramid", put("cubeA", "beside"), put("cubeC", "top"))
+    return sequence("stack pyramid", put("cubeA", "beside"), put("cubeC", "top"), Wait(0.5))

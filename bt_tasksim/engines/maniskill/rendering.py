@@ -60,7 +60,7 @@ class ManiSkillRendering(RenderingEngine):
         camera = ALIASES.get(camera, camera)
         if (camera, size) not in self._cameras:
             model, frame = self._model(camera, size)
-            self._cameras[camera, size] = SceneCamera(self._scene, model, frame)
+            self._cameras[camera, size] = SceneCamera(self._scene, model, frame, "minimal")
         self._scene.update_render()
         return self._cameras[camera, size].take(depth)
 

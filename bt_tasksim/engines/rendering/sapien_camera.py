@@ -24,13 +24,16 @@ class SceneCamera:
         scene: SAPIEN's scene.
         model: The camera.
         frame: Pose ``(7,)`` in the scene of the frame in which the camera has its own.
+        shader: Name of SAPIEN's shaders, ``default`` or ``minimal``; ManiSkill's scenes are lit for these.
     """
 
-    def __init__(self, scene: Any, model: CameraModel, frame: Array | None = None) -> None:
+    def __init__(
+        self, scene: Any, model: CameraModel, frame: Array | None = None, shader: str = "default"
+    ) -> None:
         import sapien
 
-        self.model, self._scene = model, scene
-        sapien.render.set_camera_shader_dir("default")  # ManiSkill leaves one that draws no positions
+        self.model, self._scene, self._minimal = model, scene, shader == "minimal"
+        sapien.render.set_camera_shader_dir(shader)  # for all cameras that are made from now on
         self._component = sapien.render.RenderCameraComponent(model.width, model.height)
         self._component.set_perspective_parameters(
             NEAR, FAR,
@@ -59,9 +62,15 @@ class SceneCamera:
             with contextlib.suppress(RuntimeError):
                 component.get_picture("Color")  # waits until it is drawn
             raise
-        pixels = np.round(255 * np.clip(colour[..., :3], 0, 1)).astype(np.uint8)
+        if self._minimal:
+            pixels = np.ascontiguousarray(colour[..., :3])
+        else:
+            pixels = np.round(255 * np.clip(colour[..., :3], 0, 1)).astype(np.uint8)
         if not depth:
             return Image(self.model, pixels, None)
+        if self._minimal:  # millimetres; 0 where nothing is
+            millimetres = component.get_picture("PositionSegmentation")[..., 2]
+            return Image(self.model, pixels, (-0.001 * millimetres).astype(np.float32))
         position = component.get_picture("Position")
         metres = np.where(position[..., 3] < 1, -position[..., 2], 0).astype(np.float32)
         return Image(self.model, pixels, metres)
