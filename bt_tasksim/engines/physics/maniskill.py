@@ -17,7 +17,7 @@ from bt_tasksim.core.world import Hidden, JointTarget, WorldState
 from bt_tasksim.engines.base import EngineSetup, PhysicsEngine, RenderingEngine
 from bt_tasksim.engines.maniskill.draw import Thing, body_of, configuration, things
 from bt_tasksim.engines.maniskill.environment import Environment
-from bt_tasksim.engines.maniskill.files import environment_of
+from bt_tasksim.engines.maniskill.files import bundled, environment_of
 from bt_tasksim.engines.maniskill.rendering import ManiSkillRendering
 from bt_tasksim.engines.maniskill.robot import Robot
 from bt_tasksim.engines.maniskill.verdict import verdict
@@ -72,6 +72,11 @@ class ManiSkillPhysics(PhysicsEngine):
         environment_of(name)
 
     @classmethod
+    def in_logs(cls, name: str) -> bool:
+        """See `Engine.in_logs`: an environment whose file is bundled."""
+        return environment_of(name) in bundled()
+
+    @classmethod
     def own_world(cls, name: str) -> WorldSource:
         """See `PhysicsEngine.own_world`."""
         return EnvironmentWorld(environment_of(name))
@@ -89,7 +94,7 @@ class ManiSkillPhysics(PhysicsEngine):
                 "name no scene"
             )
         self._open()
-        return scene.drawn_by(self._draw)
+        return scene.drawn_by(lambda seed, stream: self._draw(seed, stream, scene.robot))
 
     def rendering(self) -> RenderingEngine:
         """See `PhysicsEngine.rendering`: ManiSkill's own pictures, for which it is opened otherwise."""
@@ -188,10 +193,10 @@ class ManiSkillPhysics(PhysicsEngine):
             self._things = things(environment)
         self._robot.begin()
 
-    def _draw(self, seed: int, stream: str) -> ActorConfiguration:
+    def _draw(self, seed: int, stream: str, robot: str) -> ActorConfiguration:
         self._begin(environment_seed(seed, stream))
-        robot = self._robot
-        return configuration(self._open(), self.world.robot, robot.to_base, robot.position(), seed, stream)
+        here = self._robot
+        return configuration(self._open(), robot, here.to_base, here.position(), seed, stream)
 
     def _state(self, wrench: Array) -> WorldState:
         robot = self._robot

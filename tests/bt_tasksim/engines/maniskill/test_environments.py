@@ -134,6 +134,23 @@ def test_the_same_seed_gives_the_same_bits_in_any_order_and_in_another_simulatio
     second.pipeline.close()
 
 
+def test_a_run_is_replayed_bit_for_bit_and_no_log_opens_a_file(tmp_path):
+    import json
+
+    from bt_tasksim import run
+    from bt_tasksim.execution.recorded import _options
+    from bt_tasksim.execution.replay import replay
+
+    tree = sequence("hold", Grasp("cube"), Wait(0.2))
+    run(tree, seed=4, out=tmp_path / "run", engines=PICK)
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["engines"] == PICK
+    again = replay(tmp_path / "run")
+    assert again.identical, again.why
+    for name in ("maniskill:mine.yaml", "maniskill:a.module:B-v0", "maniskill"):
+        with pytest.raises(InputError):
+            _options({"engines": name}, "here")
+
+
 def test_the_camera_robot_of_the_description_is_the_environments():
     tree = sequence("wait", Wait(0.2))
     for robot in ("panda_wristcam", "panda"):
