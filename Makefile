@@ -7,7 +7,7 @@
 SHELL := /bin/bash
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
-EXTRAS := sim,train,report,ros,remote,mujoco,docs,dev
+EXTRAS := sim,train,report,ros,remote,mujoco,cluster,docs,dev
 PYTEST_FLAGS ?= -n logical --maxprocesses 4
 
 TWIN := .twin
@@ -96,7 +96,7 @@ $(VENV)/made.stamp:
 # torch first, so that nothing else chooses its build. mani_skill brings OpenCV's desktop build, which needs
 # libGL; the headless one is the same version and goes over it, last.
 $(VENV)/packages.stamp: $(VENV)/made.stamp pyproject.toml constraints.txt
-	@echo "Installing packages (2.6 GB in all; some minutes the first time) ..."
+	@echo "Installing packages (2.8 GB in all; some minutes the first time) ..."
 	@$(PIP) install -c constraints.txt setuptools torch
 	@$(PIP) install -c constraints.txt --no-build-isolation -e '.[$(EXTRAS)]'
 	@$(PIP) install -c constraints.txt --no-deps --force-reinstall opencv-python-headless

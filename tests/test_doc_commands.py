@@ -46,6 +46,8 @@ PARSED = {
 """Commands that are only parsed, and why."""
 
 QUICK = {
+    "benchmarks.batch": "--quick",
+    "benchmarks.cluster": "--times 1 --episodes 12",
     "benchmarks.decomposition": "--seeds 1",
     "benchmarks.experiments": "--pictures pictures",
     "benchmarks.gap": "--episodes 1 --scenarios shelf_to_shelf --grasps programmed --engines sapien",

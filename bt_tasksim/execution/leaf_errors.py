@@ -30,7 +30,7 @@ def ticking(tree: Behaviour) -> Generator[Behaviour | Decision, None, None]:
         end_all(tree, culprit)
         if isinstance(error, BtTasksimError) or not isinstance(error, Exception):
             raise
-        raise _leaf_error(error, tree, culprit) from error
+        raise leaf_error(error, culprit.name if culprit is not None else tree.name) from error
 
 
 def end_all(tree: Behaviour, culprit: Behaviour | None = None) -> None:
@@ -45,9 +45,8 @@ def end_all(tree: Behaviour, culprit: Behaviour | None = None) -> None:
                 node.iterator = node.tick()
 
 
-def _leaf_error(error: Exception, tree: Behaviour, culprit: Behaviour | None) -> LeafError:
+def leaf_error(error: Exception, name: str) -> LeafError:
     """The error that names the leaf that raised and, where it is the user's own, file and line."""
-    name = culprit.name if culprit is not None else tree.name
     place = users_place(error)
     return LeafError(f"leaf '{name}' raised {type(error).__name__}{f' in {place}' if place else ''}: {error}")
 

@@ -24,7 +24,7 @@ from bt_tasksim.core.errors import FieldError, InputError, nearest, within
 from bt_tasksim.core.files import file_version
 from bt_tasksim.core.named_data import named_data
 from bt_tasksim.core.plain import shown, where_text
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.limits import SafetyLimits, read_limits
 from bt_tasksim.robot.urdf_links import joint_depths, joint_limits, joint_speeds
 
@@ -173,11 +173,10 @@ class RobotDescription:
 
     def hand_position(self, hand: Array) -> Array:
         """Hand joint positions ``(..., n_hand)`` for a hand command ``(..., 1 + n_synergies)``."""
-        xp = array_namespace(hand)
-        opened, closed = xp.asarray(self.hand_open), xp.asarray(self.hand_closed)
-        out = opened + hand[..., :1] * (closed - opened)
+        opened, span = self.hand_open.copy(), self.hand_closed - self.hand_open
+        out = poses.constant(opened, hand) + hand[..., :1] * poses.constant(span, hand)
         for i in range(min(len(self.synergies), hand.shape[-1] - 1)):
-            out = out + hand[..., i + 1 : i + 2] * xp.asarray(self.synergy_directions[i])
+            out = out + hand[..., i + 1 : i + 2] * poses.constant(self.synergy_directions[i].copy(), hand)
         return out
 
     @cached_property
@@ -191,12 +190,11 @@ class RobotDescription:
 
     def closure(self, hand_position: Array) -> Array:
         """Closure ``(...)`` in [0, 1] of hand joint positions ``(..., n_hand)``: the least-squares fit."""
-        weights = self._closure_weights
-        if type(hand_position) is np.ndarray and hand_position.ndim == 1:
-            return np.float64(min(max(float((hand_position - self.hand_open) @ weights), 0.0), 1.0))
-        xp = array_namespace(hand_position)
-        fit = xp.sum((hand_position - xp.asarray(self.hand_open)) * xp.asarray(weights), axis=-1)
-        return xp.clip(fit, 0.0, 1.0)
+        opened, weights = self.hand_open.tolist(), self._closure_weights.tolist()
+        fit = (hand_position[..., 0] - opened[0]) * weights[0]
+        for i in range(1, len(weights)):  # a sum by a library may depend on how many rows there are
+            fit = fit + (hand_position[..., i] - opened[i]) * weights[i]
+        return poses.clip(fit, 0.0, 1.0)
 
     def pointing_down(self, position: Array, turn: float = 0.0) -> Array:
         """The tool pose ``(7,)`` at a position ``(3,)``, pointing down, turned from its neutral orientation.

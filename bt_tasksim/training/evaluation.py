@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from py_trees.common import Status
 
 from bt_tasksim.concept.plugins import load_all
+from bt_tasksim.core.cluster import Cluster, check_address
 from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
 from bt_tasksim.core.fleet import Fleet, Here
 from bt_tasksim.core.identity import identity
@@ -32,6 +33,12 @@ from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
 
 if TYPE_CHECKING:
     from bt_tasksim.execution.runner import Runner
+
+
+SHARE = 16
+"""Episodes that a member of a fleet takes at a time; a lost one loses the one that it was at."""
+MEMORY = 500_000_000
+"""Bytes that an actor of a cluster needs, of which 320 MB were measured (600 MB with camera images)."""
 
 
 @dataclass(frozen=True)
@@ -80,18 +87,22 @@ def evaluate(
     keep: EvaluationFile | None = None,
     stopped: Callable[[Evaluation], None] | None = None,
     kept: KeptEvaluation | None = None,
+    cluster: str | None = None,
 ) -> Evaluation:
     """Run one episode for each seed.
 
     Args:
         job: What to run.
         seeds: Seeds of the episodes.
-        workers: Worker processes; 1 runs in this process, and so does None.
+        workers: Worker processes; 1 runs in this process, and so does None. Of a cluster: the most actors;
+            None for as many as it has room for.
         progress: Called after every episode, in the order in which they end; first for those that are kept.
         stream: Stream of draws.
         keep: Keeps every episode as it ends, and all of them at the end, however it comes.
         stopped: Called with what there is where an error ends it after an episode.
         kept: Go on from this: its episodes are not run again.
+        cluster: Address of a Ray cluster, or ``local`` for one of this machine, see
+            `bt_tasksim.core.cluster`.
 
     Returns:
         The outcomes in the order of the seeds.
@@ -100,9 +111,9 @@ def evaluate(
         EvaluationInterrupted: By Ctrl-C; holds what there is.
         EvaluationTerminated: By SIGTERM or SIGHUP; likewise.
         InputError: The tree, scene, robot or engines are no good, or there are no seeds, or what is kept is
-            of something else.
+            of something else, or the cluster is of another version.
         LostEngine: An engine in another process has gone away.
-        MachineError: A robot has failed, or a worker process ended.
+        MachineError: A robot has failed, a worker process ended, or the cluster does not answer.
     """
     if not seeds:
         raise InputError("an evaluation needs at least one episode")
@@ -110,6 +121,10 @@ def evaluate(
         raise InputError(f"an evaluation needs at least one worker, found {workers}")
     if workers is not None and workers > 1 and job.options.remote:
         raise InputError("an engine in another process serves one client at a time: evaluate with 1 worker")
+    if cluster is not None:
+        if job.options.remote:
+            raise InputError("an engine in another process serves one client at a time: leave --cluster away")
+        check_address(cluster)
     for seed in seeds:
         check_seed(seed)
     started = time.perf_counter() - (kept.seconds if kept is not None else 0.0)
@@ -150,8 +165,8 @@ def evaluate(
                     progress(outcome)
             with terminable():
                 if todo:
-                    with _fleet(job, runner, workers or 1, len(todo)) as fleet:
-                        for _, outcome in fleet.spread(partial(episodes, stream=stream), todo):
+                    with _fleet(job, runner, subject, workers, cluster, len(todo)) as fleet:
+                        for _, outcome in fleet.spread(partial(episodes, stream=stream), todo, SHARE):
                             ended(outcome)
             if keep is not None:
                 keep.end(evaluation())
@@ -171,11 +186,27 @@ def evaluate(
         return evaluation()
 
 
-def _fleet(job: Job, runner: Runner, workers: int, most: int) -> Fleet[Runner]:
+def _fleet(
+    job: Job, runner: Runner, subject: dict[str, str], workers: int | None, cluster: str | None, most: int
+) -> Fleet[Runner]:
     """What runs the episodes, of which there are so many."""
-    if workers == 1:
+    make = partial(_same_runner, job, subject)
+    count = None if workers is None else min(workers, most)
+    if cluster is not None:
+        return Cluster(make, cluster, count, MEMORY)
+    if count in (None, 1):
         return Here(runner)
-    return Workers(partial(_runner, job), min(workers, most), "spawn")
+    return Workers(make, count, "spawn")
+
+
+def _same_runner(job: Job, subject: dict[str, str]) -> Runner:
+    """A runner of its own for a member of a fleet, whose files may be others than those of this machine."""
+    runner = _runner(job)
+    stream = subject["stream of draws"]
+    found = _subject(job, runner, stream)
+    if others := [name for name in subject if found[name] != subject[name]]:
+        raise InputError(f"another {' and another '.join(others)} is found there: have the same files there")
+    return runner
 
 
 def episodes(

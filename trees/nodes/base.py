@@ -10,6 +10,7 @@ from typing import ClassVar, Generic, Literal, TypeVar
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.trees.nodes.batch import BatchNode, Place
 
 NodeT = TypeVar("NodeT", bound=Behaviour)
 
@@ -86,6 +87,15 @@ class NodeKind(abc.ABC, Generic[NodeT]):
         Concepts may not stand there: they would be started anew at every tick.
         """
         return ()
+
+    def compiled(self, node: NodeT, place: Place) -> BatchNode | None:
+        """What a node does in many worlds at once; None: only py_trees can tick it, world by world.
+
+        Args:
+            node: The node.
+            place: Where it stands in the batch.
+        """
+        return None
 
 
 def free_children(owner: str, children: Sequence[Behaviour]) -> list[Behaviour]:

@@ -9,6 +9,7 @@ from py_trees.decorators import SuccessIsFailure
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
+from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, PassesOn, Place
 
 
 def force_failure(child: Behaviour, *, name: str = "ForceFailure") -> SuccessIsFailure:
@@ -33,3 +34,7 @@ class ForceFailureKind(NodeKind[SuccessIsFailure]):
     def make(self, name: str, children: list[Behaviour], ports: Mapping[str, int]) -> SuccessIsFailure:
         """See `NodeKind.make`."""
         return force_failure(children[0], name=name)
+
+    def compiled(self, node: SuccessIsFailure, place: Place) -> PassesOn:
+        """See `NodeKind.compiled`."""
+        return PassesOn(place, {SUCCESS: FAILURE}, {SUCCESS: "success is failure{}"})

@@ -9,6 +9,7 @@ from py_trees.decorators import FailureIsSuccess
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
+from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, PassesOn, Place
 
 
 def force_success(child: Behaviour, *, name: str = "ForceSuccess") -> FailureIsSuccess:
@@ -33,3 +34,7 @@ class ForceSuccessKind(NodeKind[FailureIsSuccess]):
     def make(self, name: str, children: list[Behaviour], ports: Mapping[str, int]) -> FailureIsSuccess:
         """See `NodeKind.make`."""
         return force_success(children[0], name=name)
+
+    def compiled(self, node: FailureIsSuccess, place: Place) -> PassesOn:
+        """See `NodeKind.compiled`."""
+        return PassesOn(place, {FAILURE: SUCCESS}, {FAILURE: "failure is success{}"})

@@ -9,6 +9,7 @@ from py_trees.decorators import Inverter
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
+from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, PassesOn, Place
 
 
 def invert(child: Behaviour, *, name: str = "Inverter") -> Inverter:
@@ -33,3 +34,11 @@ class InverterKind(NodeKind[Inverter]):
     def make(self, name: str, children: list[Behaviour], ports: Mapping[str, int]) -> Inverter:
         """See `NodeKind.make`."""
         return invert(children[0], name=name)
+
+    def compiled(self, node: Inverter, place: Place) -> PassesOn:
+        """See `NodeKind.compiled`."""
+        return PassesOn(
+            place,
+            {SUCCESS: FAILURE, FAILURE: SUCCESS},
+            {SUCCESS: "success -> failure", FAILURE: "failure -> success"},
+        )

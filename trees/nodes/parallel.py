@@ -10,10 +10,12 @@ from py_trees.composites import Composite
 
 from bt_tasksim.concept.reporting import Reporting
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import register_reason
+from bt_tasksim.core.outcomes import Statement, register_reason
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
+from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, SUCCESS, BatchNode, Place
 from bt_tasksim.trees.nodes.pass_through import said_below
 
 CHILDREN_FAILED = register_reason(
@@ -57,6 +59,12 @@ class Parallel(Reporting, Composite):
         self.failure_count = failure_count
         self._finished: dict[int, Status] = {}
 
+    def counts(self) -> tuple[int, int]:
+        """How many successes it needs, and with how many failures it fails."""
+        total = len(self.children)
+        needed, allowed = (c if c > 0 else total + c + 1 for c in (self.success_count, self.failure_count))
+        return needed, allowed
+
     def tick(self) -> Iterator[Behaviour]:
         """One tick."""
         if self.status != Status.RUNNING:
@@ -67,7 +75,7 @@ class Parallel(Reporting, Composite):
             self.report(None)
             self.initialise()
         total = len(self.children)
-        needed, allowed = (c if c > 0 else total + c + 1 for c in (self.success_count, self.failure_count))
+        needed, allowed = self.counts()
         for index, child in enumerate(self.children):
             if index not in self._finished:
                 self.current_child = child
@@ -142,6 +150,81 @@ class ParallelKind(NodeKind[Parallel]):
         if node.failure_count != 1:
             text += f", {_of(node.failure_count, total)} failed ends it"
         return text
+
+    def compiled(self, node: Parallel, place: Place) -> BatchParallel:
+        """See `NodeKind.compiled`."""
+        return BatchParallel(place, *node.counts())
+
+
+class BatchParallel(BatchNode):
+    """`Parallel` in many worlds at once.
+
+    Args:
+        place: Where it stands.
+        needed: Successes with which it succeeds.
+        allowed: Failures with which it fails.
+    """
+
+    def __init__(self, place: Place, needed: int, allowed: int) -> None:
+        super().__init__(place)
+        self.needed, self.allowed, self.total = needed, allowed, len(place.children)
+        self.finished = self.arrays.full(False, "bool", self.total)
+        """``(children, N)``: not ticked again."""
+        self.succeeded, self.failed = self.arrays.full(0, "int32"), self.arrays.full(0, "int32")
+        """``(N,)`` how many children."""
+        self.ticked_last = self.arrays.indices(self.total)
+        """``(N,)`` the child that was ticked last."""
+
+    def tick(self, rows: Array) -> None:
+        """On to the first child that has not finished."""
+        begins = self.begins(rows)
+        if len(begins):
+            self.stop_ended(begins)
+            self.succeeded[begins] = 0
+            self.failed[begins] = 0
+            for finished in self.finished:
+                finished[begins] = False
+        self._next(0, rows)
+
+    def after(self, child: int, rows: Array, status: Array) -> None:
+        """Count, then back or on to the next child."""
+        ended = status != RUNNING
+        if self.arrays.count(ended):
+            self.finished[child][rows] = ended
+            succeeded = self.succeeded[rows] + (status == SUCCESS)
+            failed = self.failed[rows] + (status == FAILURE)
+            self.succeeded[rows], self.failed[rows] = succeeded, failed
+            won = succeeded >= self.needed
+            lost = ~won & ((failed >= self.allowed) | (self.total - failed < self.needed))
+            (over, won), (rows, _) = self.split(won | lost, rows, won)
+            for k, running in enumerate(self.place.child_status):
+                self.stop_child(k, self.part(over, running[over] == RUNNING))
+            (winners,), (losers,) = self.split(won, over)
+            self.end(winners, SUCCESS)
+            self.end(losers, FAILURE)
+        self._next(child + 1, rows)
+
+    def _next(self, child: int, rows: Array) -> None:
+        while child < self.total and len(rows):
+            (rows,), (on,) = self.split(self.finished[child][rows], rows)
+            self.ticked_last[on] = child
+            self.tick_child(child, on)
+            child += 1
+        self.end(rows, RUNNING)
+
+    def current(self, row: int) -> int | None:
+        """The child that was ticked last."""
+        return int(self.ticked_last[row]) if int(self.place.status[row]) != INVALID else None
+
+    def says(self, row: int) -> Statement | None:
+        """How many children failed."""
+        if int(self.place.status[row]) != FAILURE:
+            return None
+        last = self.place.children[int(self.ticked_last[row])]
+        reasons, failed = self.batch.reasons, int(self.failed[row])
+        return CHILDREN_FAILED(
+            reasons.said_below(last, row), failed=failed, children=self.total, last=reasons.name(last)
+        )
 
 
 def _of(count: int, total: int) -> str:

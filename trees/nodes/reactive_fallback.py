@@ -9,6 +9,8 @@ from py_trees.composites import Selector
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
+from bt_tasksim.trees.nodes.batch import Place
+from bt_tasksim.trees.nodes.fallback import BatchSelector
 
 
 def reactive_fallback(name: str, *children: Behaviour) -> Selector:
@@ -41,3 +43,7 @@ class ReactiveFallbackKind(NodeKind[Selector]):
     def ticked_again(self, node: Selector) -> Iterable[Behaviour]:
         """All but the last: only the last child may act."""
         return node.children[:-1]
+
+    def compiled(self, node: Selector, place: Place) -> BatchSelector:
+        """See `NodeKind.compiled`."""
+        return BatchSelector(place, memory=False)

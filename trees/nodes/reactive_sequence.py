@@ -9,6 +9,8 @@ from py_trees.composites import Sequence
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
+from bt_tasksim.trees.nodes.batch import Place
+from bt_tasksim.trees.nodes.sequence import BatchSequence
 
 
 def reactive_sequence(name: str, *children: Behaviour) -> Sequence:
@@ -41,3 +43,7 @@ class ReactiveSequenceKind(NodeKind[Sequence]):
     def ticked_again(self, node: Sequence) -> Iterable[Behaviour]:
         """All but the last: only the last child may act."""
         return node.children[:-1]
+
+    def compiled(self, node: Sequence, place: Place) -> BatchSequence:
+        """See `NodeKind.compiled`."""
+        return BatchSequence(place, memory=False)

@@ -9,6 +9,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.trees.nodes.batch import RUNNING, BatchNode, Place
 from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick, said_below
 
 
@@ -62,3 +64,51 @@ class Rounds(PassThrough, abc.ABC):
                 self.report(said_below(child))
             break
         yield from end_tick(self, status)
+
+
+class BatchRounds(BatchNode):
+    """`Rounds` in many worlds at once.
+
+    Args:
+        place: Where it stands.
+        limit: How often, or -1.
+        again_on: The status after which another round begins.
+    """
+
+    def __init__(self, place: Place, limit: int, again_on: int) -> None:
+        super().__init__(place)
+        self.limit, self.again_on = limit, again_on
+        self.rounds = self.arrays.full(0, "int64")
+        """``(N,)`` rounds that have ended."""
+        self.began = self.arrays.full(False, "bool")
+        """``(N,)`` the child began in this tick."""
+
+    def tick(self, rows: Array) -> None:
+        """On to the child."""
+        begins = self.begins(rows)
+        if len(begins):
+            self.rounds[begins] = 0
+            self.count_anew(begins)
+        self.began[rows] = self.place.child_status[0][rows] != RUNNING
+        self.tick_child(0, rows)
+
+    def count_anew(self, rows: Array) -> None:  # a repeat remembers nothing
+        """It begins in worlds."""
+
+    def round_ended(self, rows: Array) -> None:
+        """A round has ended in worlds, and is counted."""
+
+    def after(self, child: int, rows: Array, status: Array) -> None:
+        """Back, or to the child anew."""
+        (again, _), (over, said) = self.split(status == self.again_on, rows, status)
+        self.end(over, said)
+        if not len(again):
+            return
+        self.rounds[again] += 1
+        self.round_ended(again)
+        (enough,), (again,) = self.split(self.rounds[again] == self.limit, again)
+        self.end(enough, self.again_on)
+        (wait,), (again,) = self.split(self.began[again], again)
+        self.end(wait, RUNNING)
+        self.began[again] = True
+        self.tick_child(0, again)

@@ -11,8 +11,10 @@ from py_trees.decorators import Decorator
 
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind
+from bt_tasksim.trees.nodes.batch import PassesOn, Place
 from bt_tasksim.trees.walk import nodes_of
 
 
@@ -92,6 +94,35 @@ class TrainKind(NodeKind[Train]):
     def make(self, name: str, children: list[Behaviour], ports: Mapping[str, int]) -> Train:
         """See `NodeKind.make`."""
         return Train(children[0], name)
+
+    def compiled(self, node: Train, place: Place) -> BatchTrain:
+        """See `NodeKind.compiled`."""
+        return BatchTrain(place)
+
+
+class BatchTrain(PassesOn):
+    """`Train` in many worlds at once.
+
+    Attributes:
+        activations: ``(N,)`` how often it has begun.
+        interrupted: boolean ``(N,)``: something outside has ended the last activation.
+    """
+
+    def __init__(self, place: Place) -> None:
+        super().__init__(place)
+        self.activations = self.arrays.full(0, "int64")
+        self.interrupted = self.arrays.full(False, "bool")
+
+    def tick(self, rows: Array) -> None:
+        """Count activations."""
+        begins = self.begins(rows)
+        self.activations[begins] += 1
+        self.interrupted[begins] = False
+        super().tick(rows)
+
+    def stopped(self, rows: Array) -> None:
+        """Remember that something outside has ended the activation."""
+        self.interrupted[rows] = True
 
 
 def _inherits_layout(cls: type[ConceptModel]) -> bool:

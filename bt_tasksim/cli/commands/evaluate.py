@@ -32,7 +32,16 @@ def evaluate(
     ] = 100,
     workers: Annotated[
         int | None,
-        typer.Option(parser=arguments.workers, metavar="W", help="Worker processes.", show_default="1"),
+        typer.Option(
+            parser=arguments.workers,
+            metavar="W",
+            help="Worker processes, or the most actors of a cluster.",
+            show_default="1; of a cluster what it has room for",
+        ),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="A", help="Run on a Ray cluster: local, or its address HOST:PORT."),
     ] = None,
     json_: Annotated[
         Path | None, typer.Option("--json", metavar="F", help="Write every episode as JSON.")
@@ -72,6 +81,7 @@ def evaluate(
                 keep=keep,
                 stopped=tell,
                 kept=kept,
+                cluster=cluster,
             )
     except evaluation.EvaluationInterrupted as stop:
         tell(stop.evaluation)

@@ -13,14 +13,29 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
-import eigenpy
 import numpy as np
 import pinocchio as pin
 
-from bt_tasksim.core.errors import UnreachableError
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, array_namespace, clip, constant
+from bt_tasksim.engines.kinematics.chain import Chain, difference
+from bt_tasksim.engines.kinematics.failures import Reach
+from bt_tasksim.engines.kinematics.linear import solve_symmetric, total
+from bt_tasksim.engines.kinematics.rows import (
+    at_least,
+    chosen,
+    either,
+    every,
+    highest,
+    host,
+    joined,
+    put,
+    some,
+    taken,
+    where_true,
+)
 from bt_tasksim.robot.description import RobotDescription
 
 _TOLERANCE = 5e-5
@@ -30,6 +45,10 @@ _MISS = (1e-3, 5e-3)
 _LENGTH = 0.3
 """Metres that weigh as much as one radian where position and rotation cannot both be had."""
 _DAMPING = 1e-7
+_LONGEST = 0.5
+"""Largest step of any joint in one iteration, rad."""
+_STUCK = 1e-7
+"""A step of no joint more than this gets nowhere, rad."""
 _TRACK, _HARDER, _SETTLE = 6, 200, 60
 """Iterations of a tracking step, of a solve that tries hard, and of settling into the preferred posture."""
 _PULL = 0.2
@@ -38,210 +57,380 @@ _PULL_LIMIT = 0.05
 """Largest such step of any joint, rad."""
 _SWING, _SWING_PER_METRE, _SWING_PER_RADIAN = 0.5, 10.0, 2.0
 """A tracked arm may change its posture at once by so much: rad, and more for the way that the tool goes."""
+_SETTLING = 0.3
+"""Share of the way to the preferred posture that one step of settling asks of the null space."""
 _RESTARTS = 24
-_LOCAL = pin.ReferenceFrame.LOCAL
+"""Random postures to begin at."""
+
+
+class Found(NamedTuple):
+    """Joints for poses, one column a row.
+
+    Attributes:
+        q: Joints ``(n, N)`` within their limits; of a row that failed the nearest that were found.
+        seen: ``(n + 1, 3, 4, N)``, what `Chain.seen` says of them.
+        code: ``(N,)`` NumPy, of `Reach`: how it went.
+        distance: ``(N,)`` NumPy, metres by which a row that failed misses; else zero.
+        angle: ``(N,)`` NumPy, radians by which it misses.
+    """
+
+    q: Array
+    seen: Array
+    code: Array
+    distance: Array
+    angle: Array
+
+
+class _Reached(NamedTuple):
+    """Where an iteration ended: joints ``(n, N)``, the chain there, and the largest error ``(N,)`` left."""
+
+    q: Array
+    seen: Array
+    worst: Array
+
+
+@dataclass(frozen=True)
+class _Missed:
+    """Sizes ``(N,)`` in NumPy of what is left of errors: metres, radians, and both weighed together."""
+
+    distance: Array
+    angle: Array
+    cost: Array
+
+    @property
+    def little(self) -> Array:
+        """It is nothing to speak of ``(N,)``."""
+        return (self.distance <= _MISS[0]) & (self.angle <= _MISS[1])
 
 
 class InverseKinematics:
-    """Joints of an arm for poses of its tool. The model is constant, and nothing is kept between two calls.
+    """Joints of an arm for poses of its tool, many at once; nothing is kept between two calls.
+
+    Rows come last in all arrays, and each is solved as if it were alone.
 
     Args:
         robot: The robot.
         model: Its arm alone, with a frame ``tool``.
+        like: An array of the library, type and device to compute with.
         patience: Seconds after which a search for another posture gives up.
     """
 
-    def __init__(self, robot: RobotDescription, model: pin.Model, patience: float = math.inf) -> None:
-        self._robot, self._model, self._patience = robot, model, patience
-        self._data = model.createData()
-        self._frame = model.getFrameId("tool", pin.FrameType.OP_FRAME)
+    def __init__(
+        self, robot: RobotDescription, model: pin.Model, like: Array, patience: float = math.inf
+    ) -> None:
+        self.chain = Chain.of(model, "tool", like)
+        self._patience = patience
         self._n = len(robot.arm_joints)
-        self._lower, self._upper, self._rest = robot.arm_lower, robot.arm_upper, robot.rest
-        self._limits = (self._lower.tolist(), self._upper.tolist())
-        self._pull = _PULL * robot.posture
-        self._rows = np.flatnonzero(robot.task_mask > 0.0)
-        self._masked = len(self._rows) < 6
-        self._weights = (robot.task_mask * ([1.0] * 3 + [_LENGTH] * 3))[self._rows]
-        self._column = self._weights[:, None]
-        self._eye = np.eye(len(self._rows))
+        column = (
+            robot.arm_lower[:, None].copy(),
+            robot.arm_upper[:, None].copy(),
+            robot.rest[:, None].copy(),
+        )
+        self._lower, self._upper, self._rest = (constant(values, like) for values in column)
+        self._pull = constant(_PULL * robot.posture[:, None], like)
+        asked = np.flatnonzero(robot.task_mask > 0.0)
+        self._asked = None if len(asked) == 6 else asked
+        weights = robot.task_mask * ([1.0] * 3 + [_LENGTH] * 3)
+        self._weights = constant(weights[asked][:, None], like)
+        self._counted = constant((robot.task_mask > 0.0).astype(float)[:, None], like)
+        self._eye = constant(np.eye(len(asked))[..., None], like)
         rng = np.random.default_rng(0)
-        self._starts = rng.uniform(self._lower, self._upper, (_RESTARTS, self._n))
+        self._starts = constant(rng.uniform(robot.arm_lower, robot.arm_upper, (_RESTARTS, self._n)).T, like)
 
-    def near(self, pose: pin.SE3, last: Array) -> Array:
-        """Joints ``(n_arm,)`` for a pose, continuous with the last ones where that is possible.
+    def near(self, goal: Array, last: Array, seen: Array) -> Found:
+        """Joints for placements, continuous with the last ones where that is possible.
 
-        Raises:
-            UnreachableError: No posture brings the tool there, or only one that the arm would have to swing
-                to while the tool hardly moves.
-        """
-        pull = self._pull * (self._rest - last)
-        largest = _largest(pull)
-        if largest > _PULL_LIMIT:
-            pull *= _PULL_LIMIT / largest
-        q, error = self._iterate(last, pose, _TRACK, pull)
-        if error <= _TOLERANCE:
-            return q
-        q, error = self._iterate(last, pose, _HARDER)
-        missed = None if error <= _TOLERANCE else self._missed(q, pose)
-        if missed is None:
-            return q
-        way = self._error(last, pose)
-        metres, radians = float(np.linalg.norm(way[:3])), float(np.linalg.norm(way[3:]))
-        swing = _SWING + _SWING_PER_METRE * metres + _SWING_PER_RADIAN * radians
-        other = self._search(pose, [self._rest], last, best=q)
-        if float(np.abs(other - last).max()) > swing:
-            raise _unreachable(self._robot.name, pose, *missed, "without swinging into another posture")
-        return other
-
-    def nearest(self, pose: pin.SE3, starts: Sequence[Array], posture: Array | None = None) -> Array:
-        """Joints ``(n_arm,)`` for a pose, of the solutions that are found the one nearest to a posture.
+        A row fails where no posture brings the tool there, or only one that the arm would have to swing to
+        while the tool hardly moves.
 
         Args:
-            pose: The tool's pose.
-            starts: Joints to begin at, before the rest posture and fixed random ones.
-            posture: Joints to come near to; by default the rest posture.
-
-        Raises:
-            UnreachableError: No posture brings the tool there; says by how much the nearest one misses.
+            goal: Placements of the tool ``(3, 4, N)``.
+            last: The joints before ``(n, N)``.
+            seen: ``(n + 1, 3, 4, N)``, what `Chain.seen` says of those.
         """
-        return self._search(pose, [*starts, self._rest], self._rest if posture is None else posture)
+        pull = self._pull * (self._rest - last)
+        pull = pull * (_PULL_LIMIT / at_least(_largest(pull), _PULL_LIMIT))
+        reached = self._iterate(last, goal, _TRACK, pull, seen)
+        rows = goal.shape[-1]
+        found = Found(reached.q, reached.seen, *np.zeros((3, rows)))
+        solved = reached.worst <= _TOLERANCE
+        if every(solved):
+            return found
+        hard = where_true(~solved)
+        return _with(found, hard, self._again(taken(goal, hard), taken(last, hard)))
+
+    def _again(self, goal: Array, last: Array) -> Found:
+        """`near` for rows that a few iterations have not brought there."""
+        reached = self._iterate(last, goal, _HARDER)
+        missed = self._missed(reached.seen, goal)
+        rows = goal.shape[-1]
+        found = Found(reached.q, reached.seen, *np.zeros((3, rows)))
+        left = np.flatnonzero(~((host(reached.worst) <= _TOLERANCE) | missed.little))
+        if not len(left):
+            return found
+        goal, last = taken(goal, left), taken(last, left)
+        way = self._missed(self.chain.seen(last), goal)
+        swing = _SWING + _SWING_PER_METRE * way.distance + _SWING_PER_RADIAN * way.angle
+        best = _Reached(*(taken(part, left) for part in reached))
+        other = self._search(goal, [self._rest], last, best)
+        swings = (other.code == Reach.REACHED) & (host(_largest(other.q - last)) > swing)
+        other.code[swings] = Reach.SWINGS
+        other.distance[swings], other.angle[swings] = (
+            missed.distance[left][swings],
+            missed.angle[left][swings],
+        )
+        return _with(found, left, other)
+
+    def nearest(self, goal: Array, starts: list[Array], posture: Array | None = None) -> Found:
+        """Joints for placements, of the solutions that are found the ones nearest to a posture.
+
+        A row fails where no posture brings the tool there.
+
+        Args:
+            goal: Placements of the tool ``(3, 4, N)``.
+            starts: Joints ``(n, N)`` or ``(n, 1)`` to begin at, before the rest posture and random ones.
+            posture: Joints ``(n, N)`` or ``(n, 1)`` to come near to; by default the rest posture.
+        """
+        return self._search(goal, [*starts, self._rest], self._rest if posture is None else posture)
 
     def _search(
-        self, pose: pin.SE3, starts: Sequence[Array], posture: Array, best: Array | None = None
-    ) -> Array:
-        """The solution nearest to a posture from given starts, or else from one of the random ones."""
-        found: list[Array] = []
-        tries = [np.minimum(np.maximum(start, self._lower), self._upper) for start in starts]
-        nearest_miss = np.inf if best is None else self._cost(best, pose)
-        began = time.monotonic()
-        for i, start in enumerate([*tries, *self._starts]):
-            if i >= len(tries) and (found or time.monotonic() - began > self._patience):
+        self, goal: Array, starts: list[Array], posture: Array, best: _Reached | None = None
+    ) -> Found:
+        """The solutions nearest to a posture from given starts, or else from the first good random one."""
+        xp = array_namespace(goal)
+        rows, began = goal.shape[-1], time.monotonic()
+        posture = xp.broadcast_to(posture, (self._n, rows))
+        tries = xp.stack(
+            [clip(xp.broadcast_to(x, (self._n, rows)), self._lower, self._upper) for x in starts], axis=1
+        )
+        at = best or _Reached(taken(tries, np.arange(rows))[:, 0], self.chain.seen(tries[:, 0]), goal[0, 0])
+        missed = self._missed(at.seen, goal)
+        least = missed.cost if best is not None else np.full(rows, np.inf)
+        found = Found(at.q, at.seen, np.full(rows, Reach.UNREACHABLE), missed.distance, missed.angle)
+        left = np.arange(rows)
+        random = xp.broadcast_to(self._starts[..., None], (self._n, _RESTARTS, rows))
+        for begin, all_count in ((tries, True), (random, False)):
+            if not all_count and time.monotonic() - began > self._patience:
                 break
-            q, error = self._iterate(start, pose, _HARDER)
-            cost = self._cost(q, pose)
-            if cost < nearest_miss:
-                best, nearest_miss = q, cost
-            if error <= _TOLERANCE or self._missed(q, pose) is None:
-                found.append(self._settle(q, pose, posture))
-        if found:
-            return min(found, key=lambda q: float(np.sum((q - posture) ** 2)))
-        assert best is not None
-        missed = self._missed(best, pose)
-        assert missed is not None
-        raise _unreachable(self._robot.name, pose, *missed)
+            found, least = self._try(found, least, left, taken(begin, left), goal, posture, all_count)
+            left = np.flatnonzero(found.code != Reach.REACHED)
+            if not len(left):
+                break
+        return found
 
-    def _settle(self, q: Array, pose: pin.SE3, posture: Array) -> Array:
-        """Moves a solution in its null space towards a posture, for as long as the tool stays in place."""
+    def _try(
+        self,
+        found: Found,
+        least: Array,
+        left: np.ndarray,
+        starts: Array,
+        goal: Array,
+        posture: Array,
+        all_count: bool,
+    ) -> tuple[Found, Array]:
+        """Better solutions of the rows ``left`` from starts ``(n, k, rows)``, tried all at once.
+
+        Args:
+            found: The best so far, of all rows.
+            least: What they miss by ``(N,)``.
+            left: The rows.
+            starts: Where to begin.
+            goal: Placements of all rows.
+            posture: Joints ``(n, N)`` to come near to.
+            all_count: The solution nearest to the posture counts, of all starts; else the first start's.
+        """
+        xp = array_namespace(goal)
+        many = starts.shape[1]
+        of = np.tile(left, many)
+        goals, postures = taken(goal, of), taken(posture, of)
+        reached = self._iterate(xp.reshape(starts, (self._n, len(of))), goals, _HARDER)
+        missed = self._missed(reached.seen, goals)
+        good = ((host(reached.worst) <= _TOLERANCE) | missed.little).reshape(many, len(left))
+        cost = missed.cost.reshape(many, len(left))
+        pick = np.where(good.any(axis=0), np.argmax(good, axis=0), np.argmin(cost, axis=0))
+        column = pick * len(left) + np.arange(len(left))
+        improved = good.any(axis=0) | (cost.min(axis=0) < least[left])
+        least = least.copy()
+        least[left] = np.minimum(least[left], cost.min(axis=0))
+        if good.any():
+            settled = good.copy()
+            if not all_count:
+                settled &= np.cumsum(good, axis=0) == 1
+            which = np.flatnonzero(settled.reshape(-1))
+            q, seen = self._settle(
+                taken(reached.q, which),
+                taken(reached.seen, which),
+                taken(goals, which),
+                taken(postures, which),
+            )
+            reached = reached._replace(q=put(reached.q, which, q), seen=put(reached.seen, which, seen))
+            apart = host(_square(reached.q - postures)).reshape(many, len(left))
+            nearest = np.argmin(np.where(settled, apart, np.inf), axis=0)
+            column = np.where(good.any(axis=0), nearest, pick) * len(left) + np.arange(len(left))
+        better = np.flatnonzero(improved)
+        chosen = column[better]
+        code = np.where(good.any(axis=0)[better], Reach.REACHED, Reach.UNREACHABLE)
+        fails = code != Reach.REACHED
+        update = Found(
+            taken(reached.q, chosen),
+            taken(reached.seen, chosen),
+            code,
+            np.where(fails, missed.distance[chosen], 0.0),
+            np.where(fails, missed.angle[chosen], 0.0),
+        )
+        return _with(found, left[better], update), least
+
+    def _settle(self, q: Array, seen: Array, goal: Array, posture: Array) -> tuple[Array, Array]:
+        """Moves solutions in their null space towards postures, for as long as the tool stays in place."""
+        going = np.arange(goal.shape[-1])
         for _ in range(_SETTLE):
-            moved, error = self._iterate(q, pose, _TRACK, 0.3 * (posture - q))
-            if error > _TOLERANCE or np.sum((moved - posture) ** 2) > np.sum((q - posture) ** 2):
+            here, there, towards = taken(q, going), taken(goal, going), taken(posture, going)
+            moved = self._iterate(here, there, _TRACK, _SETTLING * (towards - here), taken(seen, going))
+            closer = _square(moved.q - towards) <= _square(here - towards)
+            good = host((moved.worst <= _TOLERANCE) & closer)
+            if not good.any():
                 break
-            far = float(np.abs(moved - q).max())
-            q = moved
-            if far < 1e-4:
+            kept, index = going[good], np.flatnonzero(good)
+            q, seen = put(q, kept, taken(moved.q, index)), put(seen, kept, taken(moved.seen, index))
+            far = host(_largest(moved.q - here))
+            going = going[good & (far >= 1e-4)]
+            if not len(going):
                 break
-        return q
+        return q, seen
 
     def _iterate(
-        self, q: Array, pose: pin.SE3, iterations: int, pull: Array | None = None
-    ) -> tuple[Array, float]:
-        """Levenberg-Marquardt from ``q (n_arm,)``; ``pull`` is a step asked of the null space at the start.
+        self,
+        q: Array,
+        goal: Array,
+        iterations: int,
+        pull: Array | None = None,
+        seen: Array | None = None,
+    ) -> _Reached:
+        """Levenberg-Marquardt from ``q (n, N)``; ``pull`` is a step asked of the null space at the start.
 
         Returns:
-            The joints, within their limits, and the largest component of the remaining error (m, rad).
+            The joints, within their limits, the chain there, and the largest component of the remaining error
+            (m, rad).
         """
-        model, data, frame = self._model, self._data, self._frame
-        lower, upper, column = self._limits[0], self._limits[1], self._column
-        worst = np.inf
+        rows = np.arange(goal.shape[-1])
+        ended: list[_Reached] = []
+        of: list[np.ndarray] = []
+        stuck = None
         for k in range(iterations + 1):
-            pin.forwardKinematics(model, data, q)
-            miss = pin.updateFramePlacement(model, data, frame).actInv(pose)
-            e = np.concatenate((miss.translation, pin.log3(miss.rotation)))
-            if self._masked:
-                e = e[self._rows]
-            worst = _largest(e)
-            if (worst <= _TOLERANCE and pull is None) or k == iterations:
+            if k or seen is None:
+                seen = self.chain.seen(q)
+            error = self._error(seen, goal)
+            worst = _largest(error)
+            if k == iterations:
                 break
-            pin.computeJointJacobians(model, data)
-            J = pin.getFrameJacobian(model, data, frame, _LOCAL)
-            if self._masked:
-                J = J[self._rows]
-            J *= column
-            e *= self._weights
-            damping = 0.5 * float(e @ e) + _DAMPING
-            step = self._step(J, e, damping, pull)
-            largest = _largest(step)
-            if largest > 0.5:
-                step *= 0.5 / largest
-            kept = q + step
-            if not all(map(_within, lower, kept.tolist(), upper)):
-                kept = self._saturate(q, J, e, damping, pull)
-                if pull is None and float(np.abs(kept - q).max()) < 1e-7:
-                    break  # as near as the limits allow
-            elif largest < 1e-7 and pull is None:
-                break
-            q, pull = kept, None
-        return q, worst
+            if pull is None:
+                done = worst <= _TOLERANCE if stuck is None else (worst <= _TOLERANCE) | stuck
+                if every(done):
+                    break
+                if some(done):
+                    index, rest = where_true(done), where_true(~done)
+                    ended.append(_Reached(taken(q, index), taken(seen, index), taken(worst, index)))
+                    of.append(rows[index])
+                    rows = rows[rest]
+                    q, seen, goal, error = (taken(x, rest) for x in (q, seen, goal, error))
+            q, stuck = self._moved(q, seen, error, pull)
+            pull = None
+        ended.append(_Reached(q, seen, worst))
+        of.append(rows)
+        if len(ended) == 1:
+            return ended[0]
+        return _Reached(*(joined(parts, of) for parts in zip(*ended, strict=True)))
 
-    def _step(self, J: Array, e: Array, damping: float, pull: Array | None) -> Array:
+    def _moved(self, q: Array, seen: Array, error: Array, pull: Array | None) -> tuple[Array, Array | None]:
+        """Joints one step on, and which rows ``(N,)`` get nowhere any more; those stay as they are."""
+        xp = array_namespace(q)
+        jacobian = self.chain.jacobian(seen)
+        if self._asked is not None:
+            jacobian = xp.take(jacobian, xp.asarray(self._asked, device=q.device), axis=1)
+        jacobian = jacobian * self._weights
+        error = error * self._weights
+        damping = 0.5 * total(error * error) + _DAMPING
+        step = self._step(jacobian, error, damping, pull)
+        largest = _largest(step)
+        kept = q + step * (_LONGEST / at_least(largest, _LONGEST))
+        stuck = None if pull is not None else largest < _STUCK
+        past = (kept < self._lower) | (kept > self._upper)
+        if some(past):
+            index = where_true(either(past))
+            here = taken(q, index)
+            z = xp.zeros_like(here) if pull is None else taken(pull, index)
+            held = self._saturate(here, taken(jacobian, index), taken(error, index), taken(damping, index), z)
+            kept = put(kept, index, held)
+            if stuck is not None:
+                stuck = put(stuck, index, _largest(held - here) < _STUCK)
+        if stuck is not None:
+            kept = xp.where(stuck, q, kept)
+        return kept, stuck
+
+    def _step(self, jacobian: Array, error: Array, damping: Array, pull: Array | None) -> Array:
         """Damped least squares with a null-space step: ``z + J^T (J J^T + damping)^-1 (e - J z)``."""
-        turned = J.T
-        A = J @ turned
-        A += damping * self._eye
+        square = total(jacobian[:, :, None] * jacobian[:, None, :]) + damping * self._eye
         if pull is None:
-            return turned @ eigenpy.LLT(A).solve(e)
-        return pull + turned @ eigenpy.LLT(A).solve(e - J @ pull)
+            return _along(jacobian, solve_symmetric(square, error))
+        return pull + _along(jacobian, solve_symmetric(square, error - total(jacobian * pull[:, None])))
 
-    def _saturate(self, q: Array, J: Array, e: Array, damping: float, pull: Array | None) -> Array:
+    def _saturate(self, q: Array, jacobian: Array, error: Array, damping: Array, pull: Array) -> Array:
         """The step's result within the limits: joints that pass one are set on it, the worst first."""
-        free = np.ones(self._n, bool)
-        z = np.zeros(self._n) if pull is None else pull
-        step = np.zeros(self._n)
-        while free.any():
-            step[free] = self._step(J[:, free], e - J[:, ~free] @ step[~free], damping, z[free])
-            largest = float(np.abs(step[free]).max())
-            if largest > 0.5:
-                step[free] *= 0.5 / largest
-            excess = np.maximum(q + step - self._upper, self._lower - q - step)
-            excess[~free] = 0.0
-            worst = int(np.argmax(excess))
-            if excess[worst] <= 0.0:
+        xp = array_namespace(q)
+        free, step = xp.ones_like(q), xp.zeros_like(q)
+        joint = xp.asarray(np.arange(self._n)[:, None], device=q.device)
+        for _ in range(self._n):
+            held = step * (1.0 - free)
+            left = error - total(jacobian * held[:, None])
+            moved = self._step(jacobian * free[:, None], left, damping, pull * free) * free
+            moved = moved * (_LONGEST / at_least(_largest(moved), _LONGEST))
+            step = moved + held
+            excess = xp.where(free > 0.0, xp.maximum(q + step - self._upper, self._lower - q - step), 0.0 * q)
+            worst = joint == xp.argmax(excess, axis=0)
+            sets = worst & (excess > 0.0)
+            if not some(sets):
                 break
-            limit = self._upper if step[worst] > 0.0 else self._lower
-            step[worst] = limit[worst] - q[worst]
-            free[worst] = False
-        return np.minimum(np.maximum(q + step, self._lower), self._upper)
+            limit = xp.where(step > 0.0, self._upper - q, self._lower - q)
+            step, free = xp.where(sets, limit, step), xp.where(sets, 0.0 * free, free)
+        return xp.minimum(xp.maximum(q + step, self._lower), self._upper)
 
-    def _error(self, q: Array, pose: pin.SE3) -> Array:
-        pin.forwardKinematics(self._model, self._data, q)
-        miss = pin.updateFramePlacement(self._model, self._data, self._frame).actInv(pose)
-        return np.concatenate([miss.translation, pin.log3(miss.rotation)]) * (self._robot.task_mask > 0.0)
+    def _error(self, seen: Array, goal: Array) -> Array:
+        """What is left of the way in the components that are asked for ``(m, N)``, m and rad."""
+        way = difference(seen[0], goal)
+        return way if self._asked is None else chosen(way, self._asked)
 
-    def _cost(self, q: Array, pose: pin.SE3) -> float:
-        e = self._error(q, pose)[self._rows] * self._weights
-        return float(e @ e)
-
-    def _missed(self, q: Array, pose: pin.SE3) -> tuple[float, float] | None:
-        """Metres and radians by which the tool misses the pose; None where that is nothing to speak of."""
-        e = self._error(q, pose)
-        distance, angle = float(np.linalg.norm(e[:3])), float(np.linalg.norm(e[3:]))
-        return (distance, angle) if distance > _MISS[0] or angle > _MISS[1] else None
-
-
-def _unreachable(robot: str, pose: pin.SE3, distance: float, angle: float, how: str = "") -> UnreachableError:
-    x, y, z = pose.translation
-    return UnreachableError(
-        f"{robot} cannot bring its tool to ({x:.3f}, {y:.3f}, {z:.3f}) m{' ' * bool(how)}{how}: "
-        f"the nearest pose misses by {1000 * distance:.1f} mm and {np.rad2deg(angle):.1f} degrees",
-        distance,
-        angle,
-    )
+    def _missed(self, seen: Array, goal: Array) -> _Missed:
+        """How far the tool is from its placements."""
+        xp = array_namespace(goal)
+        way = difference(seen[0], goal) * self._counted
+        square = way * way
+        weighed = self._error(seen, goal) * self._weights
+        return _Missed(
+            host(xp.sqrt(square[0] + square[1] + square[2])),
+            host(xp.sqrt(square[3] + square[4] + square[5])),
+            host(total(weighed * weighed)),
+        )
 
 
-def _largest(values: Array) -> float:
-    """Largest magnitude of a few numbers; NumPy takes longer for so few."""
-    return float(max(map(abs, values.tolist())))
+def _with(found: Found, rows: np.ndarray, other: Found) -> Found:
+    """What was found, with other values for some rows."""
+    return Found(*(put(old, rows, new) for old, new in zip(found, other, strict=True)))
 
 
-def _within(low: float, x: float, high: float) -> bool:
-    return low <= x <= high
+def _along(jacobian: Array, force: Array) -> Array:
+    """``J^T y (n, N)`` of a transposed Jacobian ``(n, m, N)`` and ``y (m, N)``."""
+    terms = jacobian * force
+    out = terms[:, 0]
+    for i in range(1, force.shape[0]):
+        out = out + terms[:, i]
+    return out
+
+
+def _largest(values: Array) -> Array:
+    """Largest magnitude ``(N,)`` of values ``(k, N)``."""
+    return highest(abs(values))
+
+
+def _square(values: Array) -> Array:
+    """Sums of squares ``(N,)`` of values ``(k, N)``."""
+    return total(values * values)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import JointTarget
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_robot import Robot
@@ -19,8 +16,8 @@ FINE = 8
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
 WATCHED = 4
-"""Control periods after the hand closed fast or a contact came or went, in which overlaps are looked for at
-every step; at other times at the period's end."""
+"""Control periods from the beginning, and after the hand closed fast or a contact came or went, in which
+overlaps are looked for at every step; at other times at the period's end."""
 
 
 class SapienReading(NamedTuple):
@@ -33,7 +30,7 @@ class SapienReading(NamedTuple):
         incoming: Forces ``(n_links, 6)`` and torques that each link's parent exerts on it.
         frames: Poses of `Robot.frames`.
         objects: Poses of the objects.
-        velocities: Six numbers for each object.
+        velocities: Linear and angular ones ``(3,)`` of one object after the other.
         touch: What touches what.
         penetration: The deepest overlap so far, metres.
     """
@@ -44,7 +41,7 @@ class SapienReading(NamedTuple):
     incoming: Array
     frames: list[tuple[float, ...]]
     objects: list[tuple[float, ...]]
-    velocities: list[list[float]]
+    velocities: list[Array]
     touch: Touch
     penetration: float
 
@@ -72,25 +69,27 @@ class SapienWorld:
         self._dt = self._last_dt = 1.0 / configuration.physics_frequency
         self._substeps = configuration.physics_frequency // configuration.control_frequency
         self._time = 0.0
-        self._falling = self._rolling = False
-        self._watch = 0
+        self._falling = self._rolling = self._asleep = False
+        self._watch = WATCHED
         self._reader = ContactReader(world, n_tips)
-        self._touch = Touch([[0.0] * 3] * n_tips, [], [], set())
+        self._touch = self._reader.nothing
         disturbance, names = configuration.disturbance, [actor.name for actor in configuration.objects]
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
-        self._read()
 
     @property
     def deepest_pair(self) -> tuple[str, str, float, float] | None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         return self._reader.deepest_pair
 
-    def advance(self, target: JointTarget) -> None:
+    def drive_to(self, position: list[float], velocity: list[float]) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        if self.robot.drive_to(position, velocity):
+            self._watch = WATCHED
+
+    def advance(self) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         self._last_dt = self._dt
-        if self.robot.drive_to(target.position.tolist(), target.velocity.tolist()):
-            self._watch = WATCHED
         step = self.world.system.step
         if not self._disturbance.over:
             for _ in range(self._substeps):
@@ -109,7 +108,6 @@ class SapienWorld:
             for _ in range(self._substeps):
                 step()
         self._time += self._dt * self._substeps
-        self._read()
 
     def _fine_steps(self, n: int) -> None:
         world = self.world
@@ -126,33 +124,31 @@ class SapienWorld:
 
     # ---- reading ----------------------------------------------------------------------------------------
 
-    def _read(self) -> None:
-        robot, bodies = self.robot, self.world.objects
-        q, v = robot.articulation.get_qpos(), robot.articulation.get_qvel()
-        objects = [floats(body.entity_pose) for body in bodies]
-        moving = [[*b.linear_velocity.tolist(), *b.angular_velocity.tolist()] for b in bodies]
-        if not math.isfinite(float(q @ q) + float(v @ v) + sum(map(sum, objects)) + sum(map(sum, moving))):
-            raise MachineError(
-                f"SAPIEN's state is no longer finite after {self._time:.2f} s: see the last target"
-            )
-        self._feel()
+    def read(self) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        articulation, bodies = self.robot.articulation, self.world.objects
+        slept, self._asleep = self._asleep, all(body.is_sleeping for body in bodies)
+        still = slept and self._asleep
+        self._feel(still)
+        if not still:
+            self._objects = [floats(body.entity_pose) for body in bodies]
+            self._velocities = [v for body in bodies for v in (body.linear_velocity, body.angular_velocity)]
         self.reading = SapienReading(
             self._time,
-            q,
-            v,
-            robot.articulation.get_link_incoming_joint_forces(),
-            [floats(link.entity_pose) for link in robot.frames],
-            objects,
-            moving,
+            articulation.get_qpos(),
+            articulation.get_qvel(),
+            articulation.get_link_incoming_joint_forces(),
+            [floats(link.entity_pose) for link in self.robot.frames],
+            self._objects,
+            self._velocities,
             self._touch,
             self._reader.penetration,
         )
 
-    def _feel(self) -> None:
+    def _feel(self, asleep: bool = False) -> None:
         """Read what touches what; look closely for some time where that has changed."""
-        before, now = self._touch, self._reader.read(self._time, self._last_dt)
-        touched = [force > 0.0 for force in now.hand_force]
-        if touched != [force > 0.0 for force in before.hand_force] or now.support != before.support:
+        before, now = self._touch, self._reader.read(self._time, self._last_dt, asleep)
+        if now.touched != before.touched or now.support != before.support:
             self._watch = WATCHED
         self._touch = now
 

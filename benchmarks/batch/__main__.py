@@ -1,0 +1,47 @@
+"""``python -m benchmarks.batch [SECTION ...] [--quick] [--json FILE]``: measures worlds in batches.
+
+A section is a module of this package with ``options(parser)``, which adds what it takes, and
+``measure(options)``, which prints its table and returns its numbers. Without a name all are measured.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from benchmarks.batch import executor, kinematics, physics, same_ticks
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.files import write_text
+
+SECTIONS = {"executor": executor, "kinematics": kinematics, "physics": physics, "same-ticks": same_ticks}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure sections; 1 where one of them found that something is not as it should be."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.batch", description=__doc__.splitlines()[0])
+    parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
+    parser.add_argument("--quick", action="store_true", help="less of everything")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
+    for section in SECTIONS.values():
+        section.options(parser)
+    options = parser.parse_args(argv)
+    unknown = [name for name in options.sections if name not in SECTIONS]
+    if unknown:
+        parser.error(f"there is no section '{unknown[0]}': there are {', '.join(SECTIONS)}")
+    found = {}
+    try:
+        for name in options.sections or SECTIONS:
+            found[name] = SECTIONS[name].measure(options)
+    except InputError as error:
+        parser.error(str(error))
+    if options.json is not None:
+        write_text(options.json, json.dumps(found, indent=2) + "\n")
+        print(f"wrote {options.json}")
+    return int(any("differs" in numbers for numbers in found.values()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

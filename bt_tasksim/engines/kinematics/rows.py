@@ -1,0 +1,106 @@
+"""Rows of arrays whose rows come last: those that a mask names, and putting pieces together again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import array_api_compat
+import numpy as np
+
+from bt_tasksim.core.poses import Array, array_namespace
+
+
+def host(array: Array) -> np.ndarray:
+    """An array in NumPy's form, wherever it is."""
+    if isinstance(array, np.ndarray):
+        return array
+    try:
+        return np.asarray(array)
+    except (TypeError, RuntimeError, ValueError):
+        return np.from_dlpack(array_api_compat.to_device(array, "cpu"))
+
+
+def where_true(mask: Array) -> np.ndarray:
+    """Indices ``(k,)`` of the rows that a mask ``(N,)`` names."""
+    return np.flatnonzero(host(mask))
+
+
+def taken(array: Array, rows: np.ndarray) -> Array:
+    """The named rows ``(..., k)`` of an array ``(..., N)``."""
+    if type(array) is np.ndarray:
+        return array.take(rows, axis=-1)
+    xp = array_namespace(array)
+    return xp.take(array, xp.asarray(rows, device=array.device), axis=-1)
+
+
+def put(array: Array, rows: np.ndarray, values: Array) -> Array:
+    """An array ``(..., N)`` whose named rows are ``values (..., k)``."""
+    source = np.arange(array.shape[-1])
+    source[rows] = array.shape[-1] + np.arange(len(rows))
+    return taken(array_namespace(array, values).concat([array, values], axis=-1), source)
+
+
+def joined(pieces: Sequence[Array], rows: Sequence[np.ndarray]) -> Array:
+    """The array ``(..., N)`` whose rows ``rows[i]`` are ``pieces[i]``; every row is in one piece."""
+    if len(pieces) == 1:
+        return pieces[0]
+    whole = array_namespace(*pieces).concat(list(pieces), axis=-1)
+    return taken(whole, np.argsort(np.concatenate(rows)))
+
+
+def columns(array: Array) -> Array:
+    """Rows ``(N, k)`` as columns ``(k, N)``, each component's worlds side by side in memory."""
+    return contiguous(array_namespace(array).permute_dims(array, (1, 0)))
+
+
+def contiguous(array: Array) -> Array:
+    """The same numbers, side by side in memory where the library can say so."""
+    if type(array) is np.ndarray:
+        return np.ascontiguousarray(array)
+    return array.contiguous() if hasattr(array, "contiguous") else array
+
+
+# What follows is the library's own, said shortly for NumPy, whose wrappers take longer than few rows.
+
+
+def some(mask: Array) -> bool:
+    """An element of a mask is true."""
+    if type(mask) is np.ndarray:
+        return bool(np.count_nonzero(mask))
+    return bool(array_namespace(mask).any(mask))
+
+
+def every(mask: Array) -> bool:
+    """All elements of a mask are true."""
+    if type(mask) is np.ndarray:
+        return bool(np.count_nonzero(mask) == mask.size)
+    return bool(array_namespace(mask).all(mask))
+
+
+def either(mask: Array) -> Array:
+    """An element ``(N,)`` of each row of a mask ``(k, N)`` is true."""
+    if type(mask) is np.ndarray:
+        return np.logical_or.reduce(mask, axis=0)
+    return array_namespace(mask).any(mask, axis=0)
+
+
+def highest(values: Array) -> Array:
+    """Largest ``(N,)`` of values ``(k, N)``."""
+    if type(values) is np.ndarray:
+        return np.maximum.reduce(values, axis=0)
+    return array_namespace(values).max(values, axis=0)
+
+
+def at_least(values: Array, low: float) -> Array:
+    """Values, and where they are smaller the bound."""
+    if type(values) is np.ndarray:
+        return np.maximum(values, low)
+    return array_namespace(values).clip(values, min=low)
+
+
+def chosen(array: Array, index: np.ndarray) -> Array:
+    """Entries ``(k, ...)`` of the first axis by their indices."""
+    if type(array) is np.ndarray:
+        return array.take(index, axis=0)
+    xp = array_namespace(array)
+    return xp.take(array, xp.asarray(index, device=array.device), axis=0)

@@ -1,0 +1,164 @@
+"""Evaluation on a Ray cluster: the same outcomes, whatever the actors, and whoever is killed."""
+
+import importlib.util
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from benchmarks.cluster import local_cluster, timeless
+from bt_tasksim.cli.main import main
+from bt_tasksim.core.errors import BtTasksimWarning, InputError
+from bt_tasksim.core.identity import identity
+from bt_tasksim.core.resources import HOME
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.training.evaluation import Job, evaluate
+from bt_tasksim.training.evaluation_file import EvaluationFile, read_kept
+from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome
+
+pytestmark = pytest.mark.skipif(
+    importlib.util.find_spec("ray") is None, reason="Ray is not installed: pip install 'bt-tasksim[cluster]'"
+)
+JOB = Job("pick_and_throw", options=EngineOptions(engines="sapien", noise="hard"))
+SEEDS = range(40, 48)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return evaluate(JOB, SEEDS)
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A head with room for three actors; tests start more nodes, and end them."""
+    with local_cluster(3) as found:
+        yield found
+
+
+def members(cluster, node=0):
+    """Processes of actors on a node."""
+    mine = set(cluster.nodes[node].processes())
+    return [
+        p for p in psutil.process_iter(["name"]) if p.pid in mine and p.info["name"].startswith("ray::Mem")
+    ]
+
+
+@pytest.mark.parametrize("engines", ["sapien", "mujoco"])
+def test_one_and_three_actors_give_the_same_bits_also_after_one_was_killed(cluster, whole, engines, tmp_path):
+    if engines == "sapien":
+        job, alone = JOB, whole
+    else:
+        pytest.importorskip("mujoco")
+        job = Job(JOB.tree, options=EngineOptions(engines=engines, noise="hard"))
+        alone = evaluate(job, SEEDS)
+    killed, ended = [], []
+
+    def kill_one(outcome):
+        ended.append(outcome.seed)
+        if len(ended) == 3:
+            killed.append(members(cluster)[0].pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    with pytest.warns(BtTasksimWarning, match="an actor on .* ended"):
+        three = evaluate(job, SEEDS, 3, progress=kill_one, cluster=cluster.address)
+    assert killed and sorted(ended) == list(SEEDS), "none twice"
+    assert [o.seed for o in three.outcomes] == list(SEEDS)
+    assert timeless(three.outcomes) == timeless(alone.outcomes)
+    if engines == "sapien":
+        one = evaluate(job, SEEDS, 1, cluster=cluster.address)
+        assert timeless(one.outcomes) == timeless(alone.outcomes) and one.subject == alone.subject
+        path = tmp_path / "e.json"
+        evaluate(job, SEEDS[:3], keep=EvaluationFile(path))
+        kept = read_kept(path, identity())
+        rest = evaluate(job, SEEDS, cluster=cluster.address, kept=kept)
+        assert timeless(rest.outcomes) == timeless(alone.outcomes)
+
+
+def test_a_node_that_is_killed_is_made_up_for(cluster, whole):
+    cluster.start()
+    ended = []
+
+    def kill_node(outcome):
+        ended.append(outcome.seed)
+        if len(ended) == 4:
+            cluster.nodes.pop().kill()
+
+    with pytest.warns(BtTasksimWarning, match="an actor on .* ended"):
+        found = evaluate(JOB, SEEDS, 4, progress=kill_node, cluster=cluster.address)
+    assert timeless(found.outcomes) == timeless(whole.outcomes) and sorted(ended) == list(SEEDS)
+
+
+@pytest.mark.parametrize("there", ["another source", "an older version"])
+def test_a_node_with_another_version_is_refused(cluster, tmp_path, there):
+    shutil.copytree(HOME, tmp_path / "bt_tasksim", ignore=shutil.ignore_patterns("*.h5", "__pycache__"))
+    core, said = tmp_path / "bt_tasksim" / "core", "has another version .*source"
+    if there == "another source":
+        with open(core / "units.py", "a") as file:
+            file.write("# changed\n")
+    else:
+        (core / "identity.py").write_text("raise ModuleNotFoundError('there is none')\n")
+        said = "has no bt-tasksim, or an older version .*there is none"
+    node = cluster.start(2, {"PYTHONPATH": str(tmp_path)})
+    try:
+        with pytest.raises(InputError, match=f"the node .* of the cluster {said}") as caught:
+            evaluate(JOB, range(100), 5, cluster=cluster.address)
+        assert "\n" not in str(caught.value)
+    finally:
+        cluster.nodes.remove(node)
+        node.kill()
+
+
+def test_what_a_node_does_not_find_is_said_with_its_name(cluster, monkeypatch, tmp_path):
+    """The actors' files may be others than ours: here a tree is gone until they look for it."""
+    tree = tmp_path / "mine.py"
+    tree.write_text(
+        "import multiprocessing, sys\n"
+        "assert 'ray' not in sys.modules\n"
+        "from bt_tasksim.trees.scenarios.pick_and_throw import build, scene\n"
+    )
+    with pytest.raises(InputError, match=r"on the node .* of the cluster: .*mine\.py', line 2: Assertion"):
+        evaluate(Job(str(tree)), [1, 2], cluster=cluster.address)
+
+
+def test_engines_that_serve_one_client_are_refused():
+    for engines in ("remote:127.0.0.1:5555", "ros:127.0.0.1:9090"):
+        with pytest.raises(InputError, match="one client at a time: leave --cluster away"):
+            evaluate(Job("pick_and_throw", options=EngineOptions(engines=engines)), [1], cluster="local")
+
+
+def test_a_wrong_address_is_refused_by_the_command(capsys):
+    assert main(["evaluate", "pick_and_throw", "--cluster", "ray://10.0.0.1"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)]
+)
+def test_a_command_that_is_ended_loses_nothing_and_leaves_nothing(tmp_path, whole, number, code):
+    words = ["evaluate", "pick_and_throw", "--noise", "hard", "--seed", "40", "--episodes", "8", "--json"]
+    command = [sys.executable, "-m", "bt_tasksim.cli", *words, "e.json", "--cluster", "local"]
+    first = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    journal, until = tmp_path / "e.json.episodes", time.monotonic() + 90.0
+    while not (journal.exists() and journal.read_bytes().count(b"\n") >= 3):
+        assert first.poll() is None and time.monotonic() < until
+        time.sleep(0.005)
+    begun = psutil.Process(first.pid).children(recursive=True)
+    first.send_signal(number)
+    _, said = first.communicate()
+    assert first.returncode == code and said.count("\n") == (number != signal.SIGKILL), said
+    _, left = psutil.wait_procs(begun, timeout=30.0)
+    assert [p for p in left if p.status() != psutil.STATUS_ZOMBIE] == []
+    path = str(tmp_path / "e.json")
+    assert 2 <= len(read_kept(path, identity()).outcomes) < 8
+    if number != signal.SIGKILL:
+        return
+    assert main([*words, path, "--resume"]) == 0
+    content = json.loads(Path(path).read_text())
+    assert timeless(EpisodeOutcome.from_data(o) for o in content["outcomes"]) == timeless(whole.outcomes)
