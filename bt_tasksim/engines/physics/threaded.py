@@ -183,7 +183,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             except BtTasksimError as error:
                 self.errors[row] = error
 
-        self._share(build, zip(rows.tolist(), configurations, strict=True))
+        self._share(build, list(zip(rows.tolist(), configurations, strict=True)))
         fresh = [world for row in rows.tolist() if (world := self.simulated[row]) is not None]
         self._widen(
             max((world.n_objects for world in fresh), default=0),
@@ -235,7 +235,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             self._pool.shutdown()
         self.simulated = [None] * self.worlds
 
-    def _share(self, work: Callable[[T], None], jobs: Iterable[T]) -> None:
+    def _share(self, work: Callable[[T], None], jobs: Sequence[T]) -> None:
         """Do all jobs, each by the thread that is free for it."""
         left = iter(jobs)  # one for all: taking the next one is a single step of the interpreter
 
@@ -243,7 +243,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             for job in left:
                 work(job)
 
-        others = [self._pool.submit(some) for _ in range(self._threads - 1)] if self._pool else []
+        others = [self._pool.submit(some) for _ in jobs[1 : self._threads]] if self._pool else []
         try:
             some()
         finally:
