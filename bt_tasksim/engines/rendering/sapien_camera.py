@@ -25,6 +25,11 @@ class SceneCamera:
         model: The camera.
         frame: Pose ``(7,)`` in the scene of the frame in which the camera has its own.
         shader: Name of SAPIEN's shaders, ``default`` or ``minimal``; ManiSkill's scenes are lit for these.
+
+    Attributes:
+        model: The camera.
+        component: SAPIEN's camera.
+        entity: What carries it in the scene.
     """
 
     def __init__(
@@ -34,14 +39,14 @@ class SceneCamera:
 
         self.model, self._scene, self._minimal = model, scene, shader == "minimal"
         sapien.render.set_camera_shader_dir(shader)  # for all cameras that are made from now on
-        self._component = sapien.render.RenderCameraComponent(model.width, model.height)
-        self._component.set_perspective_parameters(
+        self.component = sapien.render.RenderCameraComponent(model.width, model.height)
+        self.component.set_perspective_parameters(
             NEAR, FAR,
             float(model.matrix[0, 0]), float(model.matrix[1, 1]),
             float(model.matrix[0, 2]), float(model.matrix[1, 2]), 0.0,
         )  # fmt: skip
         self.entity = sapien.Entity()
-        self.entity.add_component(self._component)
+        self.entity.add_component(self.component)
         at = model.pose if frame is None else poses.multiply(frame, model.pose)
         self.entity.set_pose(sapien.Pose(at[:3], at[3:]) * sapien.Pose(np.zeros(3), TO_OPTICAL))
         scene.add_entity(self.entity)
@@ -52,7 +57,7 @@ class SceneCamera:
         Args:
             depth: Fetch the depth image, too.
         """
-        component = self._component
+        component = self.component
         try:
             component.take_picture()
             colour = component.get_picture("Color")
