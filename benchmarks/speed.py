@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import py_trees
@@ -133,7 +134,7 @@ def _maniskill_rate(env: Any, steps: int) -> tuple[float, float]:
 
 
 def outside_physics(episodes: int, robot: str = "panda") -> dict[str, Any]:
-    """Median microseconds a control step spends in each part; physics is PhysX's own stepping."""
+    """Median microseconds a control step spends in each part; physics is PhysX's own steps."""
     runner = _runner("pick_and_place", robot)
     runner.run(0)
     clock = _Clock()
@@ -147,13 +148,17 @@ def outside_physics(episodes: int, robot: str = "panda") -> dict[str, Any]:
     clock.wrap(runner.pipeline.kinematics, "solve", "kinematics")
     clock.wrap(runner.pipeline.postprocess, "observe", "observation")
     clock.wrap(physics, "step", "physics engine")
-    clock.wrap(physics, "_state", "state")
     clock.wrap(runner.pipeline, "step", "pipeline")
-    for seed in range(1, 1 + episodes):
-        runner.run(seed, record=lambda step: clock.next())
+    use_software_driver()
+    from sapien import physx
+
+    stepping = clock.timed(physx.PhysxCpuSystem.step, "stepping")
+    with mock.patch.object(physx.PhysxCpuSystem, "step", stepping):
+        for seed in range(1, 1 + episodes):
+            runner.run(seed, record=lambda step: clock.next())
     parts = clock.table()
+    parts["state"] = parts["physics engine"] - parts["stepping"]
     tick, concepts = parts["tick"] - parts["concepts"], parts["concepts"]
-    stepping = parts["physics engine"] - parts["state"]
     rest = parts["pipeline"] - parts["kinematics"] - parts["physics engine"] - parts["observation"]
     table = {
         "tick": np.median(tick),
@@ -167,7 +172,7 @@ def outside_physics(episodes: int, robot: str = "panda") -> dict[str, Any]:
         "parts_us": {k: float(1e6 * v) for k, v in table.items()},
         "outside_us": float(1e6 * np.median(outside)),
         "outside_mean_us": float(1e6 * np.mean(outside)),
-        "physics_us": float(1e6 * np.median(stepping)),
+        "physics_us": float(1e6 * np.median(parts["stepping"])),
     }
 
 
@@ -180,9 +185,10 @@ class _Clock:
         self.depth = 0
 
     def wrap(self, owner: Any, name: str, part: str) -> None:
-        call: Callable[..., Any] = getattr(owner, name)
+        object.__setattr__(owner, name, self.timed(getattr(owner, name), part))
 
-        def timed(*args: Any, **kwargs: Any) -> Any:
+    def timed(self, call: Callable[..., Any], part: str) -> Callable[..., Any]:
+        def inner(*args: Any, **kwargs: Any) -> Any:
             nested = part == "concepts" and self.depth > 0
             self.depth += part == "concepts"
             started = time.perf_counter()
@@ -194,7 +200,7 @@ class _Clock:
                 if not nested:
                     self.now[part] = self.now.get(part, 0.0) + spent
 
-        object.__setattr__(owner, name, timed)
+        return inner
 
     def next(self) -> None:
         self.rows.append(self.now)

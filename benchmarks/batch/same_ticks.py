@@ -255,6 +255,8 @@ class BatchedLeaf(BatchLeaf):
 
     def tick(self, rows: Any, fresh: Any) -> Any:
         """The next answers, or PENDING."""
+        if sorted(rows.tolist()) != rows.tolist():
+            raise AssertionError("rows should ascend")
         for row, begins in zip(rows.tolist(), fresh.tolist(), strict=True):
             if begins:
                 self.logs[row].append(f"{self.name} begins")

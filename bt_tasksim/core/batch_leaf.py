@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 from typing import Final
 
+from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 
 INVALID: Final = 0
@@ -20,8 +21,8 @@ node's status, which stays what it was before the tick."""
 class BatchLeaf(abc.ABC):
     """A leaf of a tree that is ticked in many worlds at once.
 
-    Worlds are given as ``rows``, an integer array ``(k,)`` of different numbers in no particular order;
-    statuses go back as an ``int8`` array ``(k,)`` of the same library and device.
+    Worlds are given as ``rows``, an integer array ``(k,)`` of ascending numbers; statuses go back as an
+    ``int8`` array ``(k,)`` of the same library and device.
     """
 
     @abc.abstractmethod
@@ -49,3 +50,7 @@ class BatchLeaf(abc.ABC):
 
     def stop(self, rows: Array) -> None:  # noqa: B027  # most have nothing to do
         """It is interrupted in worlds where it is RUNNING or PENDING, which the tree does not tick on."""
+
+    def outcome(self, row: int) -> Outcome | None:
+        """How it ended in a world when it was last active; None: it runs, or has nothing to say."""
+        return None

@@ -82,6 +82,7 @@ class BatchTree:
         """``(N,)`` seconds since each world's episode began, at its last tick."""
         self.waits_at = self.arrays.full(-1, "int32")
         self._waiting = 0
+        self._here, self._said = self.arrays.full(False, "bool"), self.arrays.full(INVALID, "int8")
         self._due: list[int] = []
         self._inbox: dict[int, list[tuple[Array, ...]]] = {}
         self._handlers: list[Callable[..., None]] = []
@@ -170,14 +171,20 @@ class BatchTree:
 
     def stop_node(self, node: int, rows: Array) -> None:
         """Stop a node and all below it; for nodes, see `trees.nodes.batch.Batch`."""
+        if self._ends[node] == node + 1:
+            self._end(node, rows, self._status_of[node][rows])
+            return
         block = self.xp.take(self._status[node : self._ends[node]], rows, axis=1)
         for below in self.arrays.where(self.xp.any(block != INVALID, axis=1)).tolist():
-            least, listener = self._listeners.get(node + below, (0, None))
-            if listener is not None:
-                heard = self.arrays.where((block[below] != INVALID) & (block[below] <= least))
-                if len(heard):
-                    listener(rows[heard])
-            self._status_of[node + below][rows] = INVALID
+            self._end(node + below, rows, block[below])
+
+    def _end(self, node: int, rows: Array, status: Array) -> None:
+        most, listener = self._listeners.get(node, (INVALID, None))
+        if listener is not None:
+            heard = self.arrays.where((status != INVALID) & (status <= most))
+            if len(heard):
+                listener(rows[heard])
+        self._status_of[node][rows] = INVALID
 
     def _send(self, event: int, parcel: tuple[Array, ...]) -> None:
         if event in self._inbox:
@@ -189,23 +196,32 @@ class BatchTree:
     def _run(self, rows: Array, first: dict[int, Array]) -> Array:
         try:
             for event, there in first.items():
-                self._send(event, (there,))
+                self._send(event, self._merged([(there,)]))
             while self._due:
                 event = heapq.heappop(self._due)
                 parcels = self._inbox.pop(event)
-                parcel = parcels[0]
-                if len(parcels) > 1:
-                    parcel = tuple(self.xp.concat(parts) for parts in zip(*parcels, strict=True))
-                self._handlers[event](*parcel)
+                self._handlers[event](*(parcels[0] if len(parcels) == 1 else self._merged(parcels)))
         except BaseException as error:
             self._give_up(rows)
             if self._at is None or isinstance(error, BtTasksimError) or not isinstance(error, Exception):
                 raise
             raise leaf_error(error, self.nodes[self._at[0]].name) from error
+        finally:
+            self._at = None
         status = self._status_of[0][rows]
         if self._waiting:
             status[self.waits_at[rows] >= 0] = PENDING
         return status
+
+    def _merged(self, parcels: list[tuple[Array, ...]]) -> tuple[Array, ...]:
+        """Rows, and the statuses that come with them, of several parcels as one; rows ascend."""
+        for rows, *status in parcels:
+            self._here[rows] = True
+            if status:
+                self._said[rows] = status[0]
+        rows = self.arrays.where(self._here)
+        self._here[rows] = False
+        return (rows, self._said[rows]) if len(parcels[0]) > 1 else (rows,)
 
     def _give_up(self, rows: Array) -> None:
         """End all nodes in the worlds of a tick in which a leaf raised, that leaf too."""

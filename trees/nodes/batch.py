@@ -13,6 +13,7 @@ import abc
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import methodcaller
 from typing import Any, Protocol
 
 import array_api_compat.numpy
@@ -40,12 +41,16 @@ class Arrays:
         self.xp = array_namespace(xp.zeros(0))
         self._count, self._nonzero = xp.count_nonzero, self.xp.nonzero
         if self.xp is array_api_compat.numpy:  # without the wrapper, most of the time of a small batch
-            self._nonzero = np.nonzero
+            self._nonzero = methodcaller("nonzero")
 
     def full(self, value: float | bool, dtype: str, *shape: int) -> Array:
         """A number for each world: ``(*shape, N)``."""
         kind = getattr(self.xp, dtype)
         return self.xp.full((*shape, self.worlds), value, dtype=kind, device=self.device)
+
+    def indices(self, count: int) -> Array:
+        """A 0 for each world ``(N,)``, to become any number below ``count``: short ones sort much faster."""
+        return self.full(0, "int16" if count <= 2**15 else "int32")
 
     def statuses(self, rows: Array, status: int) -> Array:
         """The same status ``(k,)`` for all rows ``(k,)``."""
@@ -141,19 +146,17 @@ class BatchNode(abc.ABC):
 
     def part(self, rows: Array, mask: Array) -> Array:
         """Those rows for which a mask ``(k,)`` holds."""
-        found = self.arrays.count(mask)
-        if found == len(rows):
-            return rows
-        return rows[self.arrays.where(mask)] if found else rows[:0]
+        found = self.arrays.where(mask)
+        return rows if len(found) == len(rows) else rows[found]
 
     def split(self, mask: Array, rows: Array, *more: Array) -> tuple[list[Array], list[Array]]:
         """Arrays ``(k,)`` where a mask holds, and where it does not."""
-        arrays, found = [rows, *more], self.arrays.count(mask)
-        if found == len(rows):
+        arrays, yes = [rows, *more], self.arrays.where(mask)
+        if len(yes) == len(rows):
             return arrays, [a[:0] for a in arrays]
-        if not found:
+        if not len(yes):
             return [a[:0] for a in arrays], arrays
-        yes, no = self.arrays.where(mask), self.arrays.where(~mask)
+        no = self.arrays.where(~mask)
         return [a[yes] for a in arrays], [a[no] for a in arrays]
 
     def tick_child(self, child: int, rows: Array) -> None:

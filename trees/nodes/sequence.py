@@ -56,7 +56,7 @@ class BatchSequence(BatchNode):
     def __init__(self, place: Place, memory: bool) -> None:
         super().__init__(place)
         self.memory, self.last = memory, len(place.children) - 1
-        self.current = self.arrays.full(0, "int32")
+        self.current = self.arrays.indices(len(place.children))
         """``(N,)`` the child that was ticked last; only a sequence with memory keeps it."""
 
     def tick(self, rows: Array) -> None:

@@ -120,7 +120,7 @@ class ManiSkillPhysics(PhysicsEngine):
             world.bodies[body_of(self._open().actor(entry.actor or name))] = ("fixture", n + k)
         self._n_bodies = n + len(self.world.file.fixtures)
         self._reader = ContactReader(world, len(self.robot.tips), skin=0.0)
-        self._touch = Touch([[0.0] * 3] * len(self.robot.tips), [0.0] * n, [np.inf] * n, set())
+        self._touch = self._reader.nothing
         self._configuration = c
         return self._state(np.zeros(6))  # SAPIEN's sensor still has the force of the last episode's last step
 

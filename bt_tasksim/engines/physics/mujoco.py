@@ -38,6 +38,8 @@ class MujocoBatch(ThreadedBatch[MujocoWorld]):
         MachineError: MuJoCo is not installed.
     """
 
+    library = "MuJoCo"
+
     def __init__(self, robot: RobotDescription, worlds: int, threads: int) -> None:
         try:
             import mujoco

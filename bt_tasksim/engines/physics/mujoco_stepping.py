@@ -8,9 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import JointTarget
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.mujoco_contacts import FINE_STEP, TIMESTEP
 from bt_tasksim.engines.physics.mujoco_model import World, build_world
@@ -110,7 +108,7 @@ class MujocoWorld:
         self._hand_force = [0.0] * self.n_objects
         self.data.qpos[self.world.joint_qpos] = start
         self.data.xfrc_applied[self.world.object_body, 2] = -self.world.weight
-        self._drive_to(JointTarget(start, np.zeros_like(start)))
+        self._drive_to(start, np.zeros_like(start))
         mujoco.mj_forward(self.world.model, self.data)
         self._samples = [self._feel()]
         self._read()
@@ -126,17 +124,17 @@ class MujocoWorld:
         self._frames = np.array([self._tool_body, *(body(tip.links[0]) for tip in robot.tips)])
         self._object_com = model.body_ipos[self.world.object_body]
 
-    def _drive_to(self, target: JointTarget) -> None:
-        self._target = target
-        self.data.ctrl[:] = self._stiffness * target.position + self._damping * target.velocity
+    def _drive_to(self, position: Array, velocity: Array) -> None:
+        self._hand_target = position[self._n_arm :]
+        self.data.ctrl[:] = self._stiffness * position + self._damping * velocity
 
     # ---- running ----------------------------------------------------------------------------------------
 
-    def advance(self, target: JointTarget) -> None:
+    def advance(self, position: Array, velocity: Array) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
-        if np.any(target.position[self._n_arm :] != self._target.position[self._n_arm :]):
+        if np.any(position[self._n_arm :] != self._hand_target):
             self._watch = WATCHED
-        self._drive_to(target)
+        self._drive_to(position, velocity)
         self.world.model.opt.timestep = self._period / self._steps
         self._samples = []
         quiet = self._disturbance.over and not self._falling and self._watch == 0
@@ -200,10 +198,6 @@ class MujocoWorld:
     def _read(self) -> None:
         """Read the state: positions and distances of this instant, forces as felt since just before."""
         model, data, world = self.world.model, self.data, self.world
-        if not math.isfinite(float(data.qpos @ data.qpos) + float(data.qvel @ data.qvel)):
-            raise MachineError(
-                f"MuJoCo's state is no longer finite after {data.time:.2f} s: see the last target"
-            )
         self._mujoco.mj_kinematics(model, data)
         self._mujoco.mj_comPos(model, data)
         self._mujoco.mj_collision(model, data)

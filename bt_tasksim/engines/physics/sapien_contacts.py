@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.errors import MachineError
 from bt_tasksim.engines.physics.rolling import rolling_damping
 from bt_tasksim.engines.physics.sapien_robot import SKIN
 from bt_tasksim.engines.physics.sapien_world import DAMPING, World
+
+if TYPE_CHECKING:
+    from sapien import physx
 
 TOUCH_DISTANCE = 0.002
 """Metres of separation beyond which a contact of PhysX carries no force and counts for nothing."""
 SUPPORT_DISTANCE = 5e-4
 """Metres of separation within which two bodies touch."""
-_ROBOT = ("arm", "hand")
+_UNKNOWN = ("none", 0)
 
 
-@dataclass(frozen=True, eq=False)
-class Touch:
+class Touch(NamedTuple):
     """What touches what at one instant.
 
     Attributes:
@@ -26,12 +30,14 @@ class Touch:
         hand_force: Force of the robot on each object, N.
         hand_distance: Metres between the robot and each object; infinite where it is far.
         support: Objects and the objects and fixtures that they touch, by index.
+        touched: Whether the robot touches each object.
     """
 
     tip_force: list[list[float]]
     hand_force: list[float]
     hand_distance: list[float]
     support: set[tuple[int, int]]
+    touched: list[bool]
 
 
 class ContactReader:
@@ -45,23 +51,25 @@ class ContactReader:
     Attributes:
         penetration: The deepest overlap so far, metres.
         deepest_pair: Names of its bodies, metres, and seconds since the episode began; None before any.
+        nothing: What is read where nothing touches anything.
     """
 
     def __init__(self, world: World, n_tips: int, skin: float = SKIN) -> None:
         self._world, self._n_tips, self._skin = world, n_tips, skin
+        n = len(world.objects)
+        self.nothing = Touch([[0.0] * 3] * n_tips, [0.0] * n, [math.inf] * n, set(), [False] * n)
         self.penetration = 0.0
         self.deepest_pair: tuple[str, str, float, float] | None = None
 
     def read_depth(self, time: float) -> None:
         """Remember the deepest overlap, also between the ends of periods: fingers close within one."""
-        bodies = self._world.bodies
+        known = self._world.bodies
         for contact in self._world.system.get_contacts():
             deepest = -min([point.separation for point in contact.points])
             if deepest > self.penetration:
-                kinds = [bodies.get(body, ("none", 0))[0] for body in contact.bodies]
-                if "base" not in kinds:
-                    self.penetration = deepest
-                    self.deepest_pair = (*(b.entity.name for b in contact.bodies), deepest, time)
+                bodies = contact.bodies
+                if all(known.get(body, _UNKNOWN)[0] != "base" for body in bodies):
+                    self._note_depth(bodies, deepest, time)
 
     def read(self, time: float, step: float) -> Touch:
         """What touches what, and the deepest overlap.
@@ -70,56 +78,63 @@ class ContactReader:
             time: Seconds since the episode began.
             step: Seconds of the last physics step, over which impulses are forces.
         """
-        bodies, n = self._world.bodies, len(self._world.objects)
-        on_tip: list[list[list[float]]] = [[] for _ in range(self._n_tips)]
+        contacts = self._world.system.get_contacts()
+        if not contacts:
+            return self.nothing
+        known, n = self._world.bodies, len(self._world.objects)
+        on_tip: list[list[tuple[float, float, float]]] = [[] for _ in range(self._n_tips)]
         on_object: list[list[float]] = [[] for _ in range(n)]
         distance = [math.inf] * n
         support: set[tuple[int, int]] = set()
-        rate = 1.0 / step
-        deepest = self.penetration
-        for contact in self._world.system.get_contacts():
-            a, b = contact.bodies
-            kind_a, i = bodies.get(a, ("none", 0))
-            kind_b, j = bodies.get(b, ("none", 0))
+        for contact in contacts:
+            bodies = contact.bodies
+            kind_a, i = known.get(bodies[0], _UNKNOWN)
+            kind_b, j = known.get(bodies[1], _UNKNOWN)
             if kind_a == "base" or kind_b == "base":
                 continue
             points = contact.points
             separation = min([point.separation for point in points])
             if separation > TOUCH_DISTANCE:
                 continue
-            if -separation > deepest:
-                deepest = -separation
-                self.deepest_pair = (a.entity.name, b.entity.name, -separation, time)
-            if kind_b in _ROBOT:
-                a, b, kind_a, kind_b, i, j, sign = b, a, kind_b, kind_a, j, i, -rate
-            else:
-                sign = rate
-            if kind_a not in _ROBOT:  # what stands on what needs no forces
+            if -separation > self.penetration:
+                self._note_depth(bodies, -separation, time)
+            by_a, by_b = kind_a == "hand" or kind_a == "arm", kind_b == "hand" or kind_b == "arm"
+            if not (by_a or by_b):  # what stands on what needs no forces
                 if separation < SUPPORT_DISTANCE:
                     if kind_a == "object":
                         support.add((i, j))
                     if kind_b == "object":
                         support.add((j, i))
                 continue
+            rate = 1.0 / step
+            if by_b:
+                kind_a, kind_b, i, j, rate = kind_b, kind_a, j, i, -rate
             x = y = z = 0.0
             for point in points:
                 px, py, pz = point.impulse.tolist()
                 x, y, z = x + px, y + py, z + pz
-            x, y, z = x * sign, y * sign, z * sign  # the impulse acts on the first body
+            x, y, z = x * rate, y * rate, z * rate  # the impulse acts on the first body
             if kind_a == "hand" and i >= 0:
-                on_tip[i].append([x, y, z])
+                on_tip[i].append((x, y, z))
             if kind_b == "hand" and j >= 0:
-                on_tip[j].append([-x, -y, -z])
+                on_tip[j].append((-x, -y, -z))
             if kind_b == "object":
                 on_object[j].append(math.sqrt(x * x + y * y + z * z))
                 distance[j] = min(distance[j], max(separation - self._skin, 0.0))
-        self.penetration = deepest
         # PhysX lists contacts in an order of its own, so sums must not depend on it: `math.fsum` is exact.
-        tip_force = [
-            [math.fsum(axis) for axis in zip(*forces, strict=True)] or [0.0] * 3 for forces in on_tip
-        ]
-        hand_force = [math.fsum(forces) for forces in on_object]
-        return Touch(tip_force, hand_force, distance, support)
+        try:
+            tip_force = [
+                [math.fsum(axis) for axis in zip(*forces, strict=True)] if forces else [0.0, 0.0, 0.0]
+                for forces in on_tip
+            ]
+            hand_force = [math.fsum(forces) for forces in on_object]
+        except (ValueError, OverflowError):
+            raise MachineError(f"SAPIEN's contact forces are not finite after {time:.2f} s") from None
+        return Touch(tip_force, hand_force, distance, support, [force > 0.0 for force in hand_force])
+
+    def _note_depth(self, bodies: Sequence[physx.PhysxRigidBaseComponent], deep: float, time: float) -> None:
+        self.penetration = deep
+        self.deepest_pair = (bodies[0].entity.name, bodies[1].entity.name, deep, time)
 
 
 def resist_rolling(world: World, step: float, hand_force: list[float]) -> None:
@@ -135,7 +150,7 @@ def resist_rolling(world: World, step: float, hand_force: list[float]) -> None:
     loads: list[list[list[float]]] = [[] for _ in world.objects]
     rate = 1.0 / step
     for contact in world.system.get_contacts():
-        kinds = [world.bodies.get(body, ("none", 0)) for body in contact.bodies]
+        kinds = [world.bodies.get(body, _UNKNOWN) for body in contact.bodies]
         if all(kind in ("object", "fixture") for kind, _ in kinds):
             impulses = [point.impulse.tolist() for point in contact.points]
             force = [rate * sum(values) for values in zip(*impulses, strict=True)]

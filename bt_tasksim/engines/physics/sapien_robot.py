@@ -165,7 +165,8 @@ class Robot:
             if now != before:
                 tell(now)
         self._position, self._velocity = position, velocity
-        return any(abs(v) > fast for v, fast in zip(velocity[self._n_arm :], self._fast, strict=True))
+        closing = velocity[self._n_arm :]
+        return any(closing) and any(abs(v) > fast for v, fast in zip(closing, self._fast, strict=True))
 
 
 def _set_surfaces(

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import JointTarget
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_robot import Robot
@@ -19,8 +16,8 @@ FINE = 8
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
 WATCHED = 4
-"""Control periods after the hand closed fast or a contact came or went, in which overlaps are looked for at
-every step; at other times at the period's end."""
+"""Control periods from the beginning, and after the hand closed fast or a contact came or went, in which
+overlaps are looked for at every step; at other times at the period's end."""
 
 
 class SapienReading(NamedTuple):
@@ -33,7 +30,7 @@ class SapienReading(NamedTuple):
         incoming: Forces ``(n_links, 6)`` and torques that each link's parent exerts on it.
         frames: Poses of `Robot.frames`.
         objects: Poses of the objects.
-        velocities: Six numbers for each object.
+        velocities: Linear and angular ones ``(3,)`` of one object after the other.
         touch: What touches what.
         penetration: The deepest overlap so far, metres.
     """
@@ -44,7 +41,7 @@ class SapienReading(NamedTuple):
     incoming: Array
     frames: list[tuple[float, ...]]
     objects: list[tuple[float, ...]]
-    velocities: list[list[float]]
+    velocities: list[Array]
     touch: Touch
     penetration: float
 
@@ -73,9 +70,9 @@ class SapienWorld:
         self._substeps = configuration.physics_frequency // configuration.control_frequency
         self._time = 0.0
         self._falling = self._rolling = False
-        self._watch = 0
+        self._watch = WATCHED
         self._reader = ContactReader(world, n_tips)
-        self._touch = Touch([[0.0] * 3] * n_tips, [], [], set())
+        self._touch = self._reader.nothing
         disturbance, names = configuration.disturbance, [actor.name for actor in configuration.objects]
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
@@ -86,10 +83,10 @@ class SapienWorld:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         return self._reader.deepest_pair
 
-    def advance(self, target: JointTarget) -> None:
+    def advance(self, position: Array, velocity: Array) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         self._last_dt = self._dt
-        if self.robot.drive_to(target.position.tolist(), target.velocity.tolist()):
+        if self.robot.drive_to(position.tolist(), velocity.tolist()):
             self._watch = WATCHED
         step = self.world.system.step
         if not self._disturbance.over:
@@ -127,23 +124,16 @@ class SapienWorld:
     # ---- reading ----------------------------------------------------------------------------------------
 
     def _read(self) -> None:
-        robot, bodies = self.robot, self.world.objects
-        q, v = robot.articulation.get_qpos(), robot.articulation.get_qvel()
-        objects = [floats(body.entity_pose) for body in bodies]
-        moving = [[*b.linear_velocity.tolist(), *b.angular_velocity.tolist()] for b in bodies]
-        if not math.isfinite(float(q @ q) + float(v @ v) + sum(map(sum, objects)) + sum(map(sum, moving))):
-            raise MachineError(
-                f"SAPIEN's state is no longer finite after {self._time:.2f} s: see the last target"
-            )
+        articulation, bodies = self.robot.articulation, self.world.objects
         self._feel()
         self.reading = SapienReading(
             self._time,
-            q,
-            v,
-            robot.articulation.get_link_incoming_joint_forces(),
-            [floats(link.entity_pose) for link in robot.frames],
-            objects,
-            moving,
+            articulation.get_qpos(),
+            articulation.get_qvel(),
+            articulation.get_link_incoming_joint_forces(),
+            [floats(link.entity_pose) for link in self.robot.frames],
+            [floats(body.entity_pose) for body in bodies],
+            [velocity for b in bodies for velocity in (b.linear_velocity, b.angular_velocity)],
             self._touch,
             self._reader.penetration,
         )
@@ -151,8 +141,7 @@ class SapienWorld:
     def _feel(self) -> None:
         """Read what touches what; look closely for some time where that has changed."""
         before, now = self._touch, self._reader.read(self._time, self._last_dt)
-        touched = [force > 0.0 for force in now.hand_force]
-        if touched != [force > 0.0 for force in before.hand_force] or now.support != before.support:
+        if now.touched != before.touched or now.support != before.support:
             self._watch = WATCHED
         self._touch = now
 

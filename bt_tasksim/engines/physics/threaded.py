@@ -10,8 +10,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
-from typing import Any, Generic, Protocol, TypeVar
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -45,14 +45,15 @@ class SimulatedWorld(Protocol):
     def deepest_pair(self) -> tuple[str, str, float, float] | None:
         """Names of the bodies that overlapped most, metres, and seconds; None before any."""
 
-    def advance(self, target: JointTarget) -> None:
+    def advance(self, position: Array, velocity: Array) -> None:
         """Go on by one control period, and take the readings of its end.
 
         Args:
-            target: Of this world alone, ``(n_joints,)``.
+            position: Targets ``(n_joints,)`` of the drives.
+            velocity: The same.
 
         Raises:
-            MachineError: The state is no longer finite.
+            MachineError: It cannot go on.
         """
 
     def note_motion(self, falling: bool, spin: float) -> None:
@@ -74,7 +75,7 @@ class Layout:
 
     Attributes:
         counts: Objects of each world ``(k,)``.
-        objects: The most objects, of all worlds of the batch.
+        objects: The most objects that a world of the batch has had.
         fixtures: The most fixtures.
     """
 
@@ -94,6 +95,13 @@ class Layout:
         out[np.arange(self.objects) < self.counts[:, None]] = np.asarray(values, float).reshape(-1, *tail)
         return out
 
+    def finite(self, state: WorldState) -> Array:
+        """Whether all numbers of a state are finite, ``(k,)``, but for the padding."""
+        assert state.objects is not None and state.velocities is not None
+        joints = np.isfinite(state.joint_position) & np.isfinite(state.joint_velocity)
+        objects = np.isfinite(state.objects).all(axis=-1) & np.isfinite(state.velocities).all(axis=-1)
+        return joints.all(axis=1) & (objects.sum(axis=1) == self.counts)
+
     def support(self, pairs: Sequence[Iterable[tuple[int, int]]]) -> Array:
         """`Hidden.support` from the pairs of each world, whose fixtures are numbered behind its objects."""
         out = np.zeros((len(self.counts), self.objects, self.objects + self.fixtures), bool)
@@ -112,9 +120,12 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         threads: How many threads step them; at least 1.
 
     Attributes:
+        library: What simulates, as errors name it.
         robot: The robot.
         simulated: The worlds by row; None before the first reset.
     """
+
+    library: ClassVar[str]
 
     def __init__(self, robot: RobotDescription, worlds: int, threads: int) -> None:
         super().__init__(worlds)
@@ -127,7 +138,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         self._limit = robot.drive_array("force_limit")
         joints = (worlds, len(robot.joints))
         self._position, self._velocity = np.zeros(joints), np.zeros(joints)
-        self._layout = (0, 0)
+        self._most = (0, 0)  # objects and fixtures
         self._state: WorldState | None = None
         self._hidden: Hidden | None = None
 
@@ -166,14 +177,11 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
                 continue
             self._position[row], self._velocity[row] = start, 0.0
             built.append(row)
-        present = [world for world in self.simulated if world is not None]
-        most = (
-            max((world.n_objects for world in present), default=0),
-            max((world.n_fixtures for world in present), default=0),
+        fresh = [world for row in built if (world := self.simulated[row]) is not None]
+        self._widen(
+            max((world.n_objects for world in fresh), default=0),
+            max((world.n_fixtures for world in fresh), default=0),
         )
-        if most != self._layout or self._state is None:  # arrays of another width: all worlds anew
-            self._layout, self._state, self._hidden = most, None, None
-            built = [row for row, world in enumerate(self.simulated) if world is not None]
         self._gather(np.array(built, int))
 
     def step(self, target: JointTarget, rows: Array) -> None:
@@ -194,7 +202,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             world = self.simulated[row]
             assert world is not None
             try:
-                world.advance(JointTarget(to, speed))
+                world.advance(to, speed)
             except BtTasksimError as error:
                 self.errors[row] = error
 
@@ -232,17 +240,55 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             for other in others:
                 other.result()
 
+    def _widen(self, objects: int, fixtures: int) -> None:
+        """Make the arrays of all worlds as wide as the one with the most needs."""
+        n, m = self._most
+        objects, fixtures = self._most = max(n, objects), max(m, fixtures)
+        if (objects, fixtures) == (n, m) or self._state is None or self._hidden is None:
+            return
+
+        def wider(values: Array) -> Array:
+            room = np.full((self.worlds, objects, *values.shape[2:]), np.nan)
+            room[:, :n] = values
+            return room
+
+        state, hidden = self._state, self._hidden
+        support = np.zeros((self.worlds, objects, objects + fixtures), bool)
+        support[:, :n, :n] = hidden.support[..., :n]
+        support[:, :n, objects : objects + m] = hidden.support[..., n:]
+        both = {"objects": wider(state.objects), "velocities": wider(state.velocities)}
+        self._state = replace(state, **both)
+        self._hidden = replace(
+            hidden,
+            **both,
+            hand_force=wider(hidden.hand_force),
+            hand_distance=wider(hidden.hand_distance),
+            support=support,
+        )
+
     def _gather(self, rows: Array) -> None:
         """Read the worlds of these rows into the arrays of all."""
         if not len(rows):
             return
         worlds: list[W] = [world for row in rows.tolist() if (world := self.simulated[row]) is not None]
-        layout = Layout(np.array([world.n_objects for world in worlds]), *self._layout)
-        state, hidden = self._read(rows, worlds, layout)
+        layout = Layout(np.array([world.n_objects for world in worlds]), *self._most)
+        with np.errstate(invalid="ignore", over="ignore"):  # of worlds that blew up
+            state, hidden = self._read(rows, worlds, layout)
+        finite = layout.finite(state)
+        if not finite.all():
+            for k in np.flatnonzero(~finite).tolist():
+                when = f"after {state.time[k]:.2f} s: see the last target"
+                self.errors[rows[k]] = MachineError(f"{self.library}'s state is no longer finite {when}")
+            rows, worlds = rows[finite], [world for world, fine in zip(worlds, finite, strict=True) if fine]
+            state, hidden = taken(state, finite), taken(hidden, finite)
         if self._state is None or self._hidden is None:
             self._state, self._hidden = _room(state, self.worlds), _room(hidden, self.worlds)
         _put(self._state, rows, state)
         _put(self._hidden, rows, hidden)
+        self._note_motion(worlds, state, hidden)
+
+    @staticmethod
+    def _note_motion(worlds: list[W], state: WorldState, hidden: Hidden) -> None:
         assert state.velocities is not None
         free = hidden.hand_force == 0.0
         u, v, w, x, y, z = (np.where(free, state.velocities[..., i], 0.0) for i in range(6))
