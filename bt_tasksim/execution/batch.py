@@ -18,7 +18,9 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.concept.context import Context
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, PENDING, RUNNING, BatchLeaf
 from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.batch_reasons import BatchReasons
 from bt_tasksim.execution.leaf_errors import leaf_error
 from bt_tasksim.execution.world_by_world import Copies, WorldByWorld
 from bt_tasksim.trees.check import check_tree
@@ -93,6 +95,7 @@ class BatchTree:
         children, self._ends = _shape(tree)
         self.compiled: dict[int, BatchNode | BatchLeaf] = {}
         self._compile(children, leaves, Copies(tree, worlds, build, contexts))
+        self.reasons = BatchReasons(self.nodes, children, self.compiled, self._status_of)
         self._may_be_invalid = any(isinstance(c, WorldByWorld) for c in self.compiled.values())
 
     @property
@@ -155,6 +158,19 @@ class BatchTree:
                 self.waits_at[there] = -1
                 self._waiting -= len(there)
         self.stop_node(0, rows)
+
+    def speaker(self, row: int) -> Behaviour | None:
+        """The node that made the tree fail in a world: the one that was decided last, with words to say."""
+        found = self.reasons.speaker(0, row)
+        return None if found is None else self.nodes[found]
+
+    def outcome(self, row: int) -> Outcome | None:
+        """Why the tree failed in a world, with what was tried before; None where nobody says it.
+
+        To be asked before the world begins anew.
+        """
+        found = self.reasons.speaker(0, row)
+        return None if found is None else self.reasons.whole_outcome(found, row)
 
     def tick_node(self, node: int, rows: Array) -> None:
         """Let worlds tick a node next; for nodes, see `trees.nodes.batch.Batch`."""

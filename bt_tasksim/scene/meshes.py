@@ -1,6 +1,6 @@
 """Triangle meshes of solids: made from a few numbers, and their volume and inertia.
 
-Faces are counter-clockwise seen from outside. Everything is NumPy alone and in metres.
+Faces are counter-clockwise seen from outside. Everything is in metres.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from bt_tasksim.core.poses import Array, from_matrix, pose
+from bt_tasksim.core.poses import Array, array_namespace, from_matrix, pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,17 +164,19 @@ def cube_sphere(n: int) -> TriangleMesh:
     return TriangleMesh(vertices[first], index.reshape(-1)[faces])
 
 
-def superellipsoid_scale(direction: Array, e1: float, e2: float) -> Array:
+def superellipsoid_scale(direction: Array, e1: float | Array, e2: float | Array) -> Array:
     """Factor ``(...)`` that brings directions ``(..., 3)`` onto the superellipsoid of unit half sizes.
 
     ((|x|^(2/e2) + |y|^(2/e2))^(e2/e1) + |z|^(2/e1)) = 1; Barr, "Superquadrics and angle-preserving
     transformations", IEEE CG&A 1981.
     """
-    a = np.abs(direction)
-    level = np.max(a, axis=-1)
-    x, y, z = (a[..., i] / np.where(level > 0, level, 1.0) for i in range(3))
+    x, y, z = (abs(direction[..., i]) for i in range(3))
+    xp = array_namespace(direction)
+    level = xp.maximum(xp.maximum(x, y), z)
+    level = xp.where(level > 0, level, xp.ones_like(level))
+    x, y, z = x / level, y / level, z / level
     gauge = ((x ** (2 / e2) + y ** (2 / e2)) ** (e2 / e1) + z ** (2 / e1)) ** (e1 / 2)
-    return 1 / (gauge * np.where(level > 0, level, 1.0))
+    return 1 / (gauge * level)
 
 
 def superellipsoid(half_size: Array, e1: float, e2: float, n: int = 16) -> TriangleMesh:

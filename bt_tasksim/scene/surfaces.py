@@ -1,33 +1,35 @@
 """Nearest points on the outer surfaces of simple solids, centred on the origin.
 
-Called at every control step for every fingertip, so a few points are computed in plain floats and many in
-arrays. Exact for boxes, upright cylinders and upright prisms with a polygon as footprint; for ellipses and
-superellipsoids the point on the line to the middle is taken, which is the nearest one on the axes (where
-fingers close) and always lies on the surface.
+A surface's numbers may be plain ones or arrays with a surface a row, so that many unlike solids of one kind
+are one law's case of many: `together`. Exact for boxes, upright cylinders and upright prisms with a polygon
+as footprint; for ellipses and superellipsoids the point on the line to the middle is taken, which is the
+nearest one on the axes (where fingers close) and always lies on the surface.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.scene.meshes import superellipsoid_scale
 
-_FEW = 16
+_MIDDLE = 1e-9
+"""Metres, or a share of the size, from the origin that are the origin itself."""
 
 
 class Footprint(Protocol):
     """A convex area around the origin of the plane."""
 
-    def nearest(self, x: float, y: float) -> tuple[float, float, bool]:
-        """The outline's nearest point, and whether ``(x, y)`` is inside."""
+    def nearest(self, point: Array) -> tuple[Array, Array]:
+        """Nearest points ``(..., 2)`` of the outline to points ``(..., 2)``; these are inside ``(...)``."""
 
-    def nearest_batch(self, point: Array) -> tuple[Array, Array]:
-        """The same for points ``(..., 2)``: points ``(..., 2)`` and inside ``(...)``."""
+    @classmethod
+    def together(cls, footprints: Sequence[Self]) -> Self:
+        """Several as one, for points ``(len(footprints), ..., 2)`` with one axis between."""
 
 
 class OuterSurface(Protocol):
@@ -36,129 +38,178 @@ class OuterSurface(Protocol):
     def nearest(self, point: Array) -> Array:
         """The nearest points ``(..., 3)`` to points ``(..., 3)``, in the solid's frame, metres."""
 
-    def one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """`nearest` of a single point, in plain floats."""
+
+@runtime_checkable
+class Joinable(Protocol):
+    """A surface several of which can be computed at once."""
+
+    @property
+    def kind(self) -> Any:
+        """Surfaces of one class and the same kind can be `together`."""
+
+    @classmethod
+    def together(cls, surfaces: Sequence[Any]) -> OuterSurface:
+        """Several as one, for points ``(len(surfaces), n, 3)``."""
 
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Footprint with half sizes ``a`` along x and ``b`` along y, metres."""
+    """Footprint with half sizes ``a`` along x and ``b`` along y, metres, or arrays of them ``(k, 1)``."""
 
-    a: float
-    b: float
+    a: float | Array
+    b: float | Array
 
-    def nearest(self, x: float, y: float) -> tuple[float, float, bool]:
-        """See `Footprint`."""
-        gauge = math.hypot(x / self.a, y / self.b)
-        if gauge < 1e-9:
-            return 0.0, self.b, True
-        return x / gauge, y / gauge, gauge < 1
-
-    def nearest_batch(self, point: Array) -> tuple[Array, Array]:
+    def nearest(self, point: Array) -> tuple[Array, Array]:
         """See `Footprint`."""
         xp = array_namespace(point)
-        gauge = xp.sqrt((point[..., 0] / self.a) ** 2 + (point[..., 1] / self.b) ** 2)
-        middle = gauge < 1e-9
+        a, b = constant(self.a, point), constant(self.b, point)
+        u, v = point[..., 0] / a, point[..., 1] / b
+        gauge = xp.sqrt(u * u + v * v)
+        middle = gauge < _MIDDLE
         safe = xp.where(middle, xp.ones_like(gauge), gauge)
         x = xp.where(middle, xp.zeros_like(gauge), point[..., 0] / safe)
-        y = xp.where(middle, xp.full_like(gauge, self.b), point[..., 1] / safe)
+        y = xp.where(middle, b + xp.zeros_like(gauge), point[..., 1] / safe)
         return xp.stack([x, y], axis=-1), gauge < 1
+
+    @classmethod
+    def together(cls, footprints: Sequence[Self]) -> Self:
+        """See `Footprint`."""
+        return cls(_column([f.a for f in footprints]), _column([f.b for f in footprints]))
 
 
 @dataclass(frozen=True)
 class Polygon:
-    """Footprint with corners ``((x, y), ...)``, counter-clockwise, metres."""
+    """Footprint with corners ``((x, y), ...)``, counter-clockwise, metres, or arrays ``(k, 1, most, 2)``.
 
-    corners: tuple[tuple[float, float], ...]
+    The last corner may come again: so polygons with few corners are filled up.
+    """
 
-    def nearest(self, x: float, y: float) -> tuple[float, float, bool]:
-        """See `Footprint`."""
-        best, bx, by, inside = math.inf, 0.0, 0.0, True
-        ax, ay = self.corners[-1]
-        for cx, cy in self.corners:
-            ex, ey, px, py = cx - ax, cy - ay, x - ax, y - ay
-            if ex * py - ey * px < 0:
-                inside = False
-            t = min(max((px * ex + py * ey) / (ex * ex + ey * ey), 0.0), 1.0)
-            dx, dy = px - t * ex, py - t * ey
-            distance = dx * dx + dy * dy
-            if distance < best:
-                best, bx, by = distance, x - dx, y - dy
-            ax, ay = cx, cy
-        return bx, by, inside
+    corners: Any
 
-    def nearest_batch(self, point: Array) -> tuple[Array, Array]:
+    def nearest(self, point: Array) -> tuple[Array, Array]:
         """See `Footprint`."""
         xp = array_namespace(point)
-        corners = xp.asarray(self.corners, dtype=point.dtype)
-        edge = xp.roll(corners, -1, axis=0) - corners
-        p = point[..., None, :] - corners
-        t = xp.clip(xp.sum(p * edge, axis=-1) / xp.sum(edge * edge, axis=-1), 0.0, 1.0)
-        offset = p - t[..., None] * edge
-        best = xp.argmin(xp.sum(offset * offset, axis=-1), axis=-1)
-        chosen = xp.zeros_like(point)
-        for i in range(len(self.corners)):
-            chosen = xp.where((best == i)[..., None], offset[..., i, :], chosen)
-        left = edge[:, 0] * p[..., 1] - edge[:, 1] * p[..., 0] >= 0
-        return point - chosen, xp.all(left, axis=-1)
+        corners = constant(self.corners, point)
+        edge = xp.roll(corners, -1, axis=-2) - corners
+        ex, ey = edge[..., 0], edge[..., 1]
+        px, py = point[..., :1] - corners[..., 0], point[..., 1:] - corners[..., 1]
+        square = ex * ex + ey * ey
+        none = square == 0.0
+        t = xp.clip((px * ex + py * ey) / xp.where(none, xp.ones_like(square), square), 0.0, 1.0)
+        dx, dy = px - t * ex, py - t * ey
+        distance = xp.where(none, xp.full_like(dx, xp.inf), dx * dx + dy * dy)
+        best = xp.argmin(distance, axis=-1)
+        x, y = dx[..., 0], dy[..., 0]
+        for i in range(1, corners.shape[-2]):
+            x, y = xp.where(best == i, dx[..., i], x), xp.where(best == i, dy[..., i], y)
+        return point - xp.stack([x, y], axis=-1), xp.all(ex * py - ey * px >= 0, axis=-1)
+
+    @classmethod
+    def together(cls, footprints: Sequence[Self]) -> Self:
+        """See `Footprint`."""
+        most = max(len(f.corners) for f in footprints)
+        filled = [[*f.corners, *[f.corners[-1]] * (most - len(f.corners))] for f in footprints]
+        return cls(np.array(filled)[:, None])
 
 
 @dataclass(frozen=True)
 class PrismSurface:
-    """An upright prism: its footprint, and half its height in metres."""
+    """An upright prism: its footprint, and half its height in metres, or arrays of them ``(k, 1)``."""
 
     footprint: Footprint
-    half_height: float
+    half_height: float | Array
 
     def nearest(self, point: Array) -> Array:
         """See `OuterSurface`."""
-        if type(point) is np.ndarray and point.size <= 3 * _FEW:
-            return np.array([self.one(*p) for p in point.reshape(-1, 3).tolist()]).reshape(point.shape)
         xp = array_namespace(point)
-        z, h = point[..., 2], self.half_height
-        outline, inside = self.footprint.nearest_batch(point[..., :2])
-        depth = xp.sqrt(xp.sum((point[..., :2] - outline) ** 2, axis=-1))
-        to_cap = inside & (h - xp.abs(z) < depth)
-        cap = xp.where(z < 0, xp.full_like(z, -h), xp.full_like(z, h))
-        flat = xp.where(to_cap[..., None], point[..., :2], outline)
-        height = xp.where(to_cap, cap, xp.clip(z, -h, h))
-        return xp.concat([flat, height[..., None]], axis=-1)
+        flat, z, h = point[..., :2], point[..., 2], constant(self.half_height, point)
+        outline, inside = self.footprint.nearest(flat)
+        gap = flat - outline
+        depth = xp.sqrt(gap[..., 0] * gap[..., 0] + gap[..., 1] * gap[..., 1])
+        to_cap = inside & (h - abs(z) < depth)
+        cap = xp.where(z < 0, -h, h)
+        beside = xp.minimum(xp.maximum(z, -h), h + xp.zeros_like(z))
+        height = xp.where(to_cap, cap, beside)
+        return xp.concat([xp.where(to_cap[..., None], flat, outline), height[..., None]], axis=-1)
 
-    def one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """See `OuterSurface`."""
-        h = self.half_height
-        fx, fy, inside = self.footprint.nearest(x, y)
-        if inside and h - abs(z) < math.hypot(x - fx, y - fy):
-            return x, y, math.copysign(h, z)
-        return fx, fy, min(max(z, -h), h)
+    @property
+    def kind(self) -> Any:
+        """See `Joinable`."""
+        return type(self.footprint)
+
+    @classmethod
+    def together(cls, surfaces: Sequence[Self]) -> Self:
+        """See `Joinable`."""
+        footprints = [s.footprint for s in surfaces]
+        return cls(type(footprints[0]).together(footprints), _column([s.half_height for s in surfaces]))
 
 
 @dataclass(frozen=True)
 class SuperellipsoidSurface:
-    """A superellipsoid of half sizes ``(3,)`` in metres and exponents."""
+    """A superellipsoid: half sizes ``(3,)`` in metres and exponents ``(2,)``, or arrays ``(k, 1, ...)``."""
 
-    half_size: tuple[float, float, float]
-    exponents: tuple[float, float]
+    half_size: Any
+    exponents: Any
 
     def nearest(self, point: Array) -> Array:
         """See `OuterSurface`."""
-        if type(point) is np.ndarray and point.size <= 3 * _FEW:
-            return np.array([self.one(*p) for p in point.reshape(-1, 3).tolist()]).reshape(point.shape)
-        p = np.asarray(point, float)
-        size = np.array(self.half_size)
-        level = np.max(np.abs(p), axis=-1, keepdims=True)
-        p = np.where(level > 1e-9, p, np.array([0.0, self.half_size[1], 0.0]))
-        scale = superellipsoid_scale(p / size, *self.exponents)
-        return array_namespace(point).asarray(p * scale[..., None])
+        xp = array_namespace(point)
+        size, exponents = constant(self.half_size, point), constant(self.exponents, point)
+        x, y, z = (abs(point[..., i]) for i in range(3))
+        level = xp.maximum(xp.maximum(x, y), z)[..., None]
+        aside = size * constant([0.0, 1.0, 0.0], point)
+        point = xp.where(level > _MIDDLE, point, aside)
+        # As many exponents as points: powers by one number have other ways, and so other last digits.
+        e1, e2 = (exponents[..., i] + xp.zeros_like(level[..., 0]) for i in range(2))
+        return point * superellipsoid_scale(point / size, e1, e2)[..., None]
 
-    def one(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """See `OuterSurface`."""
-        a, b, c = self.half_size
-        e1, e2 = self.exponents
-        u, v, w = abs(x / a), abs(y / b), abs(z / c)
-        level = max(u, v, w)
-        if level * max(a, b, c) < 1e-9:
-            return 0.0, b, 0.0
-        flat = ((u / level) ** (2 / e2) + (v / level) ** (2 / e2)) ** (e2 / e1)
-        k = 1 / ((flat + (w / level) ** (2 / e1)) ** (e1 / 2) * level)
-        return x * k, y * k, z * k
+    @property
+    def kind(self) -> Any:
+        """See `Joinable`."""
+        return None
+
+    @classmethod
+    def together(cls, surfaces: Sequence[Self]) -> Self:
+        """See `Joinable`."""
+        return cls(
+            np.array([s.half_size for s in surfaces])[:, None],
+            np.array([s.exponents for s in surfaces])[:, None],
+        )
+
+
+class ManySurfaces:
+    """Surfaces of unlike kinds, one a row; those of one kind are computed at once.
+
+    Args:
+        surfaces: One for each row.
+    """
+
+    def __init__(self, surfaces: Sequence[OuterSurface]) -> None:
+        groups: dict[Any, list[int]] = {}
+        for i, surface in enumerate(surfaces):
+            key = (type(surface), surface.kind) if isinstance(surface, Joinable) else id(surface)
+            groups.setdefault(key, []).append(i)
+        self._order = np.argsort([i for rows in groups.values() for i in rows])
+        self._groups: list[tuple[np.ndarray, OuterSurface]] = []
+        for rows in groups.values():
+            first = surfaces[rows[0]]
+            joined = (
+                type(first).together([surfaces[i] for i in rows]) if isinstance(first, Joinable) else first
+            )
+            self._groups.append((np.array(rows), joined))
+
+    def nearest(self, point: Array) -> Array:
+        """The nearest points ``(k, n, 3)`` on each row's surface to its points ``(k, n, 3)``."""
+        xp = array_namespace(point)
+        if len(self._groups) == 1:
+            return self._groups[0][1].nearest(point)
+        rows = [xp.asarray(rows, device=point.device) for rows, _ in self._groups]
+        found = [
+            surface.nearest(xp.take(point, index, axis=0))
+            for index, (_, surface) in zip(rows, self._groups, strict=True)
+        ]
+        return xp.take(xp.concat(found, axis=0), xp.asarray(self._order, device=point.device), axis=0)
+
+
+def _column(values: Sequence[float | Array]) -> Array:
+    return np.array(values)[:, None]

@@ -20,6 +20,7 @@ import array_api_compat.numpy
 import numpy as np
 
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, RUNNING, SUCCESS
+from bt_tasksim.core.outcomes import TEXT, Outcome, Statement
 from bt_tasksim.core.poses import Array, array_namespace
 
 __all__ = [
@@ -96,6 +97,29 @@ class Batch(Protocol):
     def stop_node(self, node: int, rows: Array) -> None:
         """Stop a node, as py_trees' ``stop(INVALID)``."""
 
+    @property
+    def reasons(self) -> Reasons:
+        """What nodes say."""
+
+
+class Reasons(Protocol):
+    """What nodes see of what other nodes say in a world, see `bt_tasksim.execution.batch_reasons`."""
+
+    def name(self, node: int) -> str:
+        """A node's name."""
+
+    def outcome_of(self, node: int, row: int) -> Outcome | None:
+        """What a node says itself, as an outcome."""
+
+    def said_by(self, node: int, row: int) -> Statement | None:
+        """What a node says itself."""
+
+    def said_below(self, node: int, row: int) -> Statement | None:
+        """What the deepest node says that has something to say."""
+
+    def speaker(self, node: int, row: int) -> int | None:
+        """The node, at or below one that has failed, that made it fail."""
+
 
 @dataclass(frozen=True)
 class Place:
@@ -139,6 +163,18 @@ class BatchNode(abc.ABC):
 
     def stopped(self, rows: Array) -> None:  # noqa: B027  # most have nothing to do
         """It is stopped in worlds where it was RUNNING."""
+
+    def current(self, row: int) -> int | None:
+        """The child that was decided last in a world, or None; that of a decorator is its only one."""
+        return 0 if int(self.place.child_status[0][row]) != INVALID else None
+
+    def says(self, row: int) -> Statement | None:
+        """What the node itself has to say in a world: an outcome, or words; None for nothing."""
+        return None
+
+    def adds(self, row: int, outcome: Outcome) -> Outcome:
+        """What a failure below, which made this node fail, comes to here: with what was tried before."""
+        return outcome
 
     def begins(self, rows: Array) -> Array:
         """The worlds among rows in which the node begins anew."""
@@ -195,11 +231,14 @@ class PassesOn(BatchNode):
     Args:
         place: Where it stands.
         instead: What it ends with, by what its child ended with, where that is another status.
+        words: What it says then; ``{}`` stands for what its child says.
     """
 
-    def __init__(self, place: Place, instead: dict[int, int] | None = None) -> None:
+    def __init__(
+        self, place: Place, instead: dict[int, int] | None = None, words: dict[int, str] | None = None
+    ) -> None:
         super().__init__(place)
-        self.instead = instead or {}
+        self.instead, self.words = instead or {}, words or {}
 
     def tick(self, rows: Array) -> None:
         """On to the child."""
@@ -211,3 +250,14 @@ class PassesOn(BatchNode):
         for said, meant in self.instead.items():
             found = self.xp.where(status == said, self.xp.asarray(meant, dtype=status.dtype), found)
         self.end(rows, found)
+
+    def says(self, row: int) -> Statement | None:
+        """Its words where it has changed a status, else those of its child."""
+        if not self.words:
+            return None
+        said = self.batch.reasons.said_by(self.place.children[0], row)
+        below = said.sentence if said is not None else ""
+        words = self.words.get(int(self.place.child_status[0][row]))
+        if words is None:
+            return TEXT(text=below) if below else None
+        return TEXT(text=words.format(f" [{below}]" if below else ""))

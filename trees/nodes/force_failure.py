@@ -37,4 +37,4 @@ class ForceFailureKind(NodeKind[SuccessIsFailure]):
 
     def compiled(self, node: SuccessIsFailure, place: Place) -> PassesOn:
         """See `NodeKind.compiled`."""
-        return PassesOn(place, {SUCCESS: FAILURE})
+        return PassesOn(place, {SUCCESS: FAILURE}, {SUCCESS: "success is failure{}"})

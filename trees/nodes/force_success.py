@@ -37,4 +37,4 @@ class ForceSuccessKind(NodeKind[FailureIsSuccess]):
 
     def compiled(self, node: FailureIsSuccess, place: Place) -> PassesOn:
         """See `NodeKind.compiled`."""
-        return PassesOn(place, {FAILURE: SUCCESS})
+        return PassesOn(place, {FAILURE: SUCCESS}, {FAILURE: "failure is success{}"})

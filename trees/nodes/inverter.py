@@ -37,4 +37,8 @@ class InverterKind(NodeKind[Inverter]):
 
     def compiled(self, node: Inverter, place: Place) -> PassesOn:
         """See `NodeKind.compiled`."""
-        return PassesOn(place, {SUCCESS: FAILURE, FAILURE: SUCCESS})
+        return PassesOn(
+            place,
+            {SUCCESS: FAILURE, FAILURE: SUCCESS},
+            {SUCCESS: "success -> failure", FAILURE: "failure -> success"},
+        )

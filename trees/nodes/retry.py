@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.reporting import outcome_of, speaker
 from bt_tasksim.core.outcomes import Outcome, Statement, register_reason
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
@@ -64,19 +65,29 @@ class Retry(Rounds):
         self.report(self._failed(said_below(self.decorated)))
         outcome = outcome_of(failed)
         if outcome is not None:
-            cause = outcome.cause
-            self.causes.append(Cause(failed.name, cause.reason.name, cause.own_sentence))
+            self.causes.append(cause_of(failed.name, outcome))
 
     def seen_from_here(self, outcome: Outcome) -> Outcome:
         """The last attempt's failure, with the causes of those before it."""
         return self._failed(outcome) if self.rounds > 1 else outcome
 
     def _failed(self, why: Statement | None) -> Outcome:
-        before = self.causes[: self.rounds - 1]
-        said = f" (before it: {summary(before)})" if before else ""
-        if self.attempts > 0:
-            return ATTEMPT_FAILED(why, attempt=self.rounds, attempts=self.attempts, before=said)
-        return ENDLESS_ATTEMPT_FAILED(why, attempt=self.rounds, before=said)
+        return attempt_failed(self.rounds, self.attempts, self.causes, why)
+
+
+def cause_of(leaf: str, outcome: Outcome) -> Cause:
+    """Why an attempt failed, by what the leaf said."""
+    cause = outcome.cause
+    return Cause(leaf, cause.reason.name, cause.own_sentence)
+
+
+def attempt_failed(attempt: int, attempts: int, causes: Sequence[Cause], why: Statement | None) -> Outcome:
+    """Which attempt failed, and why, and why those before it did."""
+    before = causes[: attempt - 1]
+    said = f" (before it: {summary(before)})" if before else ""
+    if attempts > 0:
+        return ATTEMPT_FAILED(why, attempt=attempt, attempts=attempts, before=said)
+    return ENDLESS_ATTEMPT_FAILED(why, attempt=attempt, before=said)
 
 
 def summary(causes: Sequence[Cause]) -> str:
@@ -125,6 +136,44 @@ class RetryUntilSuccessfulKind(NodeKind[Retry]):
         often = "without end" if node.attempts < 0 else f"up to {node.attempts} times"
         return f"{self.label} {often}"
 
-    def compiled(self, node: Retry, place: Place) -> BatchRounds:
+    def compiled(self, node: Retry, place: Place) -> BatchRetry:
         """See `NodeKind.compiled`."""
-        return BatchRounds(place, node.limit, again_on=FAILURE)
+        return BatchRetry(place, node.limit, again_on=FAILURE)
+
+
+class BatchRetry(BatchRounds):
+    """`Retry` in many worlds at once; why attempts failed is kept world by world."""
+
+    def __init__(self, place: Place, limit: int, again_on: int) -> None:
+        super().__init__(place, limit, again_on)
+        self._causes: dict[int, list[Cause]] = {}
+        self._why: dict[int, Statement | None] = {}
+
+    def count_anew(self, rows: Array) -> None:
+        """Forget what was."""
+        if self._why:
+            for row in rows.tolist():
+                self._causes.pop(row, None)
+                self._why.pop(row, None)
+
+    def round_ended(self, rows: Array) -> None:
+        """Remember which attempt failed, and why."""
+        child, reasons = self.place.children[0], self.batch.reasons
+        for row in rows.tolist():
+            speaker = reasons.speaker(child, row)
+            failed = child if speaker is None else speaker
+            self._why[row] = reasons.said_below(child, row)
+            outcome = reasons.outcome_of(failed, row)
+            if outcome is not None:
+                self._causes.setdefault(row, []).append(cause_of(reasons.name(failed), outcome))
+
+    def says(self, row: int) -> Statement | None:
+        """Which attempt failed last, and why, and why those before it did."""
+        return self._failed(row, self._why.get(row)) if int(self.rounds[row]) else None
+
+    def adds(self, row: int, outcome: Outcome) -> Outcome:
+        """The last attempt's failure, with the causes of those before it."""
+        return self._failed(row, outcome) if int(self.rounds[row]) > 1 else outcome
+
+    def _failed(self, row: int, why: Statement | None) -> Outcome:
+        return attempt_failed(int(self.rounds[row]), self.limit, self._causes.get(row, []), why)

@@ -85,9 +85,18 @@ class BatchRounds(BatchNode):
 
     def tick(self, rows: Array) -> None:
         """On to the child."""
-        self.rounds[self.begins(rows)] = 0
+        begins = self.begins(rows)
+        if len(begins):
+            self.rounds[begins] = 0
+            self.count_anew(begins)
         self.began[rows] = self.place.child_status[0][rows] != RUNNING
         self.tick_child(0, rows)
+
+    def count_anew(self, rows: Array) -> None:  # a repeat remembers nothing
+        """It begins in worlds."""
+
+    def round_ended(self, rows: Array) -> None:
+        """A round has ended in worlds, and is counted."""
 
     def after(self, child: int, rows: Array, status: Array) -> None:
         """Back, or to the child anew."""
@@ -96,6 +105,7 @@ class BatchRounds(BatchNode):
         if not len(again):
             return
         self.rounds[again] += 1
+        self.round_ended(again)
         (enough,), (again,) = self.split(self.rounds[again] == self.limit, again)
         self.end(enough, self.again_on)
         (wait,), (again,) = self.split(self.began[again], again)

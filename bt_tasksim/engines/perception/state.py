@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Self
 
 import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import MachineError
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Observation, WorldModel, WorldState
 from bt_tasksim.engines.base import EngineSetup, PostProcessEngine
 from bt_tasksim.engines.images import Image
-from bt_tasksim.engines.perception.features import ObservationBuilder
+from bt_tasksim.engines.perception.features import (
+    BatchObservations,
+    alone,
+    put_rows,
+    rows_of,
+    widened,
+    with_axis,
+)
 from bt_tasksim.engines.perception.noise import NoiseModel, noise_model
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -31,7 +38,7 @@ class StatePostProcess(PostProcessEngine):
 
     def __init__(self, robot: RobotDescription, noise: NoiseModel) -> None:
         self.robot = robot
-        self.noise = noise
+        self._batch = BatchState(robot, 1, noise)
 
     @classmethod
     def create(cls, robot: RobotDescription, setup: EngineSetup) -> Self:
@@ -45,22 +52,74 @@ class StatePostProcess(PostProcessEngine):
 
     def reset(self, configuration: ActorConfiguration, model: WorldModel) -> None:
         """See `PostProcessEngine.reset`."""
-        n = len(configuration.objects)
-        noise = noise_model(configuration.noise) if configuration.noise else self.noise
-        self._error = noise.draw(configuration.generator("estimate"), n)
-        self._error[:, :3] = _along_approach(self._error[:, :3], configuration)
-        self._local: list[list[float]] | None = None
-        self._builder = ObservationBuilder(self.robot, configuration)
+        self._batch.reset([0], [configuration])
 
     def observe(self, state: WorldState, images: Mapping[str, Image]) -> Observation:
         """See `PostProcessEngine.observe`."""
+        return alone(self._batch.observe(with_axis(state)))
+
+
+class BatchState:
+    """Observations of ``n`` worlds whose estimates are the true poses with stated errors.
+
+    Args:
+        robot: The robot.
+        n: Number of worlds.
+        noise: Error of the estimates, where a world as drawn does not say otherwise.
+    """
+
+    def __init__(self, robot: RobotDescription, n: int, noise: NoiseModel) -> None:
+        self._noise, self.n = noise, n
+        self._errors: list[Array] = [np.empty((0, 7))] * n
+        self._builder = BatchObservations(robot, n)
+        self._local: Array | None = None
+        self._unseen = np.ones(n, bool)
+
+    def reset(self, rows: Sequence[int] | np.ndarray, configurations: Sequence[ActorConfiguration]) -> None:
+        """Worlds begin new episodes, each with errors of its own."""
+        for row, configuration in zip(rows, configurations, strict=True):
+            noise = noise_model(configuration.noise) if configuration.noise else self._noise
+            error = noise.draw(configuration.generator("estimate"), len(configuration.objects))
+            error[:, :3] = _along_approach(error[:, :3], configuration)
+            self._errors[row] = error
+        self._unseen[np.asarray(rows, int)] = True
+        self._builder.reset(rows, configurations)
+
+    def observe(self, state: WorldState, rows: np.ndarray | None = None) -> Observation:
+        """The observations ``(k, ...)`` of states ``(k, ...)``.
+
+        Args:
+            state: The states; worlds with fewer objects than others have NaN behind theirs.
+            rows: Which worlds these are ``(k,)``, each once; by default all.
+
+        Raises:
+            MachineError: The physics engine knows no objects.
+        """
         if state.objects is None:
             raise MachineError("no estimate from the state: this physics engine knows no objects")
-        if self._local is None:  # the error is fixed to each object as it first was seen
-            self._local = _error_in_object(state.objects, self._error).tolist()
-        pairs = zip(state.objects.tolist(), self._local, strict=True)
-        estimate = np.array([poses.composed(truth, error) for truth, error in pairs]).reshape(-1, 7)
-        return self._builder.build(state, estimate)
+        index = np.arange(self.n) if rows is None else rows
+        if self._local is None or self._unseen[index].any():
+            self._look(state.objects, index)
+        assert self._local is not None
+        local = self._local if rows is None else rows_of(self._local, rows)
+        estimate = poses.multiply(state.objects, local[:, : state.objects.shape[1]])
+        return self._builder.build(state, estimate, rows)
+
+    def _look(self, objects: Array, rows: np.ndarray) -> None:
+        """Worlds are seen for the first time: their errors are fixed to their objects as they are now."""
+        at = np.flatnonzero(self._unseen[rows])
+        new = rows[at]
+        most = objects.shape[1]
+        drawn = np.full((len(new), most, 7), np.nan)
+        for i, row in enumerate(new):
+            error = self._errors[row]
+            drawn[i, : len(error)] = error
+        local = _error_in_object(rows_of(objects, at), constant(drawn, objects))
+        if self._local is None:
+            self._local = constant(np.full((self.n, most, 7), np.nan), objects)
+        self._local = widened(self._local, most)
+        self._local = put_rows(self._local, new, widened(local, self._local.shape[1]))
+        self._unseen[new] = False
 
 
 def _along_approach(errors: Array, configuration: ActorConfiguration) -> Array:
@@ -89,8 +148,8 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def _error_in_object(objects: Array, error: Array) -> Array:
-    """Errors given in the base frame ``(n, 7)``, as frames in each object's own."""
-    estimate = np.concatenate(
-        [objects[:, :3] + error[:, :3], poses.quat_multiply(error[:, 3:], objects[:, 3:])], axis=-1
+    """Errors given in the base frame ``(..., 7)``, as frames in each object's own."""
+    estimate = array_namespace(objects).concat(
+        [objects[..., :3] + error[..., :3], poses.quat_multiply(error[..., 3:], objects[..., 3:])], axis=-1
     )
     return poses.multiply(poses.inverse(objects), estimate)

@@ -80,6 +80,7 @@ def set_inertia(body: mj.MjsBody, mass: float, frame: Array, moments: Array) -> 
     body.explicitinertial = True
 
 
+@lru_cache(maxsize=256)
 def _principal(inertial: Inertial) -> tuple[float, Array, Array]:
     xx, yy, zz, xy, xz, yz = inertial.inertia
     moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))

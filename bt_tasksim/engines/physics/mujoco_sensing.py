@@ -71,7 +71,7 @@ class ContactReader:
     ) -> None:
         self._bodies = bodies
         self._carrier: list[int] = np.asarray(geom_body).tolist()
-        self._judged = np.array([body.role != "base" for body in bodies])
+        self._judged = [body.role != "base" for body in bodies]
         self._robot = [body.role == "link" for body in bodies]
         self._n_tips, self._n_objects = n_tips, n_objects
 
@@ -80,16 +80,14 @@ class ContactReader:
 
         The robot's base does not count.
         """
-        distance = data.contact.dist
-        if not len(distance) or -distance.min() <= than:
+        distances = data.contact.dist.tolist()
+        if not distances or -min(distances) <= than:
             return None
-        geom = data.contact.geom
-        counted = np.where(self._judged[geom].all(axis=1), distance, np.inf)
-        k = int(np.argmin(counted))
-        if -counted[k] <= than:
-            return None
-        a, b = geom[k]
-        return -float(counted[k]), self._bodies[a].name, self._bodies[b].name
+        found, deepest = None, -than
+        for distance, (a, b) in zip(distances, data.contact.geom.tolist(), strict=True):
+            if distance < deepest and self._judged[a] and self._judged[b]:
+                found, deepest = (self._bodies[a].name, self._bodies[b].name), distance
+        return None if found is None else (-deepest, *found)
 
     def near(self, data: mj.MjData) -> Near:
         """What is near what, from the contacts that were last looked for."""
@@ -118,11 +116,13 @@ class ContactReader:
         by_link: defaultdict[tuple[int, int], list[float]] = defaultdict(lambda: [0.0] * 3)
         contact, robot = data.contact, self._robot
         pairs = zip(contact.efc_address.tolist(), contact.geom.tolist(), strict=True)
-        for k, (address, (a, b)) in enumerate(pairs):
-            if address < 0 or not (robot[a] or robot[b]):
-                continue
-            n, s, t = data.efc_force[address : address + 3].tolist()
-            (nx, ny, nz), (sx, sy, sz), (tx, ty, tz) = contact.frame[k].reshape(3, 3).tolist()
+        kept = [(k, at, a, b) for k, (at, (a, b)) in enumerate(pairs) if at >= 0 and (robot[a] or robot[b])]
+        if not kept:
+            return Forces(tips, [0.0] * self._n_objects)
+        frames, forces = contact.frame, data.efc_force  # each costs a copy
+        for k, at, a, b in kept:
+            n, s, t = forces[at : at + 3].tolist()
+            nx, ny, nz, sx, sy, sz, tx, ty, tz = frames[k].tolist()
             x, y, z = nx * n + sx * s + tx * t, ny * n + sy * s + ty * t, nz * n + sz * s + tz * t
             for sign, me, other in ((-1.0, a, b), (1.0, b, a)):
                 body = self._bodies[me]

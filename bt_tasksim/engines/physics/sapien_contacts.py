@@ -58,6 +58,7 @@ class ContactReader:
         self._world, self._n_tips, self._skin = world, n_tips, skin
         n = len(world.objects)
         self.nothing = Touch([[0.0] * 3] * n_tips, [0.0] * n, [math.inf] * n, set(), [False] * n)
+        self._last, self._undisturbed = self.nothing, 0
         self.penetration = 0.0
         self.deepest_pair: tuple[str, str, float, float] | None = None
 
@@ -71,16 +72,22 @@ class ContactReader:
                 if all(known.get(body, _UNKNOWN)[0] != "base" for body in bodies):
                     self._note_depth(bodies, deepest, time)
 
-    def read(self, time: float, step: float) -> Touch:
+    def read(self, time: float, step: float, asleep: bool = False) -> Touch:
         """What touches what, and the deepest overlap.
 
         Args:
             time: Seconds since the episode began.
             step: Seconds of the last physics step, over which impulses are forces.
+            asleep: All objects are, and were when contacts were read last: then PhysX adds no contact but the
+                robot's, and takes none away.
         """
         contacts = self._world.system.get_contacts()
         if not contacts:
+            self._undisturbed = 0
             return self.nothing
+        if asleep and len(contacts) == self._undisturbed:
+            return self._last
+        self._undisturbed = len(contacts)
         known, n = self._world.bodies, len(self._world.objects)
         on_tip: list[list[tuple[float, float, float]]] = [[] for _ in range(self._n_tips)]
         on_object: list[list[float]] = [[] for _ in range(n)]
@@ -92,13 +99,15 @@ class ContactReader:
             kind_b, j = known.get(bodies[1], _UNKNOWN)
             if kind_a == "base" or kind_b == "base":
                 continue
+            by_a, by_b = kind_a == "hand" or kind_a == "arm", kind_b == "hand" or kind_b == "arm"
+            if by_a or by_b:
+                self._undisturbed = 0
             points = contact.points
             separation = min([point.separation for point in points])
             if separation > TOUCH_DISTANCE:
                 continue
             if -separation > self.penetration:
                 self._note_depth(bodies, -separation, time)
-            by_a, by_b = kind_a == "hand" or kind_a == "arm", kind_b == "hand" or kind_b == "arm"
             if not (by_a or by_b):  # what stands on what needs no forces
                 if separation < SUPPORT_DISTANCE:
                     if kind_a == "object":
@@ -130,7 +139,9 @@ class ContactReader:
             hand_force = [math.fsum(forces) for forces in on_object]
         except (ValueError, OverflowError):
             raise MachineError(f"SAPIEN's contact forces are not finite after {time:.2f} s") from None
-        return Touch(tip_force, hand_force, distance, support, [force > 0.0 for force in hand_force])
+        touched = [force > 0.0 for force in hand_force]
+        self._last = Touch(tip_force, hand_force, distance, support, touched)
+        return self._last
 
     def _note_depth(self, bodies: Sequence[physx.PhysxRigidBaseComponent], deep: float, time: float) -> None:
         self.penetration = deep

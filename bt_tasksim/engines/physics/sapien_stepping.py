@@ -69,25 +69,27 @@ class SapienWorld:
         self._dt = self._last_dt = 1.0 / configuration.physics_frequency
         self._substeps = configuration.physics_frequency // configuration.control_frequency
         self._time = 0.0
-        self._falling = self._rolling = False
+        self._falling = self._rolling = self._asleep = False
         self._watch = WATCHED
         self._reader = ContactReader(world, n_tips)
         self._touch = self._reader.nothing
         disturbance, names = configuration.disturbance, [actor.name for actor in configuration.objects]
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
-        self._read()
 
     @property
     def deepest_pair(self) -> tuple[str, str, float, float] | None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         return self._reader.deepest_pair
 
-    def advance(self, position: Array, velocity: Array) -> None:
+    def drive_to(self, position: list[float], velocity: list[float]) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        if self.robot.drive_to(position, velocity):
+            self._watch = WATCHED
+
+    def advance(self) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         self._last_dt = self._dt
-        if self.robot.drive_to(position.tolist(), velocity.tolist()):
-            self._watch = WATCHED
         step = self.world.system.step
         if not self._disturbance.over:
             for _ in range(self._substeps):
@@ -106,7 +108,6 @@ class SapienWorld:
             for _ in range(self._substeps):
                 step()
         self._time += self._dt * self._substeps
-        self._read()
 
     def _fine_steps(self, n: int) -> None:
         world = self.world
@@ -123,24 +124,30 @@ class SapienWorld:
 
     # ---- reading ----------------------------------------------------------------------------------------
 
-    def _read(self) -> None:
+    def read(self) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         articulation, bodies = self.robot.articulation, self.world.objects
-        self._feel()
+        slept, self._asleep = self._asleep, all(body.is_sleeping for body in bodies)
+        still = slept and self._asleep
+        self._feel(still)
+        if not still:
+            self._objects = [floats(body.entity_pose) for body in bodies]
+            self._velocities = [v for body in bodies for v in (body.linear_velocity, body.angular_velocity)]
         self.reading = SapienReading(
             self._time,
             articulation.get_qpos(),
             articulation.get_qvel(),
             articulation.get_link_incoming_joint_forces(),
             [floats(link.entity_pose) for link in self.robot.frames],
-            [floats(body.entity_pose) for body in bodies],
-            [velocity for b in bodies for velocity in (b.linear_velocity, b.angular_velocity)],
+            self._objects,
+            self._velocities,
             self._touch,
             self._reader.penetration,
         )
 
-    def _feel(self) -> None:
+    def _feel(self, asleep: bool = False) -> None:
         """Read what touches what; look closely for some time where that has changed."""
-        before, now = self._touch, self._reader.read(self._time, self._last_dt)
+        before, now = self._touch, self._reader.read(self._time, self._last_dt, asleep)
         if now.touched != before.touched or now.support != before.support:
             self._watch = WATCHED
         self._touch = now

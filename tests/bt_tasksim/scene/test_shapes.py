@@ -280,5 +280,6 @@ def test_corners_may_be_given_clockwise():
     for bevel in (0.0, 0.001):
         one, other = (meshes.prism(order, 0.1, bevel) for order in (outline, outline[::-1]))
         assert meshes.mass_properties(one).volume == pytest.approx(meshes.mass_properties(other).volume)
-    x, y, inside = polygon(outline[::-1]).nearest(0.001, 0.001)
-    assert inside and (x, y) == pytest.approx(polygon(outline).nearest(0.001, 0.001)[:2])
+    point = np.array([0.001, 0.001])
+    found, inside = polygon(outline[::-1]).nearest(point)
+    assert inside and found == pytest.approx(polygon(outline).nearest(point)[0])

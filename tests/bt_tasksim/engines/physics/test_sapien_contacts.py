@@ -38,3 +38,33 @@ def test_sums_of_forces_are_the_same_bits_in_any_order_of_contacts():
         found.add((np.array(touch.tip_force).tobytes(), *touch.hand_force))
     assert len(found) == 1
     assert np.allclose(touch.tip_force, [[0.6, 0.0, 0.0], [0.0, 0.6, 0.9]])
+
+
+def test_contacts_of_what_sleeps_are_read_again_when_a_robot_comes_near():
+    """Also one that is too far away to count yet, and one that came as another went."""
+    table, cup, finger = (Body(entity=SimpleNamespace(name=name)) for name in ("table", "cup", "finger"))
+    standing, near = contact(cup, table, [0.0, 0.0, 0.1]), contact(finger, cup, [0.5, 0.0, 0.0])
+    near.points[0].separation = 0.003
+    listed = []
+    world = SimpleNamespace(
+        bodies={table: ("fixture", 1), cup: ("object", 0), finger: ("hand", 0)},
+        objects=[cup],
+        system=SimpleNamespace(get_contacts=lambda: listed),
+    )
+    reader = ContactReader(world, 1)
+    listed[:] = [standing]
+    first = reader.read(0.0, 1.0)
+    assert first.support == {(0, 1)} and not any(first.touched)
+    assert reader.read(0.1, 1.0, asleep=True) == first
+    listed[:] = [standing, near]
+    assert not any(reader.read(0.2, 1.0, asleep=True).touched)
+    near.points[0].separation = 0.0
+    assert reader.read(0.3, 1.0, asleep=True).hand_force == [0.5]
+    listed[:] = [near]
+    assert reader.read(0.4, 1.0, asleep=True).support == set()
+    listed[:] = [standing]
+    assert reader.read(0.5, 1.0, asleep=True) == first
+    listed[:] = []
+    assert reader.read(0.6, 1.0, asleep=True).support == set()
+    listed[:] = [near]
+    assert reader.read(0.7, 1.0, asleep=True).hand_force == [0.5]

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 
 import numpy as np
@@ -225,3 +226,47 @@ def test_objects_and_fixtures_have_their_columns():
         (2, 0, 1),
         (2, 1, 2),
     }
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_world_that_cannot_be_built_fails_alone(engine, monkeypatch):
+    grasp, throw, *_ = episodes(engine)
+    batch, rows = batch_of(engine, 2), np.arange(2)
+    build = batch._build
+
+    def refusing(row, configuration, start):
+        if configuration is throw.configuration:
+            raise InputError("no such mesh")
+        return build(row, configuration, start)
+
+    monkeypatch.setattr(batch, "_build", refusing)
+    batch.reset(rows, [throw.configuration, grasp.configuration])
+    target = grasp.targets[0]
+    batch.step(JointTarget(np.array([target.position] * 2), np.array([target.velocity] * 2)), rows)
+    assert [str(error) for error in batch.errors] == ["no such mesh", "None"]
+    assert_row(batch.state(rows), 1, grasp.states[0])
+    batch.reset(np.array([0]), [grasp.configuration])
+    assert batch.errors == [None, None]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_worlds_of_two_robots_that_threads_build_at_once_are_those_built_alone(engine):
+    """SAPIEN's defaults for new bodies, such as the solver's iterations by robot, are global."""
+
+    def first_steps(robot):
+        batch, rows = batch_of(engine, 4, threads=2, robot=robot), np.arange(4)
+        out = []
+        for seed in range(3):
+            batch.reset(rows, [scene(robot=robot).sample(seed)] * 4)
+            still = batch.state(rows).joint_position
+            for _ in range(3):
+                batch.step(JointTarget(still + 0.02, np.zeros_like(still)), rows)
+            out.append(batch.state(rows).joint_position)
+        return np.array(out)
+
+    robots = ("panda", "xarm7_ability")
+    alone = [first_steps(robot) for robot in robots]
+    with ThreadPoolExecutor(2) as pool:
+        together = list(pool.map(first_steps, robots))
+    for one, two in zip(alone, together, strict=True):
+        assert np.array_equal(one, two)
