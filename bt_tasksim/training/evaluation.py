@@ -38,7 +38,9 @@ if TYPE_CHECKING:
 SHARE = 16
 """Episodes that a member of a fleet takes at a time; a lost one loses the one that it was at."""
 MEMORY = 500_000_000
-"""Bytes that an actor of a cluster needs, of which 320 MB were measured (600 MB with camera images)."""
+"""Bytes that are reserved for an actor of a cluster; 350 MB were measured."""
+MEMORY_WITH_PICTURES = 900_000_000
+"""The same where pictures are drawn; 680 MB were measured."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +195,8 @@ def _fleet(
     make = partial(_same_runner, job, subject)
     count = None if workers is None else min(workers, most)
     if cluster is not None:
-        return Cluster(make, cluster, count, MEMORY)
+        drawn = runner.pipeline.rendering is not None
+        return Cluster(make, cluster, count, MEMORY_WITH_PICTURES if drawn else MEMORY)
     if count in (None, 1):
         return Here(runner)
     return Workers(make, count, "spawn")
