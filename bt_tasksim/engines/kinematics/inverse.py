@@ -283,7 +283,9 @@ class InverseKinematics:
         )
         return _with(found, left[better], update), least
 
-    def _settle(self, q: Array, seen: Array, goal: Array, posture: Array, until: float) -> tuple[Array, Array]:
+    def _settle(
+        self, q: Array, seen: Array, goal: Array, posture: Array, until: float
+    ) -> tuple[Array, Array]:
         """Moves solutions in their null space towards postures, for as long as the tool stays in place."""
         going = np.arange(goal.shape[-1])
         for _ in range(_SETTLE):
