@@ -90,6 +90,7 @@ class BatchTree:
         self._enter, self._leave = [0] * len(self.nodes), [0] * len(self.nodes)
         self._resume: dict[int, int] = {}
         self._listeners: dict[int, tuple[int, Callable[[Array], None]]] = {}
+        self._watchers: dict[int, Callable[[Array, Array], Array | None]] = {}
         self._at: tuple[int, Array] | None = None
         self._spoke = np.full(worlds, -1)
         children, self._ends = _shape(tree)
@@ -159,6 +160,26 @@ class BatchTree:
                 self._waiting -= len(there)
         self.stop_node(0, rows)
 
+    def watch(self, node: int, callback: Callable[[Array, Array], Array | None]) -> None:
+        """Be told whenever a node ends its tick in some worlds.
+
+        Of several watched nodes, those that a world's tick visits first are told first.
+
+        Args:
+            node: The node, by number.
+            callback: Takes worlds ``(k,)`` and the statuses ``(k,)`` that the node has there now. Gives
+                booleans ``(k,)``, or None for all: where the tick goes on. Elsewhere it is broken off where
+                it stands, and `reset` comes next.
+
+        Raises:
+            InputError: It stands below a node that is ticked world by world.
+        """
+        if node not in self.compiled:
+            raise InputError(
+                f"'{self.nodes[node].name}' cannot be watched: a node above it has no form for many worlds"
+            )
+        self._watchers[node] = callback
+
     def tick_node(self, node: int, rows: Array) -> None:
         """Let worlds tick a node next; for nodes, see `trees.nodes.batch.Batch`."""
         self._send(self._enter[node], (rows,))
@@ -170,7 +191,19 @@ class BatchTree:
             if len(invalid):
                 self.stop_node(node, rows[invalid])
         self._status_of[node][rows] = status
+        if node in self._watchers:
+            rows, status = self._watched(node, rows, status)
+            if not len(rows):
+                return
         self._send(self._leave[node], (rows, status))
+
+    def _watched(self, node: int, rows: Array, status: Array) -> tuple[Array, Array]:
+        """The worlds in which a tick goes on after a watched node has ended, and its statuses there."""
+        going = self._watchers[node](rows, status)
+        if going is None:
+            return rows, status
+        on = self.arrays.where(going)
+        return rows[on], status[on]
 
     def stop_node(self, node: int, rows: Array) -> None:
         """Stop a node and all below it; for nodes, see `trees.nodes.batch.Batch`."""
@@ -199,6 +232,11 @@ class BatchTree:
         if number < 0:
             return "", None
         return self.nodes[number].name, self.compiled[number].outcome(row)
+
+    def outcome(self, node: int, row: int) -> Outcome | None:
+        """How a node ended when it was last active in a world, by its own account."""
+        compiled = self.compiled.get(node)
+        return None if compiled is None else compiled.outcome(row)
 
     def whole_outcome(self, row: int) -> tuple[Behaviour | None, Outcome | None]:
         """Of a world in which the tree has ended: the node that made it end so, and why.
@@ -289,6 +327,10 @@ class BatchTree:
                 return
         self._status_of[node][rows] = status
         self._spoke[np.asarray(rows)] = node
+        if node in self._watchers:
+            rows, status = self._watched(node, rows, status)
+            if not len(rows):
+                return
         self._handlers[self._leave[node]](rows, status)
 
     def _compile(

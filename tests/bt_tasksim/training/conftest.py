@@ -14,6 +14,8 @@ import toys
 def toy_engines(monkeypatch):
     """Every pipeline that is built is a toy world."""
     monkeypatch.setattr("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: toys.World())
+    monkeypatch.setattr("bt_tasksim.training.episode_batch.Worlds", toys.Worlds)
+    monkeypatch.setattr(toys.Worlds, "made", [])
 
 
 @pytest.fixture
