@@ -1,4 +1,4 @@
-"""What follows a Train node, watched in many worlds at once; the laws are those of `bt_tasksim.training.judge`."""
+"""What follows a Train node, watched in many worlds at once; its laws are those of `training.judge`."""
 
 from __future__ import annotations
 
@@ -135,7 +135,11 @@ class BatchJudgement:
         facts = self._context.seen(rows, np.zeros(len(rows))).world
         for k, row in enumerate(rows.tolist()):
             one = np.array([k])
-            known = Known(taken(hidden, one), facts.map(lambda v, one=one: v[one]), judged.hidden.get(row))
+
+            def one_of(values: Array, one: Array = one) -> Array:
+                return values[one]
+
+            known = Known(taken(hidden, one), facts.map(one_of), judged.hidden.get(row))
             cost = float(model.sufficient_cost(known, taken(memory, np.array([row])))[0])
             if cost >= self._cost[row] and cost > 0.0:
                 self._cost[row] = cost

@@ -22,6 +22,7 @@ from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.episodes import Episode
 from bt_tasksim.training.reward import Reward
+from bt_tasksim.training.reward_parts import Decided
 from bt_tasksim.training.transitions import Transitions
 from bt_tasksim.trees.nodes.train import Train, concepts_in, train_nodes
 
@@ -208,7 +209,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             self._episode.close()
             self._episode = self._transitions = None
 
-    def _features(self, decision: Decision) -> Array:
+    def _features(self, decision: Decided) -> Array:
         """What the leaf sees."""
         model = decision.leaf.model
         found = np.asarray(model.features(decision.seen, decision.memory)[0], np.float32)

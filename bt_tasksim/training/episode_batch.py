@@ -27,7 +27,7 @@ from bt_tasksim.core.world import Hidden
 from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import LONGEST
-from bt_tasksim.execution.worlds import Worlds
+from bt_tasksim.execution.worlds import Worlds, why_alone
 from bt_tasksim.policy.policy import Policy, split_action
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import WorldSource
@@ -109,6 +109,19 @@ class BatchDecision:
     def memory(self) -> Any:
         """What the leaf remembered ``(1, ...)``."""
         return taken(self._memory, np.array([self._position]))
+
+
+def why_alone_in(tree: Behaviour, scene: WorldSource, options: EngineOptions) -> str:
+    """Why episodes of a tree run one by one, as a sentence; empty where they need not."""
+    alone = why_alone(options)
+    if alone:
+        return alone
+    context = Context(load_robot(scene.robot))
+    try:
+        BatchTree(tree, context.worlds, lambda leaf: leaf_in_batch(leaf, context))
+    except InputError:
+        return "something in the tree has no form for many worlds"
+    return ""
 
 
 class EpisodeBatch:
@@ -296,8 +309,8 @@ class EpisodeBatch:
         self.batch.reset(begun_rows)
         self.context.begin(models, begun_rows)
         failed = self.worlds.reset(begun_rows, drawn)
-        for row, error in failed.items():
-            self._none(row, error)
+        for row, why in failed.items():
+            self._none(row, why)
         fresh = np.array([row for row in begun if row not in failed], int)
         self._activation[fresh], self._following[fresh] = BEFORE, False
         self._judgement.reset(fresh)

@@ -1,7 +1,7 @@
-"""Episodes collected over worker processes, the same whatever their number.
+"""Episodes collected in batches of worlds, the same whatever their size and the number of processes.
 
 A rollout is a fixed number of environments. Each runs its own episodes for a fixed number of decisions, with
-its own seeds, in whichever worker is free: so the number of workers changes the time and nothing else.
+its own seeds, in a world of its own beside others: so what it comes to does not depend on these.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.fleet import Fleet
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import split_action
@@ -324,7 +325,7 @@ class DrawLane(Lane[DrawResult]):
 
 def alone(env: EpisodeEnv, lane: Lane[Any]) -> None:
     """Run a lane in an environment."""
-    stream, stage, redrawn = env.stream, env.stage, env.redrawn
+    stream, stage = env.stream, env.stage
     try:
         while (wanted := lane.begin()) is not None:
             env.stream, env.stage = wanted.stream, wanted.stage
@@ -403,6 +404,33 @@ def in_batch(batch: EpisodeBatch, tasks: Sequence[Any], /) -> Iterator[tuple[int
     finally:
         for row in lanes:
             batch.leave(row)
+
+
+def side_by_side(
+    keeper: EpisodeBatch | EpisodeEnv, shares: Sequence[Sequence[Any]], /
+) -> Iterator[tuple[int, list[Any]]]:
+    """Work for a fleet whose members keep a batch of worlds, or an environment: do shares of tasks."""
+    for index, tasks in enumerate(shares):
+        if isinstance(keeper, EpisodeBatch):
+            done = dict(in_batch(keeper, tasks))
+        else:
+            done = {k: task.run(keeper) for k, task in enumerate(tasks)}
+        yield index, [done[k] for k in range(len(tasks))]
+
+
+def results(fleet: Fleet[EpisodeBatch | EpisodeEnv], tasks: Sequence[Any], members: int) -> list[Any]:
+    """The results of tasks, in their order.
+
+    Args:
+        fleet: Does them.
+        tasks: The tasks.
+        members: How many it has; each gets an equal share, so that its worlds have something to do.
+    """
+    shares = [tasks[k::members] for k in range(min(members, len(tasks)))]
+    out: list[Any] = [None] * len(tasks)
+    for k, found in fleet.spread(side_by_side, shares):
+        out[k::members] = found
+    return out
 
 
 def _decide(

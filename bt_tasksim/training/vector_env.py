@@ -46,8 +46,8 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
     next one within the same step (`gymnasium.vector.AutoresetMode.SAME_STEP`).
 
     Between two decisions of a world there may be a hundred ticks, while others wait for their next action.
-    Besides ``step``, which waits for all worlds, there are `send` and `recv`, which give those that are ready.
-    What a world comes to does not depend on which of the two is used.
+    Besides ``step``, which waits for all worlds, there are `send` and `recv`, for those that are ready. What
+    a world comes to does not depend on which of the two is used.
 
     Args:
         tree: The tree, with one `Train` node at least.
@@ -144,8 +144,7 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
             rows: Which worlds.
             seed: As of `reset`.
         """
-        seeds = [None if seed is None else seed + k for k in range(self.num_envs)] if _one(seed) else seed
-        assert not isinstance(seeds, int) and seeds is not None
+        seeds = self._seeds(seed)
         if len(seeds) != self.num_envs:
             raise InputError(f"there are {self.num_envs} worlds, and {len(seeds)} seeds")
         for row in np.asarray(rows).tolist():
@@ -229,12 +228,14 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
             missing -= set(found.tolist())
         return self.batch.features(), rewards, terminated, truncated, infos
 
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + k for k in range(self.num_envs)]
+        return seed
+
     def _begin(self, row: int) -> None:
         rng = self._rngs[row]
         assert rng is not None
         self.batch.begin(row, Draws(rng, None, self.stream, self.stage))
-
-
-def _one(seed: Any) -> bool:
-    """A seed for all worlds."""
-    return seed is None or isinstance(seed, int | np.integer)
