@@ -30,7 +30,7 @@ from bt_tasksim.core.errors import BtTasksimWarning, MachineError
 from bt_tasksim.training.evaluation import Job, evaluate
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome
 
-QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_AUTH_MODE": "token"}
+QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_AUTH_MODE": "token", "RAY_worker_niceness": "0"}
 HEAD = "127.0.0.2"
 """Where the head is: Ray does not take 127.0.0.1 for an address that other nodes can have."""
 START = 60.0

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from bt_tasksim.concept.seen import Known, Seen
     from bt_tasksim.core import poses, units
     from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
-    from bt_tasksim.core.outcomes import Form, Outcome, register_reason
+    from bt_tasksim.core.outcomes import Form, Outcome, Possible, Statement, register_reason
     from bt_tasksim.core.poses import Array, array_namespace
     from bt_tasksim.core.registry import register
     from bt_tasksim.core.world import Command, Hidden, Observation
@@ -78,7 +78,7 @@ _HOMES = {
     "bt_tasksim.core.world": ("Command", "Hidden", "Observation"),
     "bt_tasksim.execution.pipelines": ("EngineOptions",),
     "bt_tasksim.core.errors": ("BtTasksimError", "InputError", "MachineError"),
-    "bt_tasksim.core.outcomes": ("Form", "Outcome", "register_reason"),
+    "bt_tasksim.core.outcomes": ("Form", "Outcome", "Possible", "Statement", "register_reason"),
     "bt_tasksim.report.launch": ("run",),
     "bt_tasksim.execution.result": ("Result",),
     "bt_tasksim.execution.runner": ("Runner",),
@@ -135,6 +135,7 @@ __all__ = [
     "PlaceName",
     "Points",
     "Position",
+    "Possible",
     "Radians",
     "Ratio",
     "Result",
@@ -144,6 +145,7 @@ __all__ = [
     "Seconds",
     "Seen",
     "SpotSpec",
+    "Statement",
     "Text",
     "Train",
     "TrainConfig",

@@ -179,7 +179,7 @@ class Bring(Carry):
 def obstacles_of(seen: Seen, world: int) -> list[Obstacle]:
     """What is to be kept clear of in one world, by its row."""
     boxes = seen.world.obstacle_facts
-    there, pose, size = (np.asarray(values[world]) for values in (boxes.present, boxes.pose, boxes.size))
+    there, pose, size = (np.asarray(values[world, ...]) for values in (boxes.present, boxes.pose, boxes.size))
     return [Obstacle(pose[k], tuple(size[k].tolist()), "") for k in np.flatnonzero(there).tolist()]
 
 

@@ -315,13 +315,13 @@ class Grasp(ConceptModel[GraspMemory]):
 
     def explain(self, seen: Seen, memory: GraspMemory) -> Statement:
         """Contacts, opening and how far the tool is from the object."""
+        contacts, tips = seen.contacts, list(enumerate(seen.world.tips))
         touching = [
-            [tip for tip, touches in zip(seen.world.tips, row, strict=True) if touches]
-            for row in seen.contacts.tolist()
+            [tip for k, tip in tips if bool(contacts[world, k])] for world in range(contacts.shape[0])
         ]
         return GRASPING(
             closure=seen.closure,
-            contact=tuple(f"contact at {', '.join(tips)}" if tips else "no contact" for tips in touching),
+            contact=tuple(f"contact at {', '.join(found)}" if found else "no contact" for found in touching),
             distance=tool_distance(seen, self.target),
             object=self.target,
             force=force_at_wrist(seen),
@@ -337,7 +337,7 @@ def _approach_begins(path: Path, standoff: float) -> Array:
     xp, n = array_namespace(path.table), path.table.shape[1]
     left = poses.norm(path.table[:, :, :3] - path.table[:, -1:, :3])
     numbers = xp.astype(xp.arange(1, n + 1, device=left.device), left.dtype)
-    fraction = xp.max((left > standoff) * numbers, axis=-1) / (n - 1)
+    fraction = xp.max(xp.astype(left > standoff, left.dtype) * numbers, axis=-1) / (n - 1)
     return minimum_jerk_time(fraction) * path.duration
 
 

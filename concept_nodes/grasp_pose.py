@@ -140,7 +140,7 @@ def _closing_axes(
     xp = array_namespace(pose)
     one = xp.ones_like(pose[:, :1])
     if closing is not None:
-        return poses.rotate(pose[:, 3:], constant(closing, pose))[:, None], 0.0 * one, one > 0.0
+        return poses.rotate(pose[:, 3:], constant(closing, pose))[:, None, :], 0.0 * one, one > 0.0
     axes = poses.rotate(pose[:, None, 3:], model.grasp_axes)
     across = abs(poses.dot(axes, approach[:, None, :])) < 0.5
     counts = across & (model.grasp_widths < seen.world.opening - 0.006) & ~model.revolved[:, None]
@@ -152,8 +152,10 @@ def _closing_axes(
         _across_anything(pose, approach),
     )
     none = ~xp.any(counts, axis=1)[:, None]
+    # Those that do not count may lie along the approach, across which nothing can be said of them.
+    axes = xp.where(counts[..., None], axes, otherwise[:, None, :])
     return (
-        xp.concat([axes, otherwise[:, None]], axis=1),
+        xp.concat([axes, otherwise[:, None, :]], axis=1),
         xp.concat([rank, 0.0 * one], axis=1),
         xp.concat([counts, none], axis=1),
     )

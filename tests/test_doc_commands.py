@@ -53,6 +53,7 @@ QUICK = {
     "benchmarks.gap": "--episodes 1 --scenarios shelf_to_shelf --grasps programmed --engines sapien",
     "benchmarks.grasp": "--draws 2 --workers 1 --only programmed --noise original",
     "benchmarks.learning": "--quick --only inference --json learning.json",
+    "benchmarks.maniskill_world": "--episodes 1",
     "benchmarks.oracle": "--draws 1 --workers 1",
     "benchmarks.remote": "--quick",
     "benchmarks.sealed": "",
@@ -143,7 +144,8 @@ def parse(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def prepared(tmp_path_factory):
     """A folder with what the pages have made before."""
     folder = tmp_path_factory.mktemp("docs")
-    (folder / "assets").symlink_to(ROOT / "assets")
+    for shared in ("assets", "examples"):
+        (folder / shared).symlink_to(ROOT / shared)
     for page in PAGES:
         for name, text in FILE.findall(page.read_text(encoding="utf-8")):
             (folder / name).write_text(text, encoding="utf-8")

@@ -21,7 +21,17 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ("bt_tasksim", "trees", "concept_nodes", "demos_decomp", "assets")
 FILES = ("pyproject.toml", "setup.py", "bt_tasksim.pth", "README.md")
-HEAVY = ("torch", "sapien", "mani_skill", "mujoco", "stable_baselines3", "gymnasium", "zmq", "roslibpy")
+HEAVY = (
+    "torch",
+    "sapien",
+    "mani_skill",
+    "mujoco",
+    "stable_baselines3",
+    "gymnasium",
+    "zmq",
+    "roslibpy",
+    "ray",
+)
 OWN = {
     "trees.py": "MINE = 'trees'\n",
     "concept_nodes.py": "MINE = 'concept_nodes'\n",

@@ -12,11 +12,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.batch import executor, physics, same_ticks
+from benchmarks.batch import executor, kinematics, physics, same_ticks
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
 
-SECTIONS = {"executor": executor, "physics": physics, "same-ticks": same_ticks}
+SECTIONS = {"executor": executor, "kinematics": kinematics, "physics": physics, "same-ticks": same_ticks}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

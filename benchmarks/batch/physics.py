@@ -201,7 +201,7 @@ def _timed_calls(engine: str) -> dict[str, tuple[Any, str]]:
 
     from bt_tasksim.engines.physics.mujoco_stepping import MujocoWorld
 
-    return {"steps": (mujoco, "mj_step"), "targets": (MujocoWorld, "_drive_to")}
+    return {"steps": (mujoco, "mj_step"), "targets": (MujocoWorld, "drive_to")}
 
 
 def _record(engine: str, seed: int) -> Told:

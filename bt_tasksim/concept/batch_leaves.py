@@ -9,6 +9,7 @@ from bt_tasksim.concept.activation import Activation, no_action
 from bt_tasksim.concept.condition import ConditionNode
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.batch_leaf import FAILURE, PENDING, SUCCESS, BatchLeaf
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
@@ -73,21 +74,21 @@ class ConditionInBatch(BatchLeaf):
 
     def __init__(self, leaf: ConditionNode, context: Context) -> None:
         self._leaf, self._context = leaf, context
-        self._failed: dict[int, Outcome] = {}
+        self._answers: dict[int, tuple[Seen, Array, int]] = {}
 
     def tick(self, rows: Array, fresh: Array) -> Array:
         """See `BatchLeaf.tick`."""
         seen = self._context.seen(rows, np.zeros(len(rows)))
         holds = np.asarray(self._leaf.model.holds(seen))
-        for k, row in enumerate(rows.tolist()):
-            self._failed.pop(row, None)
-            if not holds[k]:
-                self._failed[row] = self._leaf.model.answer(seen, k, False)
+        self._answers.update((row, (seen, holds, k)) for k, row in enumerate(rows.tolist()))
         return np.where(holds, SUCCESS, FAILURE).astype(np.int8)
 
     def outcome(self, row: int) -> Outcome | None:
-        """The last answer in a world where it was no."""
-        return self._failed.get(row)
+        """The last answer in a world."""
+        if row not in self._answers:
+            return None
+        seen, holds, k = self._answers[row]
+        return self._leaf.model.answer(seen, k, bool(holds[k]))
 
 
 def leaf_in_batch(leaf: Behaviour, context: Context) -> BatchLeaf | None:

@@ -155,7 +155,11 @@ class Context:
 
     def tool_writer(self, world: int = 0) -> Behaviour | None:
         """The leaf that has commanded the tool in this tick, in one world."""
-        return self._parts["tool"].writer(world)
+        return self.writer_of("tool", world)
+
+    def writer_of(self, part: str, world: int = 0) -> Behaviour | None:
+        """The leaf that has written a part of the command, ``tool`` or ``hand``, in this tick."""
+        return self._parts[part].writer(world)
 
     def withdraw(self, leaf: Behaviour, rows: Array) -> None:
         """Drop what a leaf has written in this tick: it was interrupted, and others may act instead."""
@@ -240,6 +244,8 @@ class _Part:
             if self._values is None:
                 xp, shape = array_namespace(values), (self._worlds, values.shape[-1])
                 self._values = xp.full(shape, np.nan, dtype=values.dtype, device=values.device)
+            width = max(self._values.shape[-1], values.shape[-1])
+            self._values, values = _widened(self._values, width), _widened(values, width)
             self._values[rows] = values
         if leaf not in self._leaves:
             self._leaves.append(leaf)
@@ -282,6 +288,16 @@ class _Part:
         )
 
 
+def _widened(values: Array, width: int) -> Array:
+    """Targets ``(k, n)`` with so many numbers: a hand target without synergies has them at zero."""
+    missing = width - values.shape[-1]
+    if not missing:
+        return values
+    xp = array_namespace(values)
+    nothing = xp.zeros((values.shape[0], missing), dtype=values.dtype, device=values.device)
+    return xp.concat([values, nothing], axis=-1)
+
+
 WANTED = {
     "tool": "a tool target is (worlds, 7): of each world 7 numbers, position, then quaternion w x y z",
     "hand": "a hand target is (worlds, n): of each world a row of numbers, the closure first: "
@@ -298,4 +314,10 @@ def _conflict(part: str, first: Behaviour, second: Behaviour) -> CommandConflict
 def one_world(bundle: _T) -> _T:
     """An observation, or a hidden state, of a single world, which has no axis of worlds, with one."""
     found: _T = Rows(bundle, lambda values: np.asarray(values)[None])  # type: ignore[assignment]
+    return found
+
+
+def only_world(bundle: _T, world: int) -> _T:
+    """One world of an observation ``(N, ...)``, or of a hidden state, as that of a batch of one."""
+    found: _T = Rows(bundle, lambda values: values[world : world + 1])  # type: ignore[assignment]
     return found

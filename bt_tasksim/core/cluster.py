@@ -40,11 +40,14 @@ LONGEST_PLACE = 24
 """Characters of the path of a folder for temporary files, which is part of the names of Ray's sockets."""
 
 _ADDRESS = re.compile(r"(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9_.-]+):([0-9]{1,5})")
+_PREFIX = re.compile(r"^\[[^]]*\] (\([^)]*\) )?\S+:[0-9]+: ")
+"""Time, process and place in the source, in lines of Ray's log."""
 _BEGIN = "from bt_tasksim.core.cluster_process import main; main()"
 _ALONE = {
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",  # Ray's name for "on the loopback device alone"
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_AUTH_MODE": "token",
+    "RAY_worker_niceness": "0",  # as other processes of the user, and not behind them all
 }
 
 
@@ -188,6 +191,7 @@ class Cluster(Fleet[StateT]):
         self._log.seek(0)
         lines = [line.strip() for line in self._log.read().decode(errors="replace").splitlines()]
         said = next((line for line in reversed(lines) if line), "it said nothing")
+        said = _PREFIX.sub("", said).partition(". ")[0]
         return MachineError(f"{self._where} was lost: {said[:300]}")
 
 

@@ -37,7 +37,9 @@ GROW = 5.0
 ROOM = 60.0
 """Seconds without a living actor, after which the cluster counts as one that has no room."""
 MOST_STARTS = 5
-"""Actors that may end while they begin, one after the other."""
+"""Actors that may end while they begin, one after the other, where no other one lives."""
+LONGEST_REST = 10.0
+"""Seconds, at most, before an actor is begun again after one that ended while it began."""
 ENDING = 8.0
 """Seconds for ending in order."""
 
@@ -97,7 +99,7 @@ class ClusterDriver:
         self._actors: list[_Actor] = []
         self._calls: dict[Any, _Actor] = {}
         self._failed_starts = 0
-        self._alone_since = self._looked = -float("inf")
+        self._alone_since = self._looked = self._rest_until = -float("inf")
 
     def spread(self, work: bytes, items: Sequence[bytes], share: int) -> None:
         """Do work on items with all actors, and pass the results on.
@@ -116,7 +118,10 @@ class ClusterDriver:
                 if actor.begun and not actor.doing and (taken := shares.take(actor, self._living)):
                     self._call(actor, "more", (work, [items[number] for number in taken]), GATHER)
             self._check_room()
-            ready, _ = self._ray.wait(list(self._calls), timeout=LOOK) if self._calls else ([], [])
+            if not self._calls:
+                time.sleep(LOOK)
+                continue
+            ready, _ = self._ray.wait(list(self._calls), timeout=LOOK)
             for call in ready:
                 self._answered(call, shares)
 
@@ -130,6 +135,8 @@ class ClusterDriver:
 
     def _recruit(self, shares: Shares) -> None:
         """Have as many actors as were asked for, or as there is room for; one, at least, waits for room."""
+        if time.monotonic() < self._rest_until:
+            return
         wanted = self._settings.count
         if wanted is None:
             wanted = max(1, len(self._actors))
@@ -210,7 +217,8 @@ class ClusterDriver:
             self._ray.kill(actor.handle)
         if not actor.begun:
             self._failed_starts += 1
-            if self._failed_starts >= MOST_STARTS:
+            self._rest_until = time.monotonic() + min(0.5 * 2.0**self._failed_starts, LONGEST_REST)
+            if self._failed_starts >= MOST_STARTS and not self._living:
                 raise MachineError(
                     f"actors of the Ray cluster end while they begin, such as on {actor.node}; is there "
                     "enough memory?"

@@ -18,11 +18,11 @@ from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.world import ObjectModel, PlaceModel, WorldModel
 
-_T = TypeVar("_T", bound="Facts")
+_T = TypeVar("_T", bound="FactArrays")
 
 
 @dataclass(frozen=True)
-class Facts:
+class FactArrays:
     """A bundle of arrays with the same leading dimensions."""
 
     def map(self: _T, change: Callable[[Array], Array]) -> _T:
@@ -31,7 +31,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class ObjectFacts(Facts):
+class ObjectFacts(FactArrays):
     """What is known beforehand of objects; leading dimensions ``(...)``, see `ObjectModel`.
 
     Attributes:
@@ -63,7 +63,7 @@ class ObjectFacts(Facts):
 
 
 @dataclass(frozen=True)
-class PlaceFacts(Facts):
+class PlaceFacts(FactArrays):
     """Calibrated places; leading dimensions ``(...)``, see `PlaceModel`.
 
     Attributes:
@@ -96,7 +96,7 @@ class PlaceFacts(Facts):
 
 
 @dataclass(frozen=True)
-class ObstacleFacts(Facts):
+class ObstacleFacts(FactArrays):
     """Boxes to keep clear of; leading dimensions ``(N, most)``.
 
     Attributes:

@@ -116,6 +116,19 @@ FORMER: Mapping[str, str] = {
 """Modules of version 0.1 and what they became, both without ``bt_tasksim.``; where one was cut up, a name is
 looked for beside it, too, and then everywhere."""
 
+_HELD = {"holding": "holding", "not_held": "not_held"}
+ONE_WORLD: Mapping[str, Mapping[str, str]] = {
+    "bt_tasksim": {"ConceptModel": "OneWorldConcept"},
+    "bt_tasksim.concept": {"ConceptModel": "OneWorldConcept"},
+    "bt_tasksim.motion": {"plan": "plan"},
+    "concept_nodes.holding": _HELD,
+    "bt_tasksim.concept_nodes.holding": _HELD,
+}
+"""What concepts of version 0.1 are and call where they were written for one world, by the module of then, and
+its name today."""
+ONE_WORLD_HOME = "concept_nodes.former"
+"""Where it is."""
+
 
 @dataclass(frozen=True)
 class Converted:
@@ -162,10 +175,10 @@ def convert(source: str, file: str) -> Converted:
         raise InputError(f"'{file}'{line} is not Python: {error}") from error
     text = _Text(source)
     unknown: list[str] = []
-    dotted = False
+    dotted, former = False, _is_former(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module is not None:
-            text.replace(node, _from(node, f"'{file}', line {node.lineno}", unknown))
+            text.replace(node, _from(node, f"'{file}', line {node.lineno}", unknown, former))
         elif isinstance(node, ast.Import):
             text.replace(node, _import(node))
             dotted = dotted or any(_moved(alias.name) and alias.asname is None for alias in node.names)
@@ -176,12 +189,24 @@ def convert(source: str, file: str) -> Converted:
     return Converted(text.result(), tuple(text.changes), tuple(unknown))
 
 
-def _from(node: ast.ImportFrom, where: str, unknown: list[str]) -> list[str] | None:
+def _is_former(tree: ast.Module) -> bool:
+    """A file imports a module that has moved since version 0.1."""
+    return any(
+        _moved(name)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom | ast.Import)
+        for name in ([a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""])
+    )
+
+
+def _from(node: ast.ImportFrom, where: str, unknown: list[str], former: bool) -> list[str] | None:
     """The statements that replace ``from old import ...``; None where it stays."""
     assert node.module is not None
     homes: dict[str, list[str]] = {}
     for alias in node.names:
         home, name = _home(node.module, alias.name)
+        if former and name in (today := ONE_WORLD.get(node.module, {})):
+            home, name = ONE_WORLD_HOME, today[name]
         if home is None:
             unknown.append(f"{where}: nothing of today defines '{alias.name}' of '{node.module}'")
             home = _moved(node.module) or node.module

@@ -129,6 +129,15 @@ class Engine(ABC):
             raise InputError(f"the {cls.role} engine '{name.partition(':')[0]}' takes no address: '{name}'")
 
     @classmethod
+    def in_logs(cls, name: str) -> bool:
+        """Whether a log that anybody may have written can name it so; by default with nothing behind a colon.
+
+        Args:
+            name: The engine's name, and what follows it after a colon.
+        """
+        return ":" not in name
+
+    @classmethod
     def label(cls, setup: EngineSetup) -> str:
         """How results name an engine with this setup; by default as it was asked for."""
         return setup.name

@@ -20,11 +20,12 @@ from bt_tasksim.core.batch_leaf import FAILURE, INVALID, PENDING, RUNNING, Batch
 from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.batch_reasons import BatchReasons
 from bt_tasksim.execution.leaf_errors import leaf_error
 from bt_tasksim.execution.world_by_world import Copies, WorldByWorld
 from bt_tasksim.trees.check import check_tree
 from bt_tasksim.trees.nodes.base import NodeKind
-from bt_tasksim.trees.nodes.batch import Arrays, BatchNode, Place
+from bt_tasksim.trees.nodes.batch import Arrays, BatchNode, NodePlace
 from bt_tasksim.trees.nodes.subtree import SubTree
 from bt_tasksim.trees.nodes.subtree import compiled as compiled_subtree
 from bt_tasksim.trees.vocabulary import node_kinds
@@ -92,11 +93,10 @@ class BatchTree:
         self._listeners: dict[int, tuple[int, Callable[[Array], None]]] = {}
         self._watchers: dict[int, Callable[[Array, Array], Array | None]] = {}
         self._at: tuple[int, Array] | None = None
-        self._spoke = np.full(worlds, -1)
         children, self._ends = _shape(tree)
         self.compiled: dict[int, BatchNode | BatchLeaf] = {}
-        self._parent = {below: node for node, under in enumerate(children) for below in under}
         self._compile(children, leaves, Copies(tree, worlds, build, contexts))
+        self.reasons = BatchReasons(self.nodes, children, self.compiled, self._status_of)
         self._may_be_invalid = any(isinstance(c, WorldByWorld) for c in self.compiled.values())
 
     @property
@@ -180,6 +180,19 @@ class BatchTree:
             )
         self._watchers[node] = callback
 
+    def speaker(self, row: int) -> Behaviour | None:
+        """The node that made the tree fail in a world: the one that was decided last, with words to say."""
+        found = self.reasons.speaker(0, row)
+        return None if found is None else self.nodes[found]
+
+    def outcome(self, row: int) -> Outcome | None:
+        """Why the tree failed in a world, with what was tried before; None where nobody says it.
+
+        To be asked before the world begins anew.
+        """
+        found = self.reasons.speaker(0, row)
+        return None if found is None else self.reasons.whole_outcome(found, row)
+
     def tick_node(self, node: int, rows: Array) -> None:
         """Let worlds tick a node next; for nodes, see `trees.nodes.batch.Batch`."""
         self._send(self._enter[node], (rows,))
@@ -221,38 +234,6 @@ class BatchTree:
             if len(heard):
                 listener(rows[heard])
         self._status_of[node][rows] = INVALID
-
-    def speaks(self, node: int, rows: Array) -> None:
-        """A node has something to say; for nodes, see `trees.nodes.batch.Batch`."""
-        self._spoke[np.asarray(rows)] = node
-
-    def said(self, row: int) -> tuple[str, Outcome | None]:
-        """Name of the node that spoke last in a world, and what it says; for nodes, too."""
-        number = int(self._spoke[row])
-        if number < 0:
-            return "", None
-        return self.nodes[number].name, self.compiled[number].outcome(row)
-
-    def outcome(self, node: int, row: int) -> Outcome | None:
-        """How a node ended when it was last active in a world, by its own account."""
-        compiled = self.compiled.get(node)
-        return None if compiled is None else compiled.outcome(row)
-
-    def whole_outcome(self, row: int) -> tuple[Behaviour | None, Outcome | None]:
-        """Of a world in which the tree has ended: the node that made it end so, and why.
-
-        See `bt_tasksim.concept.reporting.whole_outcome`.
-        """
-        number = int(self._spoke[row])
-        if number < 0:
-            return None, None
-        outcome = self.compiled[number].outcome(row)
-        above = self._parent.get(number)
-        while outcome is not None and above is not None:
-            node = self.compiled[above]
-            outcome = node.seen_from_here(row, outcome) if isinstance(node, BatchNode) else outcome
-            above = self._parent.get(above)
-        return self.nodes[number], outcome
 
     def _send(self, event: int, parcel: tuple[Array, ...]) -> None:
         if event in self._inbox:
@@ -326,7 +307,6 @@ class BatchTree:
             if not len(rows):
                 return
         self._status_of[node][rows] = status
-        self._spoke[np.asarray(rows)] = node
         if node in self._watchers:
             rows, status = self._watched(node, rows, status)
             if not len(rows):
@@ -371,7 +351,7 @@ class BatchTree:
     def _known(self, node: int, children: tuple[int, ...], kinds: list[NodeKind[Any]]) -> BatchNode | None:
         behaviour = self.nodes[node]
         below = tuple(self._status_of[c] for c in children)
-        place = Place(self, node, self._status_of[node], children, below)
+        place = NodePlace(self, node, self._status_of[node], children, below)
         if type(behaviour) is SubTree:
             return compiled_subtree(behaviour, place)
         kind = next((kind for kind in kinds if kind.describes(behaviour)), None)

@@ -11,14 +11,14 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.concept.batch_leaves import leaf_in_batch
-from bt_tasksim.concept.context import Context, Refusal
+from bt_tasksim.concept.context import Context, Refusal, only_world
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.batch_leaf import RUNNING
 from bt_tasksim.core.errors import BtTasksimError, InputError, UnreachableError
 from bt_tasksim.core.outcomes import FAILED, OUT_OF_REACH, TIME_OVER, Outcome
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import Hidden, WorldModel
+from bt_tasksim.core.world import Command, Hidden, WorldModel
 from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
@@ -47,6 +47,7 @@ class _Episode:
     leaf: str = ""
     steps: int = 0
     sim_time: float = 0.0
+    shown: bool = False
 
 
 class BatchRunner:
@@ -87,7 +88,14 @@ class BatchRunner:
         self.context.hidden = self.worlds.hidden
         for node in self.tree.iterate():
             node.setup(context=self.context)
-        self.batch = BatchTree(self.tree, worlds, lambda leaf: leaf_in_batch(leaf, self.context))
+        self._own: dict[int, Context] = {}  # of worlds in which something is ticked by py_trees
+        self.batch = BatchTree(
+            self.tree,
+            worlds,
+            lambda leaf: leaf_in_batch(leaf, self.context),
+            build=build,
+            contexts=self._own_context,
+        )
         self._episodes: list[_Episode | None] = [None] * worlds
         self._phase = np.full(worlds, IDLE)
         self._quiet, self._left = np.zeros(worlds, int), np.zeros(worlds, int)
@@ -173,7 +181,9 @@ class BatchRunner:
         rows = np.flatnonzero(self._phase == TICKING)
         if not len(rows):
             return
+        self._show(rows)
         status = self.batch.tick(rows, self.context.times[rows])
+        self._collect(rows)
         for k, row in enumerate(rows.tolist()):
             episode = self._episodes[row]
             assert episode is not None
@@ -184,10 +194,37 @@ class BatchRunner:
                 episode.outcome = TIME_OVER(limit=self.longest)
                 self._settle(row, episode)
 
+    def _own_context(self, row: int) -> Context:
+        """The context of one world, for what py_trees ticks in it."""
+        self._own[row] = Context(self.robot)
+        return self._own[row]
+
+    def _show(self, rows: Array) -> None:
+        """Let what py_trees ticks see its worlds."""
+        for row in rows.tolist() if self._own else ():
+            own, episode = self._own[row], self._episodes[row]
+            assert episode is not None
+            if not episode.shown:
+                own.begin([episode.world])
+                episode.shown = True
+            own.advance(only_world(self.context.observation, row))
+            if row in self.context.refused:
+                own.refused[0] = self.context.refused[row]
+
+    def _collect(self, rows: Array) -> None:
+        """Take over what leaves that py_trees ticks have written."""
+        for row in rows.tolist() if self._own else ():
+            own = self._own[row]
+            for name, part in vars(own.written).items():
+                if part is not None and not np.isnan(part[0, 0]):
+                    leaf = own.writer_of(name)
+                    assert leaf is not None, "somebody wrote it"
+                    self.context.write(Command(**{name: part}), np.array([row]), leaf)
+
     def _ended(self, row: int, episode: _Episode, status: Status) -> None:
         episode.status = status
         if status == Status.FAILURE:
-            node, outcome = self.batch.whole_outcome(row)
+            node, outcome = self.batch.speaker(row), self.batch.outcome(row)
             episode.outcome = outcome or FAILED(text="the tree failed, and no node says why")
             episode.leaf = "" if node is None else node.name
         self._settle(row, episode)

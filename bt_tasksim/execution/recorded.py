@@ -25,6 +25,7 @@ from bt_tasksim.core.renamed import former_names, with_present_names
 from bt_tasksim.core.resources import asset
 from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.demos_decomp.log import Demonstration
+from bt_tasksim.engines.base import engine_class
 from bt_tasksim.engines.remote.configurations import check
 from bt_tasksim.engines.remote.plain import from_plain, shown
 from bt_tasksim.execution.pipelines import EngineOptions, local_engines
@@ -215,7 +216,7 @@ def _options(content: Mapping[str, Any], where: str) -> EngineOptions:
             continue
         engines = local_engines(role)
         name = from_plain(str, content[option], f"{where}: {option}")
-        if name not in engines:
+        if name.partition(":")[0] not in engines or not engine_class(role, name).in_logs(name):
             raise InputError(
                 f"{where} was run with {option} {shown(name)}; only a run in which all engines were this "
                 f"machine's own ({', '.join(engines)}) can be replayed"

@@ -11,8 +11,10 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import Decision
+from bt_tasksim.concept.reporting import outcome_of, speaker
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, PENDING, RUNNING, SUCCESS, BatchLeaf
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.leaf_errors import end_all
 from bt_tasksim.trees.nodes.batch import Arrays
@@ -69,6 +71,11 @@ class WorldByWorld(BatchLeaf):
                 half.ticks.close()
                 end_all(self.copies[row], half.decision.leaf)
             self.copies[row].stop(Status.INVALID)
+
+    def outcome(self, row: int) -> Outcome | None:
+        """See `BatchLeaf.outcome`: what the node says that was decided last."""
+        found = speaker(self.copies[row])
+        return None if found is None else outcome_of(found)
 
     def _go_on(self, row: int, ticks: Generator[Behaviour | Decision, None, None]) -> int:
         for said in ticks:

@@ -88,7 +88,7 @@ def plan(
     if line.shape[1] == 1:
         return Path(line + xp.zeros((1, samples, 1), dtype=line.dtype, device=line.device), zero + shortest)
     turned = poses.angle_between(line[:, :-1, 3:], line[:, 1:, 3:])
-    turned = xp.where(xp.all(line[:, :-1] == line[:, 1:], axis=-1), xp.zeros_like(turned), turned)
+    turned = xp.where(xp.all(line[:, :-1, :] == line[:, 1:, :], axis=-1), xp.zeros_like(turned), turned)
     along = _summed(xp.maximum(ways, turned * (speed / turn)))
     total = along[:, -1]
     peak = 1.875  # of a minimum-jerk motion, over its mean speed

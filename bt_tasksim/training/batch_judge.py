@@ -152,10 +152,10 @@ class BatchJudgement:
         for number in below:
             if tree.nodes[number].children or tree.status[row, number] != FAILURE:
                 continue
-            said = tree.outcome(number, row)
+            said = tree.reasons.outcome_of(number, row)
             if said is not None:
                 return FOLLOWER_FAILED(said, node=tree.nodes[number].name)
-        said = tree.outcome(root, row)
+        said = tree.reasons.outcome_of(root, row)
         return None if said is None else FOLLOWER_FAILED(said, node=tree.nodes[root].name)
 
     def _status(self, node: int, row: int) -> str:

@@ -474,11 +474,13 @@ class EpisodeBatch:
         transitions = self._transitions.pop(row)
         last = transitions.decision.leaf
         number = next(n for n, node in enumerate(self.batch.nodes) if node is last)
+        reasons = self.batch.reasons
+        failed = reasons.speaker(self._judgement.train, row)
         ending = ending_of(
             cut,
             judged,
-            self.batch.outcome(number, row),
-            self.batch.said(row)[1],
+            self._leaf(number).outcome(row),
+            None if failed is None else reasons.outcome_of(failed, row),
             self.reward.sufficient,
             STATUSES[int(self._train.place.status[row])].name,
             float(self.context.times[row]),
@@ -498,7 +500,8 @@ class EpisodeBatch:
         self._over.append(row)
         if self._redrawn[row] < REDRAWS and draws.draw is None:
             return
-        said = self.batch.said(row)[1]
+        speaker = self.batch.reasons.speaker(0, row)
+        said = None if speaker is None else self.batch.reasons.said_by(speaker, row)
         status = STATUSES[int(self.batch.status[row, 0])].name
         why = "" if said is None else said.sentence
         redrawn, draw = int(self._redrawn[row]), int(self._drawn[row])

@@ -37,7 +37,9 @@ from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
 SHARE = 16
 """Episodes that a member of a fleet takes at a time; a lost one loses the one that it was at."""
 MEMORY = 500_000_000
-"""Bytes that an actor of a cluster needs, of which 320 MB were measured (600 MB with camera images)."""
+"""Bytes that are reserved for an actor of a cluster, without its worlds; 350 MB were measured with one."""
+MEMORY_WITH_PICTURES = 900_000_000
+"""The same where pictures are drawn; 680 MB were measured."""
 BATCH = 64
 """Worlds that run at once, unless somebody says otherwise."""
 SHARES = 8
@@ -225,7 +227,9 @@ def _fleet(
     make = partial(_same_player, job, subject)
     count = None if workers is None else min(workers, most)
     if cluster is not None:
-        return Cluster(make, cluster, count, MEMORY + job.batch * WORLD_MEMORY)
+        drawn = player.runner.pipeline.rendering is not None
+        alone = MEMORY_WITH_PICTURES if drawn else MEMORY
+        return Cluster(make, cluster, count, alone + job.batch * WORLD_MEMORY)
     if count in (None, 1):
         return Here(player)
     return Workers(make, count, "spawn")

@@ -17,6 +17,8 @@ CONFIDENCE = 0.95
 
 ERRORS = ("position_error", "angle_error", "penetration")
 """Fields of an outcome that may be unknown."""
+UNJUDGED = ("no_goal", "not_judged", "done")
+"""Reasons of successes that nobody judged; ``done`` is that of files of version 0.1."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ class Evaluation:
             f"95 % interval {100 * low:.1f} to {100 * high:.1f}), "
             f"{steps / max(self.seconds, 1e-9):.0f} control steps/s"
         ]
-        if any(o.success and math.isnan(o.position_error) for o in self.outcomes):
+        if any(o.success and o.outcome.cause.reason.name in UNJUDGED for o in self.outcomes):
             lines.append("  (the scene has no goal: success is the tree's own word, nothing was judged)")
         return [*lines, *(f"  {line}" for line in self.failure_lines())]
 

@@ -80,10 +80,13 @@ def plain(value: Any) -> Any:
 def node(tree: Any) -> dict[str, Any]:
     """A tree's nodes, names and arguments."""
     found = {"type": type(tree).__name__, "name": tree.name}
-    values = getattr(tree, "values", None)
-    if values is not None:
-        found["values"] = plain(values)
-        found |= {name: plain(getattr(tree, name)) for name in SETTINGS if hasattr(tree, name)}
+    model = getattr(tree, "model", None)
+    if model is not None:
+        found["values"] = plain(model.values)
+        both = {name: getattr(tree, name, getattr(model, name, None)) for name in SETTINGS}
+        found |= {
+            name: plain(value) for name, value in both.items() if hasattr(model, name) or name in vars(tree)
+        }
     else:
         found |= {name: plain(getattr(tree, name)) for name in PORTS if name in vars(tree)}
     return found | {"children": [node(child) for child in tree.children]}

@@ -82,9 +82,13 @@ def test_it_is_recognised_in_a_log_and_becomes_a_leaf(plugin, poured):
     assert "by 60 degrees" in text_table(found.tasks)
     assert "#2a7f9e" in picture(found.graph)
     assert spoken_concepts("now I pour the cup out") == {"pour"}
-    (leaf,) = [leaf for leaf in tree_from_graph(found.graph).iterate() if isinstance(leaf, pour)]
-    assert leaf.angle == pytest.approx(np.radians(60.0), abs=0.1)
-    assert abs(leaf.axis[0]) == pytest.approx(1.0, abs=0.05)
+    (leaf,) = [
+        leaf
+        for leaf in tree_from_graph(found.graph).iterate()
+        if isinstance(getattr(leaf, "model", None), pour)
+    ]
+    assert leaf.model.angle == pytest.approx(np.radians(60.0), abs=0.1)
+    assert abs(leaf.model.axis[0]) == pytest.approx(1.0, abs=0.05)
 
 
 def test_the_command_line_takes_it(plugin, poured, tmp_path, capsys):

@@ -22,12 +22,12 @@ def test_a_concept_looks_at_it_and_it_is_computed_once_an_instant(plugin, monkey
     assert observables.observable("span").unit == "m"
     runner = Runner(outside.Pinch("target"), load_source("pick_and_place").scene)
     runner.begin(1)
-    seen = runner.context.seen(0.0)
+    seen = runner.context.seen(np.array([0]), np.zeros(1))
     tips = seen.observation.tips
-    assert seen.observable("span") == pytest.approx(np.linalg.norm(tips[0] - tips[-1]))
+    assert seen.observable("span") == pytest.approx(np.linalg.norm(tips[:, 0] - tips[:, -1], axis=-1))
     asked = []
-    monkeypatch.setattr(outside.Span, "read", lambda *_: asked.append(1) or np.float64(0.05))
-    again = runner.context.seen(0.0)
+    monkeypatch.setattr(outside.Span, "read", lambda *_: asked.append(1) or np.array([0.05]))
+    again = runner.context.seen(np.array([0]), np.zeros(1))
     assert again.observable("span") == again.observable("span") == 0.05
     assert len(asked) == 1
 

@@ -58,7 +58,7 @@ def test_in_many_worlds_it_has_its_own_form_or_is_ticked_world_by_world(plugin, 
     assert [r.args[0] for r in caplog.records] == ["Delay"]
     found = []
     for tick in range(5):
-        contexts[1].now = 0.05 * tick
+        contexts[1].times = np.array([0.05 * tick])
         tree.tick(np.arange(2), 0.0)
         found.append(tree.status.tolist())
     first = [RUNNING, RUNNING, INVALID, INVALID, INVALID]

@@ -35,8 +35,8 @@ RELEASE = ("release", {"target": "cup"})
 def test_common_order_becomes_a_sequence_with_its_parameters():
     tree = tree_from_graph(graph(GRASP, PICK, BRING, PLACE, RELEASE), "carry")
     assert isinstance(tree, Sequence) and tree.memory and tree.name == "carry"
-    assert [type(c) for c in tree.children] == [Grasp, Pick, Bring, Place, Release]
-    pick, bring, place = tree.children[1:4]
+    assert [type(c.model) for c in tree.children] == [Grasp, Pick, Bring, Place, Release]
+    pick, bring, place = (leaf.model for leaf in tree.children[1:4])
     assert pick.distance == pytest.approx(0.12) and pick.direction == (0, 0, 1)
     assert bring.to == "goal" and bring.via == ((0.0, -0.1, 0.2),)
     assert bring.hover == pytest.approx(0.08), "it ends where the place after it began"
@@ -46,14 +46,14 @@ def test_common_order_becomes_a_sequence_with_its_parameters():
 @pytest.mark.parametrize(("distance", "hover"), [(0.5, 0.12), (0.001, 0.03)])
 def test_the_hover_is_kept_within_reason(distance, hover):
     place = ("place", {**PLACE[1], "distance": distance})
-    assert tree_from_graph(graph(GRASP, PICK, BRING, place)).children[2].hover == pytest.approx(hover)
+    assert tree_from_graph(graph(GRASP, PICK, BRING, place)).children[2].model.hover == pytest.approx(hover)
 
 
 @pytest.mark.parametrize(("degrees", "kept"), [(10, False), (20, True), (90, True)])
 def test_an_approach_that_is_vertical_as_far_as_can_be_told_is_left_to_the_robot(degrees, kept):
     a = np.deg2rad(degrees)
     given = ("grasp", {"target": "cup", "approach": (np.sin(a), 0.0, -np.cos(a))})
-    leaf = tree_from_graph(graph(given)).children[0]
+    leaf = tree_from_graph(graph(given)).children[0].model
     assert (leaf.approach is not None) == kept
     assert not kept or leaf.approach == pytest.approx(given[1]["approach"], abs=1e-4)
 
@@ -66,15 +66,15 @@ def test_alternatives_become_a_fallback_that_tries_the_commoner_way_first():
     found.nodes[names[2]]["share"], found.nodes[names[3]]["share"] = 0.2, 0.8
     found.graph["alternatives"] = [[[names[2]], [names[3]]]]
     tree = tree_from_graph(found)
-    assert [type(c) for c in tree.children] == [Grasp, Pick, Selector, Release]
+    assert [type(getattr(c, "model", c)) for c in tree.children] == [Grasp, Pick, Selector, Release]
     ways = tree.children[2]
-    assert ways.memory and [way.to for way in ways.children] == ["goal", "other"]
+    assert ways.memory and [way.model.to for way in ways.children] == ["goal", "other"]
 
 
 def test_the_spread_of_demonstrations_becomes_uncertainty():
     found = graph(GRASP, PICK)
     found.nodes["pick 1"]["uncertainty"] = {"distance": 0.02, "direction": np.array([0.03, 0.04, 0.0])}
-    pick = tree_from_graph(found).children[1]
+    pick = tree_from_graph(found).children[1].model
     assert pick.uncertainty == {"distance": pytest.approx(0.02), "direction": pytest.approx(0.05)}
 
 

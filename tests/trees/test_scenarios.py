@@ -96,7 +96,7 @@ def test_a_place_that_is_calibrated_wrong_deceives_the_tree_and_not_the_judge():
         place = configuration.places[-1]
         assert place.name == "goal"
         moved = dataclasses.replace(place, pose=place.pose + np.array([0.06, 0, 0, 0, 0, 0, 0]))
-        runner.context._world = dataclasses.replace(world, places={**world.places, "goal": moved})
+        runner.context.begin([dataclasses.replace(world, places={**world.places, "goal": moved})])
         return runner.finish(configuration, world)
 
     result = deceived(run, "not_in_place")

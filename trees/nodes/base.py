@@ -10,7 +10,7 @@ from typing import ClassVar, Generic, Literal, TypeVar
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.trees.nodes.batch import BatchNode, Place
+from bt_tasksim.trees.nodes.batch import BatchNode, NodePlace
 
 NodeT = TypeVar("NodeT", bound=Behaviour)
 
@@ -88,7 +88,7 @@ class NodeKind(abc.ABC, Generic[NodeT]):
         """
         return ()
 
-    def compiled(self, node: NodeT, place: Place) -> BatchNode | None:
+    def compiled(self, node: NodeT, place: NodePlace) -> BatchNode | None:
         """What a node does in many worlds at once; None: only py_trees can tick it, world by world.
 
         Args:

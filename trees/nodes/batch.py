@@ -20,11 +20,11 @@ import array_api_compat.numpy
 import numpy as np
 
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, RUNNING, SUCCESS
-from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.core.outcomes import TEXT, Outcome, Statement
 from bt_tasksim.core.poses import Array, array_namespace
 
 __all__ = [
-    "FAILURE", "INVALID", "RUNNING", "SUCCESS", "Arrays", "Batch", "BatchNode", "PassesOn", "Place",
+    "FAILURE", "INVALID", "RUNNING", "SUCCESS", "Arrays", "Batch", "BatchNode", "PassesOn", "NodePlace",
 ]  # fmt: skip
 
 
@@ -97,15 +97,32 @@ class Batch(Protocol):
     def stop_node(self, node: int, rows: Array) -> None:
         """Stop a node, as py_trees' ``stop(INVALID)``."""
 
-    def speaks(self, node: int, rows: Array) -> None:
-        """A node is the last one, so far, that has something to say on how the tree ends in these worlds."""
+    @property
+    def reasons(self) -> Reasons:
+        """What nodes say."""
 
-    def said(self, row: int) -> tuple[str, Outcome | None]:
-        """Name of the node that spoke last in a world, and what it says."""
+
+class Reasons(Protocol):
+    """What nodes see of what other nodes say in a world, see `bt_tasksim.execution.batch_reasons`."""
+
+    def name(self, node: int) -> str:
+        """A node's name."""
+
+    def outcome_of(self, node: int, row: int) -> Outcome | None:
+        """What a node says itself, as an outcome."""
+
+    def said_by(self, node: int, row: int) -> Statement | None:
+        """What a node says itself."""
+
+    def said_below(self, node: int, row: int) -> Statement | None:
+        """What the deepest node says that has something to say."""
+
+    def speaker(self, node: int, row: int) -> int | None:
+        """The node, at or below one that has failed, that made it fail."""
 
 
 @dataclass(frozen=True)
-class Place:
+class NodePlace:
     """Where a node stands in a batch.
 
     Attributes:
@@ -126,7 +143,7 @@ class Place:
 class BatchNode(abc.ABC):
     """A control node or decorator in all worlds of a batch. Worlds are rows ``(k,)`` of different numbers."""
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: NodePlace) -> None:
         self.place, self.batch, self.arrays = place, place.batch, place.batch.arrays
         self.xp = self.arrays.xp
 
@@ -144,16 +161,20 @@ class BatchNode(abc.ABC):
             status: ``(k,)`` what it ended with.
         """
 
-    def outcome(self, row: int) -> Outcome | None:
-        """How it ended by itself in a world when it was last active; None where a child of it says so."""
-        return None
-
-    def seen_from_here(self, row: int, outcome: Outcome) -> Outcome:
-        """What a failure below comes to here, see `bt_tasksim.concept.reporting.Reporting`."""
-        return outcome
-
     def stopped(self, rows: Array) -> None:  # noqa: B027  # most have nothing to do
         """It is stopped in worlds where it was RUNNING."""
+
+    def current(self, row: int) -> int | None:
+        """The child that was decided last in a world, or None; that of a decorator is its only one."""
+        return 0 if int(self.place.child_status[0][row]) != INVALID else None
+
+    def says(self, row: int) -> Statement | None:
+        """What the node itself has to say in a world: an outcome, or words; None for nothing."""
+        return None
+
+    def adds(self, row: int, outcome: Outcome) -> Outcome:
+        """What a failure below, which made this node fail, comes to here: with what was tried before."""
+        return outcome
 
     def begins(self, rows: Array) -> Array:
         """The worlds among rows in which the node begins anew."""
@@ -210,11 +231,14 @@ class PassesOn(BatchNode):
     Args:
         place: Where it stands.
         instead: What it ends with, by what its child ended with, where that is another status.
+        words: What it says then; ``{}`` stands for what its child says.
     """
 
-    def __init__(self, place: Place, instead: dict[int, int] | None = None) -> None:
+    def __init__(
+        self, place: NodePlace, instead: dict[int, int] | None = None, words: dict[int, str] | None = None
+    ) -> None:
         super().__init__(place)
-        self.instead = instead or {}
+        self.instead, self.words = instead or {}, words or {}
 
     def tick(self, rows: Array) -> None:
         """On to the child."""
@@ -226,3 +250,14 @@ class PassesOn(BatchNode):
         for said, meant in self.instead.items():
             found = self.xp.where(status == said, self.xp.asarray(meant, dtype=status.dtype), found)
         self.end(rows, found)
+
+    def says(self, row: int) -> Statement | None:
+        """Its words where it has changed a status, else those of its child."""
+        if not self.words:
+            return None
+        said = self.batch.reasons.said_by(self.place.children[0], row)
+        below = said.sentence if said is not None else ""
+        words = self.words.get(int(self.place.child_status[0][row]))
+        if words is None:
+            return TEXT(text=below) if below else None
+        return TEXT(text=words.format(f" [{below}]" if below else ""))

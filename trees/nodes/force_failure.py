@@ -9,7 +9,7 @@ from py_trees.decorators import SuccessIsFailure
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, PassesOn, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, NodePlace, PassesOn
 
 
 def force_failure(child: Behaviour, *, name: str = "ForceFailure") -> SuccessIsFailure:
@@ -35,6 +35,6 @@ class ForceFailureKind(NodeKind[SuccessIsFailure]):
         """See `NodeKind.make`."""
         return force_failure(children[0], name=name)
 
-    def compiled(self, node: SuccessIsFailure, place: Place) -> PassesOn:
+    def compiled(self, node: SuccessIsFailure, place: NodePlace) -> PassesOn:
         """See `NodeKind.compiled`."""
-        return PassesOn(place, {SUCCESS: FAILURE})
+        return PassesOn(place, {SUCCESS: FAILURE}, {SUCCESS: "success is failure{}"})

@@ -9,7 +9,7 @@ from py_trees.decorators import FailureIsSuccess
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, PassesOn, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, NodePlace, PassesOn
 
 
 def force_success(child: Behaviour, *, name: str = "ForceSuccess") -> FailureIsSuccess:
@@ -35,6 +35,6 @@ class ForceSuccessKind(NodeKind[FailureIsSuccess]):
         """See `NodeKind.make`."""
         return force_success(children[0], name=name)
 
-    def compiled(self, node: FailureIsSuccess, place: Place) -> PassesOn:
+    def compiled(self, node: FailureIsSuccess, place: NodePlace) -> PassesOn:
         """See `NodeKind.compiled`."""
-        return PassesOn(place, {FAILURE: SUCCESS})
+        return PassesOn(place, {FAILURE: SUCCESS}, {FAILURE: "failure is success{}"})

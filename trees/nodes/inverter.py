@@ -9,7 +9,7 @@ from py_trees.decorators import Inverter
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, PassesOn, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, NodePlace, PassesOn
 
 
 def invert(child: Behaviour, *, name: str = "Inverter") -> Inverter:
@@ -35,6 +35,10 @@ class InverterKind(NodeKind[Inverter]):
         """See `NodeKind.make`."""
         return invert(children[0], name=name)
 
-    def compiled(self, node: Inverter, place: Place) -> PassesOn:
+    def compiled(self, node: Inverter, place: NodePlace) -> PassesOn:
         """See `NodeKind.compiled`."""
-        return PassesOn(place, {SUCCESS: FAILURE, FAILURE: SUCCESS})
+        return PassesOn(
+            place,
+            {SUCCESS: FAILURE, FAILURE: SUCCESS},
+            {SUCCESS: "success -> failure", FAILURE: "failure -> success"},
+        )

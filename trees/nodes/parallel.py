@@ -10,12 +10,12 @@ from py_trees.composites import Composite
 
 from bt_tasksim.concept.reporting import Reporting
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import register_reason
+from bt_tasksim.core.outcomes import Statement, register_reason
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, RUNNING, SUCCESS, BatchNode, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, SUCCESS, BatchNode, NodePlace
 from bt_tasksim.trees.nodes.pass_through import said_below
 
 CHILDREN_FAILED = register_reason(
@@ -151,7 +151,7 @@ class ParallelKind(NodeKind[Parallel]):
             text += f", {_of(node.failure_count, total)} failed ends it"
         return text
 
-    def compiled(self, node: Parallel, place: Place) -> BatchParallel:
+    def compiled(self, node: Parallel, place: NodePlace) -> BatchParallel:
         """See `NodeKind.compiled`."""
         return BatchParallel(place, *node.counts())
 
@@ -165,13 +165,15 @@ class BatchParallel(BatchNode):
         allowed: Failures with which it fails.
     """
 
-    def __init__(self, place: Place, needed: int, allowed: int) -> None:
+    def __init__(self, place: NodePlace, needed: int, allowed: int) -> None:
         super().__init__(place)
         self.needed, self.allowed, self.total = needed, allowed, len(place.children)
         self.finished = self.arrays.full(False, "bool", self.total)
         """``(children, N)``: not ticked again."""
         self.succeeded, self.failed = self.arrays.full(0, "int32"), self.arrays.full(0, "int32")
         """``(N,)`` how many children."""
+        self.ticked_last = self.arrays.indices(self.total)
+        """``(N,)`` the child that was ticked last."""
 
     def tick(self, rows: Array) -> None:
         """On to the first child that has not finished."""
@@ -205,9 +207,24 @@ class BatchParallel(BatchNode):
     def _next(self, child: int, rows: Array) -> None:
         while child < self.total and len(rows):
             (rows,), (on,) = self.split(self.finished[child][rows], rows)
+            self.ticked_last[on] = child
             self.tick_child(child, on)
             child += 1
         self.end(rows, RUNNING)
+
+    def current(self, row: int) -> int | None:
+        """The child that was ticked last."""
+        return int(self.ticked_last[row]) if int(self.place.status[row]) != INVALID else None
+
+    def says(self, row: int) -> Statement | None:
+        """How many children failed."""
+        if int(self.place.status[row]) != FAILURE:
+            return None
+        last = self.place.children[int(self.ticked_last[row])]
+        reasons, failed = self.batch.reasons, int(self.failed[row])
+        return CHILDREN_FAILED(
+            reasons.said_below(last, row), failed=failed, children=self.total, last=reasons.name(last)
+        )
 
 
 def _of(count: int, total: int) -> str:

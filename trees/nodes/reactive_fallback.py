@@ -9,7 +9,7 @@ from py_trees.composites import Selector
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
-from bt_tasksim.trees.nodes.batch import Place
+from bt_tasksim.trees.nodes.batch import NodePlace
 from bt_tasksim.trees.nodes.fallback import BatchSelector
 
 
@@ -44,6 +44,6 @@ class ReactiveFallbackKind(NodeKind[Selector]):
         """All but the last: only the last child may act."""
         return node.children[:-1]
 
-    def compiled(self, node: Selector, place: Place) -> BatchSelector:
+    def compiled(self, node: Selector, place: NodePlace) -> BatchSelector:
         """See `NodeKind.compiled`."""
         return BatchSelector(place, memory=False)

@@ -9,7 +9,7 @@ from py_trees.composites import Sequence
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
-from bt_tasksim.trees.nodes.batch import Place
+from bt_tasksim.trees.nodes.batch import NodePlace
 from bt_tasksim.trees.nodes.sequence import BatchSequence
 
 
@@ -44,6 +44,6 @@ class ReactiveSequenceKind(NodeKind[Sequence]):
         """All but the last: only the last child may act."""
         return node.children[:-1]
 
-    def compiled(self, node: Sequence, place: Place) -> BatchSequence:
+    def compiled(self, node: Sequence, place: NodePlace) -> BatchSequence:
         """See `NodeKind.compiled`."""
         return BatchSequence(place, memory=False)

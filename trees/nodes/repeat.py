@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.core.outcomes import Form
+from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
-from bt_tasksim.trees.nodes.batch import SUCCESS, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, SUCCESS, NodePlace
 from bt_tasksim.trees.nodes.rounds import BatchRounds, Rounds
 
 ROUND_OF = Form("round {round} of {rounds} done", {"round": COUNT, "rounds": COUNT})
@@ -39,10 +39,12 @@ class Repeat(Rounds):
 
     def report_round(self) -> None:
         """Say which round is done."""
-        if self.times > 0:
-            self.report(ROUND_OF(round=self.rounds, rounds=self.times))
-        else:
-            self.report(ROUND(round=self.rounds))
+        self.report(round_done(self.rounds, self.times))
+
+
+def round_done(rounds: int, times: int) -> Statement:
+    """Which round is done."""
+    return ROUND_OF(round=rounds, rounds=times) if times > 0 else ROUND(round=rounds)
 
 
 def repeat(times: int, child: Behaviour, *, name: str = "Repeat") -> Repeat:
@@ -78,6 +80,17 @@ class RepeatKind(NodeKind[Repeat]):
         often = "without end" if node.times < 0 else f"{node.times} times"
         return f"{self.label} {often}"
 
-    def compiled(self, node: Repeat, place: Place) -> BatchRounds:
+    def compiled(self, node: Repeat, place: NodePlace) -> BatchRepeat:
         """See `NodeKind.compiled`."""
-        return BatchRounds(place, node.limit, again_on=SUCCESS)
+        return BatchRepeat(place, node.limit, again_on=SUCCESS)
+
+
+class BatchRepeat(BatchRounds):
+    """`Repeat` in many worlds at once."""
+
+    def says(self, row: int) -> Statement | None:
+        """Why it failed, or which round is done."""
+        if int(self.place.status[row]) == FAILURE:
+            return self.batch.reasons.said_below(self.place.children[0], row)
+        rounds = int(self.rounds[row])
+        return round_done(rounds, self.limit) if rounds else None

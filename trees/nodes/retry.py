@@ -15,7 +15,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, NodePlace
 from bt_tasksim.trees.nodes.pass_through import said_below
 from bt_tasksim.trees.nodes.rounds import BatchRounds, Rounds
 
@@ -65,67 +65,29 @@ class Retry(Rounds):
         self.report(self._failed(said_below(self.decorated)))
         outcome = outcome_of(failed)
         if outcome is not None:
-            cause = outcome.cause
-            self.causes.append(Cause(failed.name, cause.reason.name, cause.own_sentence))
+            self.causes.append(cause_of(failed.name, outcome))
 
     def seen_from_here(self, outcome: Outcome) -> Outcome:
         """The last attempt's failure, with the causes of those before it."""
         return self._failed(outcome) if self.rounds > 1 else outcome
 
     def _failed(self, why: Statement | None) -> Outcome:
-        return attempt_failed(why, self.rounds, self.attempts, self.causes)
+        return attempt_failed(self.rounds, self.attempts, self.causes, why)
 
 
-def attempt_failed(why: Statement | None, attempt: int, attempts: int, causes: Sequence[Cause]) -> Outcome:
-    """The failure of an attempt, with the causes of those before it.
+def cause_of(leaf: str, outcome: Outcome) -> Cause:
+    """Why an attempt failed, by what the leaf said."""
+    cause = outcome.cause
+    return Cause(leaf, cause.reason.name, cause.own_sentence)
 
-    Args:
-        why: What it says.
-        attempt: Which one, from 1.
-        attempts: How many there may be, or -1.
-        causes: Of all attempts so far, in their order.
-    """
+
+def attempt_failed(attempt: int, attempts: int, causes: Sequence[Cause], why: Statement | None) -> Outcome:
+    """Which attempt failed, and why, and why those before it did."""
     before = causes[: attempt - 1]
     said = f" (before it: {summary(before)})" if before else ""
     if attempts > 0:
         return ATTEMPT_FAILED(why, attempt=attempt, attempts=attempts, before=said)
     return ENDLESS_ATTEMPT_FAILED(why, attempt=attempt, before=said)
-
-
-class BatchRetry(BatchRounds):
-    """`Retry` in many worlds at once.
-
-    Args:
-        place: Where it stands.
-        attempts: How often, or -1.
-    """
-
-    def __init__(self, place: Place, attempts: int) -> None:
-        super().__init__(place, attempts, again_on=FAILURE)
-        self._causes: dict[int, list[Cause]] = {}
-
-    def tick(self, rows: Array) -> None:
-        """On to the child; what was noted of an earlier activation is forgotten."""
-        if self._causes:
-            for row in self.begins(rows).tolist():
-                self._causes.pop(row, None)
-        super().tick(rows)
-
-    def round_ended(self, rows: Array) -> None:
-        """Note why."""
-        for row in rows.tolist():
-            name, outcome = self.batch.said(row)
-            if outcome is not None:
-                cause = outcome.cause
-                found = Cause(name, cause.reason.name, cause.own_sentence)
-                self._causes.setdefault(row, []).append(found)
-
-    def seen_from_here(self, row: int, outcome: Outcome) -> Outcome:
-        """See `Retry.seen_from_here`."""
-        rounds = int(self.rounds[row])
-        if rounds <= 1:
-            return outcome
-        return attempt_failed(outcome, rounds, self.limit, self._causes.get(row, []))
 
 
 def summary(causes: Sequence[Cause]) -> str:
@@ -174,6 +136,44 @@ class RetryUntilSuccessfulKind(NodeKind[Retry]):
         often = "without end" if node.attempts < 0 else f"up to {node.attempts} times"
         return f"{self.label} {often}"
 
-    def compiled(self, node: Retry, place: Place) -> BatchRetry:
+    def compiled(self, node: Retry, place: NodePlace) -> BatchRetry:
         """See `NodeKind.compiled`."""
-        return BatchRetry(place, node.limit)
+        return BatchRetry(place, node.limit, again_on=FAILURE)
+
+
+class BatchRetry(BatchRounds):
+    """`Retry` in many worlds at once; why attempts failed is kept world by world."""
+
+    def __init__(self, place: NodePlace, limit: int, again_on: int) -> None:
+        super().__init__(place, limit, again_on)
+        self._causes: dict[int, list[Cause]] = {}
+        self._why: dict[int, Statement | None] = {}
+
+    def count_anew(self, rows: Array) -> None:
+        """Forget what was."""
+        if self._why:
+            for row in rows.tolist():
+                self._causes.pop(row, None)
+                self._why.pop(row, None)
+
+    def round_ended(self, rows: Array) -> None:
+        """Remember which attempt failed, and why."""
+        child, reasons = self.place.children[0], self.batch.reasons
+        for row in rows.tolist():
+            speaker = reasons.speaker(child, row)
+            failed = child if speaker is None else speaker
+            self._why[row] = reasons.said_below(child, row)
+            outcome = reasons.outcome_of(failed, row)
+            if outcome is not None:
+                self._causes.setdefault(row, []).append(cause_of(reasons.name(failed), outcome))
+
+    def says(self, row: int) -> Statement | None:
+        """Which attempt failed last, and why, and why those before it did."""
+        return self._failed(row, self._why.get(row)) if int(self.rounds[row]) else None
+
+    def adds(self, row: int, outcome: Outcome) -> Outcome:
+        """The last attempt's failure, with the causes of those before it."""
+        return self._failed(row, outcome) if int(self.rounds[row]) > 1 else outcome
+
+    def _failed(self, row: int, why: Statement | None) -> Outcome:
+        return attempt_failed(int(self.rounds[row]), self.limit, self._causes.get(row, []), why)

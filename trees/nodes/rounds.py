@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.trees.nodes.batch import RUNNING, BatchNode, Place
+from bt_tasksim.trees.nodes.batch import RUNNING, BatchNode, NodePlace
 from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick, said_below
 
 
@@ -75,7 +75,7 @@ class BatchRounds(BatchNode):
         again_on: The status after which another round begins.
     """
 
-    def __init__(self, place: Place, limit: int, again_on: int) -> None:
+    def __init__(self, place: NodePlace, limit: int, again_on: int) -> None:
         super().__init__(place)
         self.limit, self.again_on = limit, again_on
         self.rounds = self.arrays.full(0, "int64")
@@ -83,14 +83,20 @@ class BatchRounds(BatchNode):
         self.began = self.arrays.full(False, "bool")
         """``(N,)`` the child began in this tick."""
 
-    def round_ended(self, rows: Array) -> None:
-        """A round has ended in these worlds; by default nothing is noted of it."""
-
     def tick(self, rows: Array) -> None:
         """On to the child."""
-        self.rounds[self.begins(rows)] = 0
+        begins = self.begins(rows)
+        if len(begins):
+            self.rounds[begins] = 0
+            self.count_anew(begins)
         self.began[rows] = self.place.child_status[0][rows] != RUNNING
         self.tick_child(0, rows)
+
+    def count_anew(self, rows: Array) -> None:  # a repeat remembers nothing
+        """It begins in worlds."""
+
+    def round_ended(self, rows: Array) -> None:
+        """A round has ended in worlds, and is counted."""
 
     def after(self, child: int, rows: Array, status: Array) -> None:
         """Back, or to the child anew."""

@@ -10,7 +10,7 @@ from py_trees.composites import Sequence
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, free_children
-from bt_tasksim.trees.nodes.batch import SUCCESS, BatchNode, Place
+from bt_tasksim.trees.nodes.batch import INVALID, SUCCESS, BatchNode, NodePlace
 
 
 def sequence(name: str, *children: Behaviour) -> Sequence:
@@ -40,7 +40,7 @@ class SequenceKind(NodeKind[Sequence]):
         """See `NodeKind.make`."""
         return sequence(name, *children)
 
-    def compiled(self, node: Sequence, place: Place) -> BatchSequence:
+    def compiled(self, node: Sequence, place: NodePlace) -> BatchSequence:
         """See `NodeKind.compiled`."""
         return BatchSequence(place, memory=True)
 
@@ -53,10 +53,10 @@ class BatchSequence(BatchNode):
         memory: Whether it goes on where it stood.
     """
 
-    def __init__(self, place: Place, memory: bool) -> None:
+    def __init__(self, place: NodePlace, memory: bool) -> None:
         super().__init__(place)
         self.memory, self.last = memory, len(place.children) - 1
-        self.current = self.arrays.indices(len(place.children))
+        self.stands_at = self.arrays.indices(len(place.children))
         """``(N,)`` the child that was ticked last; only a sequence with memory keeps it."""
 
     def tick(self, rows: Array) -> None:
@@ -64,11 +64,11 @@ class BatchSequence(BatchNode):
         begins = self.begins(rows)
         if len(begins):
             self.stop_ended(begins)
-            self.current[begins] = 0
+            self.stands_at[begins] = 0
         if not self.memory:
             self.tick_child(0, rows)
             return
-        for child, there in self.arrays.groups(self.current[rows], rows):
+        for child, there in self.arrays.groups(self.stands_at[rows], rows):
             self.tick_child(child, there)
 
     def after(self, child: int, rows: Array, status: Array) -> None:
@@ -81,5 +81,12 @@ class BatchSequence(BatchNode):
             self.end(on, SUCCESS)
             return
         if self.memory:
-            self.current[on] = child + 1
+            self.stands_at[on] = child + 1
         self.tick_child(child + 1, on)
+
+    def current(self, row: int) -> int | None:
+        """The last child that is active or has ended: those behind it are stopped, or not yet begun."""
+        for child in range(self.last, -1, -1):
+            if int(self.place.child_status[child][row]) != INVALID:
+                return child
+        return None

@@ -5,8 +5,9 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_tasksim.core.outcomes import Statement
 from bt_tasksim.trees.nodes.base import free_children
-from bt_tasksim.trees.nodes.batch import PassesOn, Place
+from bt_tasksim.trees.nodes.batch import NodePlace, PassesOn
 from bt_tasksim.trees.nodes.pass_through import PassThrough, said_by
 
 
@@ -28,6 +29,14 @@ def subtree(name: str, root: Behaviour) -> SubTree:
     return SubTree(name, free_children(name, (root,))[0])
 
 
-def compiled(node: SubTree, place: Place) -> PassesOn:
+def compiled(node: SubTree, place: NodePlace) -> BatchSubTree:
     """See `NodeKind.compiled`: a subtree is no kind of node, since its form in XML is another."""
-    return PassesOn(place)
+    return BatchSubTree(place)
+
+
+class BatchSubTree(PassesOn):
+    """`SubTree` in many worlds at once."""
+
+    def says(self, row: int) -> Statement | None:
+        """What its child says."""
+        return self.batch.reasons.said_by(self.place.children[0], row)

@@ -14,11 +14,11 @@ from py_trees.common import Status
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import not_set_up
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import TIMED_OUT, Outcome
+from bt_tasksim.core.outcomes import TIMED_OUT, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
-from bt_tasksim.trees.nodes.batch import FAILURE, RUNNING, PassesOn, Place
+from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, NodePlace, PassesOn
 from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick, said_below
 
 SLACK = 1e-9
@@ -111,7 +111,7 @@ class TimeoutKind(NodeKind[Timeout]):
         """See `NodeKind.describe`."""
         return f"{self.label} {node.seconds:g} s"
 
-    def compiled(self, node: Timeout, place: Place) -> BatchTimeout:
+    def compiled(self, node: Timeout, place: NodePlace) -> BatchTimeout:
         """See `NodeKind.compiled`."""
         return BatchTimeout(place, node.seconds)
 
@@ -124,15 +124,12 @@ class BatchTimeout(PassesOn):
         seconds: The child's time.
     """
 
-    def __init__(self, place: Place, seconds: float) -> None:
+    def __init__(self, place: NodePlace, seconds: float) -> None:
         super().__init__(place)
         self.seconds = seconds
         self.started = self.arrays.full(0.0, "float64")
         """``(N,)`` when the child began."""
-
-    def outcome(self, row: int) -> Outcome:
-        """See `BatchNode.outcome`."""
-        return TIMED_OUT(limit=self.seconds)
+        self._below: dict[int, Statement | None] = {}
 
     def tick(self, rows: Array) -> None:
         """On to the child, unless its time is over."""
@@ -140,7 +137,14 @@ class BatchTimeout(PassesOn):
         over = running & (now - self.started[rows] >= self.seconds - SLACK)
         self.started[rows] = self.xp.where(running, self.started[rows], now)
         (late,), (rows,) = self.split(over, rows)
+        for row in late.tolist():
+            self._below[row] = self.batch.reasons.said_below(self.place.children[0], row)
         self.stop_child(0, late)
-        self.batch.speaks(self.place.node, late)
         self.end(late, FAILURE)
         self.tick_child(0, rows)
+
+    def says(self, row: int) -> Statement | None:
+        """That the time was over: then its child was stopped."""
+        if int(self.place.status[row]) != FAILURE or int(self.place.child_status[0][row]) != INVALID:
+            return None
+        return TIMED_OUT(self._below.get(row), limit=self.seconds)

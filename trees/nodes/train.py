@@ -16,7 +16,7 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind
-from bt_tasksim.trees.nodes.batch import PassesOn, Place
+from bt_tasksim.trees.nodes.batch import NodePlace, PassesOn
 from bt_tasksim.trees.walk import nodes_of
 
 
@@ -100,7 +100,7 @@ class TrainKind(NodeKind[Train]):
         """See `NodeKind.make`."""
         return Train(children[0], name)
 
-    def compiled(self, node: Train, place: Place) -> BatchTrain:
+    def compiled(self, node: Train, place: NodePlace) -> BatchTrain:
         """See `NodeKind.compiled`."""
         return BatchTrain(place)
 
@@ -113,7 +113,7 @@ class BatchTrain(PassesOn):
         interrupted: boolean ``(N,)``: something outside has ended the last activation.
     """
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: NodePlace) -> None:
         super().__init__(place)
         self.activations = self.arrays.full(0, "int64")
         self.interrupted = self.arrays.full(False, "bool")

@@ -63,7 +63,7 @@ _RESTARTS = 24
 """Random postures to begin at."""
 
 
-class Found(NamedTuple):
+class Postures(NamedTuple):
     """Joints for poses, one column a row.
 
     Attributes:
@@ -137,7 +137,7 @@ class InverseKinematics:
         rng = np.random.default_rng(0)
         self._starts = constant(rng.uniform(robot.arm_lower, robot.arm_upper, (_RESTARTS, self._n)).T, like)
 
-    def near(self, goal: Array, last: Array, seen: Array) -> Found:
+    def near(self, goal: Array, last: Array, seen: Array) -> Postures:
         """Joints for placements, continuous with the last ones where that is possible.
 
         A row fails where no posture brings the tool there, or only one that the arm would have to swing to
@@ -152,19 +152,19 @@ class InverseKinematics:
         pull = pull * (_PULL_LIMIT / at_least(_largest(pull), _PULL_LIMIT))
         reached = self._iterate(last, goal, _TRACK, pull, seen)
         rows = goal.shape[-1]
-        found = Found(reached.q, reached.seen, *np.zeros((3, rows)))
+        found = Postures(reached.q, reached.seen, *np.zeros((3, rows)))
         solved = reached.worst <= _TOLERANCE
         if every(solved):
             return found
         hard = where_true(~solved)
         return _with(found, hard, self._again(taken(goal, hard), taken(last, hard)))
 
-    def _again(self, goal: Array, last: Array) -> Found:
+    def _again(self, goal: Array, last: Array) -> Postures:
         """`near` for rows that a few iterations have not brought there."""
         reached = self._iterate(last, goal, _HARDER)
         missed = self._missed(reached.seen, goal)
         rows = goal.shape[-1]
-        found = Found(reached.q, reached.seen, *np.zeros((3, rows)))
+        found = Postures(reached.q, reached.seen, *np.zeros((3, rows)))
         left = np.flatnonzero(~((host(reached.worst) <= _TOLERANCE) | missed.little))
         if not len(left):
             return found
@@ -181,7 +181,7 @@ class InverseKinematics:
         )
         return _with(found, left, other)
 
-    def nearest(self, goal: Array, starts: list[Array], posture: Array | None = None) -> Found:
+    def nearest(self, goal: Array, starts: list[Array], posture: Array | None = None) -> Postures:
         """Joints for placements, of the solutions that are found the ones nearest to a posture.
 
         A row fails where no posture brings the tool there.
@@ -195,7 +195,7 @@ class InverseKinematics:
 
     def _search(
         self, goal: Array, starts: list[Array], posture: Array, best: _Reached | None = None
-    ) -> Found:
+    ) -> Postures:
         """The solutions nearest to a posture from given starts, or else from the first good random one."""
         xp = array_namespace(goal)
         rows, began = goal.shape[-1], time.monotonic()
@@ -206,7 +206,7 @@ class InverseKinematics:
         at = best or _Reached(taken(tries, np.arange(rows))[:, 0], self.chain.seen(tries[:, 0]), goal[0, 0])
         missed = self._missed(at.seen, goal)
         least = missed.cost if best is not None else np.full(rows, np.inf)
-        found = Found(at.q, at.seen, np.full(rows, Reach.UNREACHABLE), missed.distance, missed.angle)
+        found = Postures(at.q, at.seen, np.full(rows, Reach.UNREACHABLE), missed.distance, missed.angle)
         left = np.arange(rows)
         random = xp.broadcast_to(self._starts[..., None], (self._n, _RESTARTS, rows))
         for begin, all_count in ((tries, True), (random, False)):
@@ -220,14 +220,14 @@ class InverseKinematics:
 
     def _try(
         self,
-        found: Found,
+        found: Postures,
         least: Array,
         left: np.ndarray,
         starts: Array,
         goal: Array,
         posture: Array,
         all_count: bool,
-    ) -> tuple[Found, Array]:
+    ) -> tuple[Postures, Array]:
         """Better solutions of the rows ``left`` from starts ``(n, k, rows)``, tried all at once.
 
         Args:
@@ -271,7 +271,7 @@ class InverseKinematics:
         chosen = column[better]
         code = np.where(good.any(axis=0)[better], Reach.REACHED, Reach.UNREACHABLE)
         fails = code != Reach.REACHED
-        update = Found(
+        update = Postures(
             taken(reached.q, chosen),
             taken(reached.seen, chosen),
             code,
@@ -412,9 +412,9 @@ class InverseKinematics:
         )
 
 
-def _with(found: Found, rows: np.ndarray, other: Found) -> Found:
+def _with(found: Postures, rows: np.ndarray, other: Postures) -> Postures:
     """What was found, with other values for some rows."""
-    return Found(*(put(old, rows, new) for old, new in zip(found, other, strict=True)))
+    return Postures(*(put(old, rows, new) for old, new in zip(found, other, strict=True)))
 
 
 def _along(jacobian: Array, force: Array) -> Array:

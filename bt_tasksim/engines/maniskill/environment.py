@@ -58,7 +58,8 @@ class Environment:
             seed: From 0 to 2^32 - 1.
         """
         if self._fresh != seed:
-            self._env.reset(seed=seed, options={"reconfigure": self.file.rebuild})
+            with _quiet():
+                self._env.reset(seed=seed, options={"reconfigure": self.file.rebuild})
             self._fresh = seed
 
     def step(self, action: Array) -> None:
@@ -164,7 +165,7 @@ def _check_assets(name: str, spec: Any) -> None:
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
     """Without what ManiSkill says about machines that have no GPU."""
-    log = logging.getLogger("mani_skill")
+    log = logging.getLogger("mani_skill ")  # with a blank: so ManiSkill calls it
     before = log.level
     log.setLevel(logging.ERROR)
     try:

@@ -50,8 +50,8 @@ def load_environment_file(environment: str) -> EnvironmentFile:
     if environment in bundled() or is_file(environment):
         return _load(path, file_version(path) if path.is_file() else ())
     raise InputError(
-        f"no file says what is in the ManiSkill environment '{shown(environment)}'"
-        f"{nearest(environment, bundled())}; write one and name it: {NAME}:FILE.yaml (docs/maniskill.md)"
+        f"no file says what is in the ManiSkill environment '{shown(environment)}': write one and name it, "
+        f"{NAME}:FILE.yaml (docs/maniskill.md){nearest(environment, bundled())}"
     )
 
 

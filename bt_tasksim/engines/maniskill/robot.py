@@ -69,24 +69,27 @@ class Robot:
         described = robot.drive_array("force_limit")
         limits = [min(float(j.force_limit), own) for j, own in zip(drives, described, strict=True)]
         self._limit = np.array(limits)
-        self._lead = np.divide(
+        lag = np.divide(
             self._damping, self._stiffness, out=np.zeros(len(drives)), where=self._stiffness > 0.0
         )
+        self._lead = lag * environment.frequencies[1] - 0.5
         self.begin()
 
     def begin(self) -> None:
         """A new episode in the same scene: the robot may stand elsewhere, and is told to stay as it is."""
         self.to_base = poses.inverse(array(self._base.entity_pose))
         self._from_world = self.to_base.tolist()
-        self._target = self.position()
+        self._target = self._wanted = self.position()
 
     def action(self, target: JointTarget) -> Array:
         """What the controller is told, for a target of all joints.
 
-        It takes positions alone. A drive of stiffness k and damping d that is told to be at q + v d/k pulls
-        exactly as one that is told to be at q with speed v.
+        It takes positions alone, one for a whole period. A drive of stiffness k and damping d that is told to
+        be at q + v d/k pulls exactly as one that is told to be at q with speed v; from the last target to
+        this one, the mean of that over the period is told.
         """
-        told = target.position + self._lead * target.velocity
+        told = target.position + self._lead * (target.position - self._wanted)
+        self._wanted = target.position
         action, self._target = self._controls.action(told)
         return action
 

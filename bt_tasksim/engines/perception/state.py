@@ -100,7 +100,7 @@ class BatchState:
         index = np.arange(self.n) if rows is None else rows
         if self._local is None or self._unseen[index].any():
             self._look(state.objects, index)
-        assert self._local is not None, "every world was looked at"
+        assert self._local is not None
         local = self._local if rows is None else rows_of(self._local, rows)
         estimate = poses.multiply(state.objects, local[:, : state.objects.shape[1]])
         return self._builder.build(state, estimate, rows)

@@ -14,10 +14,11 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Hidden, JointTarget, WorldState
-from bt_tasksim.engines.base import EngineSetup, PhysicsEngine
+from bt_tasksim.engines.base import EngineSetup, PhysicsEngine, RenderingEngine
 from bt_tasksim.engines.maniskill.draw import Thing, body_of, configuration, things
 from bt_tasksim.engines.maniskill.environment import Environment
-from bt_tasksim.engines.maniskill.files import environment_of
+from bt_tasksim.engines.maniskill.files import bundled, environment_of
+from bt_tasksim.engines.maniskill.rendering import ManiSkillRendering
 from bt_tasksim.engines.maniskill.robot import Robot
 from bt_tasksim.engines.maniskill.verdict import verdict
 from bt_tasksim.engines.maniskill.world import EnvironmentWorld, environment_seed
@@ -56,6 +57,7 @@ class ManiSkillPhysics(PhysicsEngine):
         self.robot = robot
         self.world = EnvironmentWorld(environment, str(robot.source))
         self._environment: Environment | None = None
+        self._drawn = False
         self._scene: Any = None
         self._configuration: ActorConfiguration | None = None
 
@@ -68,6 +70,11 @@ class ManiSkillPhysics(PhysicsEngine):
     def check_name(cls, name: str) -> None:
         """See `Engine.check_name`: the name of an environment follows."""
         environment_of(name)
+
+    @classmethod
+    def in_logs(cls, name: str) -> bool:
+        """See `Engine.in_logs`: an environment whose file is bundled."""
+        return environment_of(name) in bundled()
 
     @classmethod
     def own_world(cls, name: str) -> WorldSource:
@@ -87,7 +94,14 @@ class ManiSkillPhysics(PhysicsEngine):
                 "name no scene"
             )
         self._open()
-        return scene.drawn_by(self._draw)
+        return scene.drawn_by(lambda seed, stream: self._draw(seed, stream, scene.robot))
+
+    def rendering(self) -> RenderingEngine:
+        """See `PhysicsEngine.rendering`: ManiSkill's own pictures, for which it is opened otherwise."""
+        if not self._drawn:
+            self.close()
+        self._drawn = True
+        return ManiSkillRendering(self.robot, self._open, lambda: poses.inverse(self._robot.to_base))
 
     def reset(self, configuration: ActorConfiguration) -> WorldState:
         """See `PhysicsEngine.reset`.
@@ -166,7 +180,7 @@ class ManiSkillPhysics(PhysicsEngine):
 
     def _open(self) -> Environment:
         if self._environment is None:
-            self._environment = Environment(self.world.file, self.world.agent)
+            self._environment = Environment(self.world.file, self.world.agent, self._drawn)
         return self._environment
 
     def _begin(self, seed: int) -> None:
@@ -179,10 +193,10 @@ class ManiSkillPhysics(PhysicsEngine):
             self._things = things(environment)
         self._robot.begin()
 
-    def _draw(self, seed: int, stream: str) -> ActorConfiguration:
+    def _draw(self, seed: int, stream: str, robot: str) -> ActorConfiguration:
         self._begin(environment_seed(seed, stream))
-        robot = self._robot
-        return configuration(self._open(), self.world.robot, robot.to_base, robot.position(), seed, stream)
+        here = self._robot
+        return configuration(self._open(), robot, here.to_base, here.position(), seed, stream)
 
     def _state(self, wrench: Array) -> WorldState:
         robot = self._robot

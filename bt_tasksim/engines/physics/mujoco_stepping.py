@@ -108,10 +108,10 @@ class MujocoWorld:
         self._hand_force = [0.0] * self.n_objects
         self.data.qpos[self.world.joint_qpos] = start
         self.data.xfrc_applied[self.world.object_body, 2] = -self.world.weight
-        self._drive_to(start, np.zeros_like(start))
+        self._hand_target: list[float] = start[self._n_arm :].tolist()
+        self.drive_to(start.tolist(), [0.0] * len(start))
         mujoco.mj_forward(self.world.model, self.data)
         self._samples = [self._feel()]
-        self._read()
 
     def _index_bodies(self, robot: RobotDescription) -> None:
         model = self.world.model
@@ -124,17 +124,17 @@ class MujocoWorld:
         self._frames = np.array([self._tool_body, *(body(tip.links[0]) for tip in robot.tips)])
         self._object_com = model.body_ipos[self.world.object_body]
 
-    def _drive_to(self, position: Array, velocity: Array) -> None:
-        self._hand_target = position[self._n_arm :]
-        self.data.ctrl[:] = self._stiffness * position + self._damping * velocity
-
     # ---- running ----------------------------------------------------------------------------------------
 
-    def advance(self, position: Array, velocity: Array) -> None:
+    def drive_to(self, position: list[float], velocity: list[float]) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
-        if np.any(position[self._n_arm :] != self._hand_target):
+        if position[self._n_arm :] != self._hand_target:
             self._watch = WATCHED
-        self._drive_to(position, velocity)
+        self._hand_target = position[self._n_arm :]
+        self.data.ctrl[:] = self._stiffness * np.array(position) + self._damping * np.array(velocity)
+
+    def advance(self) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         self.world.model.opt.timestep = self._period / self._steps
         self._samples = []
         quiet = self._disturbance.over and not self._falling and self._watch == 0
@@ -144,7 +144,6 @@ class MujocoWorld:
             self._step(sensed=k >= self._steps - self._sensed)
         self._watch = max(self._watch - 1, 0)
         self._periods += 1
-        self._read()
 
     def note_motion(self, falling: bool, spin: float) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
@@ -195,7 +194,7 @@ class MujocoWorld:
             self._penetration, a, b = found
             self.deepest_pair = (a, b, self._penetration, float(self.data.time))
 
-    def _read(self) -> None:
+    def read(self) -> None:
         """Read the state: positions and distances of this instant, forces as felt since just before."""
         model, data, world = self.world.model, self.data, self.world
         self._mujoco.mj_kinematics(model, data)

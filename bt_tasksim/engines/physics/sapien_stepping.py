@@ -76,18 +76,20 @@ class SapienWorld:
         disturbance, names = configuration.disturbance, [actor.name for actor in configuration.objects]
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
-        self._read()
 
     @property
     def deepest_pair(self) -> tuple[str, str, float, float] | None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         return self._reader.deepest_pair
 
-    def advance(self, position: Array, velocity: Array) -> None:
+    def drive_to(self, position: list[float], velocity: list[float]) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        if self.robot.drive_to(position, velocity):
+            self._watch = WATCHED
+
+    def advance(self) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         self._last_dt = self._dt
-        if self.robot.drive_to(position.tolist(), velocity.tolist()):
-            self._watch = WATCHED
         step = self.world.system.step
         if not self._disturbance.over:
             for _ in range(self._substeps):
@@ -106,7 +108,6 @@ class SapienWorld:
             for _ in range(self._substeps):
                 step()
         self._time += self._dt * self._substeps
-        self._read()
 
     def _fine_steps(self, n: int) -> None:
         world = self.world
@@ -123,7 +124,8 @@ class SapienWorld:
 
     # ---- reading ----------------------------------------------------------------------------------------
 
-    def _read(self) -> None:
+    def read(self) -> None:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         articulation, bodies = self.robot.articulation, self.world.objects
         slept, self._asleep = self._asleep, all(body.is_sleeping for body in bodies)
         still = slept and self._asleep

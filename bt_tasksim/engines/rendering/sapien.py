@@ -6,7 +6,6 @@ stand before it.
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, Self
@@ -22,6 +21,7 @@ from bt_tasksim.engines.cameras import CAMERAS, CameraSpec
 from bt_tasksim.engines.images import CameraModel, Image
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.rendering import materials
+from bt_tasksim.engines.rendering.sapien_camera import SceneCamera
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.robot.urdf_visuals import LinkVisual, load_visuals
@@ -33,7 +33,6 @@ Size = tuple[int, int] | None
 """Width and height in pixels; None for the camera's own."""
 _FLOOR = -0.75
 _MAT = 0.0005
-_NEAR, _FAR = 0.02, 20.0
 
 
 @register("engine/rendering", "sapien")
@@ -70,7 +69,7 @@ class SapienRendering(RenderingEngine):
         self._sapien, self._render = sapien, render
         self._own = dict(cameras or {})
         self._specs: dict[str, CameraSpec] = {}
-        self._cameras: dict[tuple[str, Size], tuple[CameraSpec, CameraModel, Any, Any]] = {}
+        self._cameras: dict[tuple[str, Size], tuple[CameraSpec, SceneCamera]] = {}
         self._robot: RobotDescription | None = None
         self._kinematics: PinocchioKinematics | None = None
         self._links: dict[str, Any] = {}
@@ -116,7 +115,7 @@ class SapienRendering(RenderingEngine):
         Raises:
             InputError: There is no such camera.
         """
-        return self._camera(name, None)[1]
+        return self._camera(name, None).model
 
     def render(
         self, state: WorldState, camera: str, *, depth: bool = False, size: tuple[int, int] | None = None
@@ -135,28 +134,14 @@ class SapienRendering(RenderingEngine):
         """
         if self._kinematics is None:
             raise RuntimeError("nothing can be drawn: the rendering engine was not reset")
-        _, model, component, _ = self._camera(camera, size)
+        stands = self._camera(camera, size)
         for name, pose in self._kinematics.link_poses(state.joint_position, list(self._links)).items():
             self._links[name].set_pose(self._pose(pose))
         if state.objects is not None:
             for entity, pose in zip(self._objects, state.objects, strict=True):
                 entity.set_pose(self._pose(pose))
         self._scene.update_render()
-        try:
-            component.take_picture()
-            colour = component.get_picture("Color")
-        except (
-            BaseException
-        ):  # an interrupt: a scene that is let go of while it is drawn takes the process down
-            with contextlib.suppress(RuntimeError):
-                component.get_picture("Color")  # waits until it is drawn
-            raise
-        pixels = np.round(255 * np.clip(colour[..., :3], 0, 1)).astype(np.uint8)
-        if not depth:
-            return Image(model, pixels, None)
-        position = component.get_picture("Position")
-        metres = np.where(position[..., 3] < 1, -position[..., 2], 0).astype(np.float32)
-        return Image(model, pixels, metres)
+        return stands.take(depth)
 
     def close(self) -> None:
         """Let go of the scene."""
@@ -166,7 +151,7 @@ class SapienRendering(RenderingEngine):
         self._remove(list(self._links.values()))
         self._links, self._cameras, self._robot, self._kinematics, self._drawn = {}, {}, None, None, ()
 
-    def _camera(self, name: str, size: Size) -> tuple[CameraSpec, CameraModel, Any, Any]:
+    def _camera(self, name: str, size: Size) -> SceneCamera:
         name = ALIASES.get(name, name)
         specs = self._specs or {**CAMERAS, **self._own}
         spec = specs.get(name)
@@ -175,25 +160,12 @@ class SapienRendering(RenderingEngine):
         spec = spec if size is None else dataclasses.replace(spec, size=size)
         known = self._cameras.get((name, size))
         if known is not None and known[0] == spec:
-            return known
+            return known[1]
         if known is not None:
-            self._scene.remove_entity(known[3])
-        model = spec.model(name)
-        component = self._render.RenderCameraComponent(model.width, model.height)
-        component.set_perspective_parameters(
-            _NEAR, _FAR,
-            float(model.matrix[0, 0]), float(model.matrix[1, 1]),
-            float(model.matrix[0, 2]), float(model.matrix[1, 2]), 0.0,
-        )  # fmt: skip
-        # SAPIEN's camera looks along x, with y to the left and z up.
-        to_optical = np.array([0.5, 0.5, -0.5, 0.5])
-        entity = self._sapien.Entity()
-        entity.add_component(component)
-        pose = self._pose(model.pose) * self._pose(np.array([0, 0, 0, *to_optical]))
-        entity.set_pose(pose)
-        self._scene.add_entity(entity)
-        self._cameras[name, size] = (spec, model, component, entity)
-        return self._cameras[name, size]
+            known[1].remove()
+        stands = SceneCamera(self._scene, spec.model(name))
+        self._cameras[name, size] = (spec, stands)
+        return stands
 
     def _build_robot(self, robot: RobotDescription) -> None:
         specs = {

@@ -246,6 +246,20 @@ def test_a_target_without_a_row_for_each_of_its_worlds_is_refused(three, command
     assert context.written.of_world(0) == Command()
 
 
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_hand_with_synergies_in_one_world_and_without_in_another(three, first):
+    context, a, b = three
+    writes = [
+        (Command(hand=np.array([[0.5]])), rows(0), a),
+        (Command(hand=np.array([[0.6, 0.2]])), rows(1), b),
+    ]
+    for write in (writes[first], writes[1 - first]):
+        context.write(*write)
+    found = context.written
+    assert found.of_world(0).hand.tolist() == [0.5, 0.0] and found.of_world(1).hand.tolist() == [0.6, 0.2]
+    assert found.of_world(2).hand is None
+
+
 def test_goals_are_each_worlds_own(three):
     context, _, _ = three
     context.reach("holding", "cup", rows(0, 2))

@@ -160,6 +160,17 @@ def test_what_is_no_address_is_one_sentence(address):
     assert "\n" not in str(caught.value)
 
 
+@needs_ray
+def test_a_cluster_that_is_lost_is_one_sentence(work, monkeypatch):
+    """Ray ends its process after a minute without the head, with a line in its log."""
+    line = (
+        "[2026-11-22 18:20:54,426 E 20454 20624] (driver) rpc_client.h:204: Failed to connect. It's killed."
+    )
+    monkeypatch.setattr(module, "_BEGIN", f"print({line!r})")
+    with pytest.raises(MachineError, match=r"^Ray was lost: Failed to connect$"):
+        Cluster(work.make, "local")
+
+
 def test_where_ray_is_not_installed_it_says_what_to_do(monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"pip install 'bt-tasksim\[cluster\]'"):

@@ -7,7 +7,7 @@ import pytest
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.facts import Facts, FactsTable, WorldFacts, joined, rotations, take_rows
+from bt_tasksim.core.facts import FactArrays, FactsTable, WorldFacts, joined, rotations, take_rows
 from bt_tasksim.core.world import ObjectModel, Obstacle, PlaceModel, WorldModel
 
 KINDS = {
@@ -253,5 +253,5 @@ def test_of_each_row_the_entry_that_is_asked_for(library, inner):
 def test_facts_are_brought_to_torch():
     torch = pytest.importorskip("torch")
     facts = WorldFacts.of(UNLIKE).map(torch.from_numpy)
-    assert isinstance(facts.object_facts, Facts) and type(facts.object("cup").extent) is torch.Tensor
+    assert isinstance(facts.object_facts, FactArrays) and type(facts.object("cup").extent) is torch.Tensor
     assert facts.place("table").rim.tolist() == [0.0] * 4 and facts.worlds == 4

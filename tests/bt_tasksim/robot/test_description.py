@@ -19,9 +19,10 @@ from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.scene import Scene
 
-ROBOTS = ["panda", "xarm7_ability", "so100"]
+ROBOTS = ["panda", "panda_wristcam", "xarm7_ability", "so100"]
 AGENTS = {
     "panda": ("mani_skill.agents.robots.panda.panda", "Panda"),
+    "panda_wristcam": ("mani_skill.agents.robots.panda.panda_wristcam", "PandaWristCam"),
     "xarm7_ability": ("mani_skill.agents.robots.xarm.xarm7_ability", "XArm7Ability"),
     "so100": ("mani_skill.agents.robots.so100.so_100", "SO100"),
 }
@@ -77,7 +78,7 @@ def test_agrees_with_maniskills_agent(name: str) -> None:
     robot = load_robot(name)
     assert Path(agent.urdf_path).resolve() == robot.urdf.resolve()
     assert agent.uid == robot.name
-    if name == "panda":
+    if name.startswith("panda"):
         assert tuple(agent.arm_joint_names) == robot.arm_joints
         assert tuple(agent.gripper_joint_names) == robot.hand_joints
         assert agent.ee_link_name == robot.tool_link

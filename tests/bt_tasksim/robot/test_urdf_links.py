@@ -24,7 +24,7 @@ def urdf(tmp_path):
     return write
 
 
-@pytest.mark.parametrize("robot", ["panda", "xarm7_ability", "so100"])
+@pytest.mark.parametrize("robot", ["panda", "panda_wristcam", "xarm7_ability", "so100"])
 def test_masses_and_places_agree_with_pinocchio(robot):
     description = load_robot(robot)
     links = load_links(description.urdf)

@@ -13,9 +13,7 @@ import toys
 @pytest.fixture
 def toy_engines(monkeypatch):
     """Every pipeline that is built is a toy world."""
-    monkeypatch.setattr("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: toys.World())
-    monkeypatch.setattr("bt_tasksim.training.episode_batch.Worlds", toys.Worlds)
-    monkeypatch.setattr(toys.Worlds, "made", [])
+    toys.instead_of_engines(monkeypatch.setattr)
 
 
 @pytest.fixture

@@ -145,13 +145,16 @@ def test_a_command_that_is_ended_loses_nothing_and_leaves_nothing(tmp_path, whol
     words = ["evaluate", "pick_and_throw", "--noise", "hard", "--seed", "40", "--episodes", "8", "--json"]
     command = [sys.executable, "-m", "bt_tasksim.cli", *words, "e.json", "--cluster", "local"]
     first = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    journal, until = tmp_path / "e.json.episodes", time.monotonic() + 90.0
-    while not (journal.exists() and journal.read_bytes().count(b"\n") >= 3):
-        assert first.poll() is None and time.monotonic() < until
-        time.sleep(0.005)
-    begun = psutil.Process(first.pid).children(recursive=True)
-    first.send_signal(number)
-    _, said = first.communicate()
+    journal, until = tmp_path / "e.json.episodes", time.monotonic() + 300.0
+    with first:
+        while not (journal.exists() and journal.read_bytes().count(b"\n") >= 3):
+            if first.poll() is not None or time.monotonic() > until:
+                first.kill()
+                raise AssertionError(first.communicate()[1])
+            time.sleep(0.005)
+        begun = psutil.Process(first.pid).children(recursive=True)
+        first.send_signal(number)
+        _, said = first.communicate()
     assert first.returncode == code and said.count("\n") == (number != signal.SIGKILL), said
     _, left = psutil.wait_procs(begun, timeout=30.0)
     assert [p for p in left if p.status() != psutil.STATUS_ZOMBIE] == []

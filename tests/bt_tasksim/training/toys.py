@@ -120,6 +120,13 @@ class Worlds:
             world.close()
 
 
+def instead_of_engines(put: Any) -> None:
+    """Every world is a toy from now on; ``put(path, value)`` puts a value in the place of another."""
+    put("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: World())
+    put("bt_tasksim.training.episode_batch.Worlds", Worlds)
+    put("toys.Worlds.made", [])
+
+
 def stacked(bundles: list[Any]) -> Any:
     """Observations or hidden states of single worlds as one of several."""
     names = [field.name for field in dataclasses.fields(bundles[0])]

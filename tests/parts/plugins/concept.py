@@ -42,8 +42,10 @@ class Pour(Carry):
 
     def begin(self, seen: Seen) -> MoveMemory:
         """There and back, on the spot."""
-        turn = np.concatenate([[np.cos(self.angle / 2)], np.sin(self.angle / 2) * np.asarray(self.axis)])
-        tilted = poses.pose(seen.tool[:3], poses.quat_multiply(turn, seen.tool[3:]))
+        xp = poses.array_namespace(seen.tool)
+        turn = [np.cos(self.angle / 2), *(np.sin(self.angle / 2) * np.asarray(self.axis))]
+        tilted = poses.quat_multiply(poses.constant(turn, seen.tool), seen.tool[:, 3:])
+        tilted = xp.concat([seen.tool[:, :3], tilted], axis=-1)
         return MoveMemory(plan([seen.tool, tilted, seen.tool], self.speed))
 
     @classmethod

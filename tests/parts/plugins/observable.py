@@ -1,15 +1,14 @@
 """An observable from outside, and a concept that looks at it: how far apart the fingertips are."""
 
-import numpy as np
-
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import ObjectName
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import poses
+from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.observables import Observable
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.world import Command, Observation, WorldModel
+from bt_tasksim.core.world import Command, Observation
 from bt_tasksim.robot.description import RobotDescription
 
 
@@ -17,13 +16,13 @@ from bt_tasksim.robot.description import RobotDescription
 class Span(Observable):
     """Distance between the first and the last fingertip."""
 
-    shape = "(...)"
+    shape = "(N,)"
     unit = "m"
     gap = "small"
     why = "encoders and a calibrated hand"
 
-    def read(self, observation: Observation, world: WorldModel) -> Array:
-        return poses.norm(observation.tips[..., 0, :] - observation.tips[..., -1, :])
+    def read(self, observation: Observation, world: WorldFacts) -> Array:
+        return poses.norm(observation.tips[:, 0, :] - observation.tips[:, -1, :])
 
 
 @register("concept")
@@ -45,11 +44,11 @@ class Pinch(ConceptModel):
 
     def features(self, seen: Seen, memory: None) -> Array:
         xp = array_namespace(seen.tool)
-        span = seen.observable("span")[..., None] / 0.1
-        return xp.concat([xp.asarray(span), xp.astype(seen.contacts, seen.tool.dtype)], axis=-1)
+        span = seen.observable("span")[:, None] / 0.1
+        return xp.concat([span, xp.astype(seen.contacts, seen.tool.dtype)], axis=-1)
 
     def command(self, action: Array, seen: Seen, memory: None) -> Command:
-        closure = poses.clip(seen.closure[..., None] + 0.1 + 0.05 * action, 0.0, 1.0)
+        closure = poses.clip(seen.closure[:, None] + 0.1 + 0.05 * action, 0.0, 1.0)
         return Command(hand=closure)
 
     def done(self, seen: Seen, memory: None) -> Array:
@@ -60,4 +59,6 @@ class Pinch(ConceptModel):
         return seen.observable("span")
 
     def sufficient_cost(self, known, memory: None) -> Array:
-        return np.where(known.hand_force(self.target) > 0.1, 0.0, 2.0)
+        force = known.hand_force(self.target)
+        xp = array_namespace(force)
+        return xp.where(force > 0.1, xp.zeros_like(force), 2.0 * xp.ones_like(force))

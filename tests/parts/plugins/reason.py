@@ -2,7 +2,7 @@
 
 from bt_tasksim.concept.parameters import Metres
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.core.outcomes import Outcome, register_reason
+from bt_tasksim.core.outcomes import Possible, register_reason
 from bt_tasksim.core.poses import norm
 from bt_tasksim.core.units import METRES
 from concept_nodes import Pick
@@ -21,9 +21,8 @@ class NearPick(Pick):
 
     limit: Metres = 0.8
 
-    def initial_state(self, seen: Seen) -> Outcome | None:
-        """The object must be near."""
-        distance = float(norm(seen.object(self.target)[:3]))
-        if distance > self.limit:
-            return TOO_FAR(object=self.target, distance=distance, limit=self.limit)
-        return super().initial_state(seen)
+    def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
+        """The object must be near, and in the hand."""
+        distance = norm(seen.object(self.target)[:, :3])
+        far = TOO_FAR.where(distance > self.limit, object=self.target, distance=distance, limit=self.limit)
+        return far, super().initial_state(seen)

@@ -9,7 +9,7 @@ from py_trees.decorators import Decorator
 from bt_tasksim.concept.context import Context
 from bt_tasksim.core.registry import register
 from trees.nodes.base import NodeKind, Port, free_children
-from trees.nodes.batch import RUNNING, SUCCESS, PassesOn, Place
+from trees.nodes.batch import RUNNING, SUCCESS, NodePlace, PassesOn
 
 
 class Delay(Decorator):
@@ -82,5 +82,5 @@ class KeepRunningKind(NodeKind[KeepRunningUntilFailure]):
     def make(self, name: str, children: list[Behaviour], ports: Mapping[str, int]) -> KeepRunningUntilFailure:
         return KeepRunningUntilFailure(name, children[0])
 
-    def compiled(self, node: KeepRunningUntilFailure, place: Place) -> PassesOn:
+    def compiled(self, node: KeepRunningUntilFailure, place: NodePlace) -> PassesOn:
         return PassesOn(place, {SUCCESS: RUNNING})

@@ -264,7 +264,13 @@ engine = SapienRendering()
 world = here.red_world("box")
 engine.reset(world)
 find = engine._camera
-engine._camera = lambda *which: (*find(*which)[:2], Camera(find(*which)[2]), None)
+
+def watched(*which):
+    stands = find(*which)
+    stands.component = Camera(stands.component)
+    return stands
+
+engine._camera = watched
 try:
     engine.render(here.state_of(world), "scene")
 except KeyboardInterrupt:

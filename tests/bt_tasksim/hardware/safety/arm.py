@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import socket
 import subprocess
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim import Runner, Scene
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.world import Command, WorldState
@@ -181,38 +181,49 @@ class GivenPoses(PostProcessEngine):
         return self.builder.build(state, np.array([[0.5, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0]]))
 
 
-class Sweep(ConceptModel):
-    """Moves the tool to and fro, 5 cm to each side, and misbehaves when told.
+class SweepLeaf(ConceptNode):
+    """The leaf of a sweep, which keeps how it ended and hands on what the sweep is told.
 
     Attributes:
         trouble: Called at every tick with the command that it would give; gives the one to use.
+        lasts: Seconds.
     """
 
-    default_timeout = 60.0
-    lasts = 60.0
+    trouble = property(
+        lambda self: self.model.trouble, lambda self, call: setattr(self.model, "trouble", call)
+    )
+    lasts = property(lambda self: self.model.lasts, lambda self, lasts: setattr(self.model, "lasts", lasts))
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.trouble = lambda tool: tool
         self.ended: list[Any] = []
 
-    def begin(self, seen: Any) -> Any:
-        return seen.tool.copy()
-
-    def command(self, action: Any, seen: Any, memory: Any) -> Command:
-        tool = memory.copy()
-        tool[1] += 0.05 * (1.0 - math.cos(4.0 * float(seen.elapsed)))
-        return Command(tool=self.trouble(tool))
-
-    def done(self, seen: Any, memory: Any) -> Any:
-        return np.bool_(seen.elapsed >= self.lasts)
-
     def terminate(self, new_status: Any) -> None:
         self.ended.append(new_status)
         super().terminate(new_status)
 
 
-def runner_of(port: int) -> tuple[Runner, Sweep]:
+class Sweep(ConceptModel):
+    """Moves the tool to and fro, 5 cm to each side, and misbehaves when told."""
+
+    default_timeout = 60.0
+    lasts = 60.0
+    leaf_base = SweepLeaf
+
+    def begin(self, seen: Any) -> Any:
+        return seen.tool.copy()
+
+    def command(self, action: Any, seen: Any, memory: Any) -> Command:
+        tool = memory.copy()
+        tool[:, 1] += 0.05 * (1.0 - np.cos(4.0 * seen.elapsed))
+        return Command(tool=self.trouble(tool))
+
+    def done(self, seen: Any, memory: Any) -> Any:
+        return seen.elapsed >= self.lasts
+
+
+def runner_of(port: int) -> tuple[Runner, SweepLeaf]:
     """A runner of a sweep on the arm."""
     leaf = Sweep(name="sweep")
     pipeline = robot_pipeline(ROBOT, ArmEngine(port), GivenPoses())

@@ -130,7 +130,7 @@ def test_the_watchdog_watches_the_way_to_the_start_and_rests_then(arm):
         runner.run(0)
     assert arm.stopped()["latched"].startswith("no sign of life") and leaf.ended == []
     engine.reset = lambda configuration, heartbeat: (reset(configuration, heartbeat), heartbeat())
-    leaf.lasts, leaf.begin = 0.3, lambda seen: (time.sleep(0.4), seen.tool.copy())[1]
+    leaf.lasts, leaf.model.begin = 0.3, lambda seen: (time.sleep(0.4), seen.tool.copy())[1]
     assert runner.run(0).success, "a leaf may plan before its first command"
     runner.pipeline.close()
 

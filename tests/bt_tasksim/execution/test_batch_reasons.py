@@ -1,0 +1,53 @@
+"""Why a tree failed in one world of a batch; that it is what py_trees' nodes say is shown on random trees."""
+
+from __future__ import annotations
+
+import numpy as np
+from py_trees.behaviours import Running
+
+from bt_tasksim import trees
+from bt_tasksim.core.batch_leaf import FAILURE, RUNNING, SUCCESS, BatchLeaf
+from bt_tasksim.core.outcomes import FAILED, TIMED_OUT
+from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.trees.nodes.retry import ATTEMPT_FAILED
+
+
+class Fails(BatchLeaf):
+    """Fails in odd worlds, in its second tick, and runs on in others."""
+
+    def __init__(self):
+        self.times, self.failed = np.zeros(4, int), np.zeros(4, bool)
+
+    def tick(self, rows, fresh):
+        status = np.where((rows % 2 == 1) & ~fresh, np.int8(FAILURE), np.int8(RUNNING))
+        self.failed[rows] = status == FAILURE
+        self.times[rows] += self.failed[rows]
+        return status
+
+    def outcome(self, row):
+        return FAILED(text=f"time {self.times[row]} in world {row}") if self.failed[row] else None
+
+
+class Nods(BatchLeaf):
+    def tick(self, rows, fresh):
+        return np.full(len(rows), SUCCESS, np.int8)
+
+
+def test_a_failure_is_told_with_what_was_tried_before_by_world():
+    tree = trees.sequence("root", Running("first"), trees.timeout(1.0, trees.retry(2, Running("second"))))
+    batch = BatchTree(tree, 4, lambda leaf: Nods() if leaf.name == "first" else Fails())
+    everyone = np.arange(4)
+    for now in (0.0, 0.1, 0.2):
+        found = batch.tick(everyone, now)
+    assert found.tolist() == [RUNNING, FAILURE, RUNNING, FAILURE]
+    for world in (1, 3):
+        assert batch.speaker(world) is batch.nodes[4]
+        outcome = batch.outcome(world)
+        assert outcome.is_a(ATTEMPT_FAILED) and outcome.cause == FAILED(text=f"time 2 in world {world}")
+        assert f"time 1 in world {world}" in outcome.names["before"]
+    batch.tick(np.asarray([0, 2]), 1.0)
+    assert batch.outcome(0).is_a(TIMED_OUT) and batch.speaker(0) is batch.nodes[2]
+    batch.reset(everyone)
+    batch.tick(everyone, 0.0)
+    batch.tick(everyone, 2.0)
+    assert batch.outcome(1) == TIMED_OUT(limit=1.0), "what was before the world began anew is forgotten"

@@ -1,0 +1,198 @@
+"""Episodes in batches: what becomes of a seed is, to the last bit, what a runner of one world makes of it."""
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Success
+from py_trees.common import Status
+
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import ObjectName
+from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Wait
+from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError
+from bt_tasksim.core.world import Command
+from bt_tasksim.execution.batch_runner import BatchRunner
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.execution.worlds import most_worlds, why_alone
+from bt_tasksim.trees import retry, sequence, timeout
+from bt_tasksim.trees.load import load_source
+
+pytestmark = pytest.mark.physical
+SCENARIO = "pick_and_place_recovering"  # retries, disturbances, and several ways for it to end
+
+
+def facts(found):
+    if isinstance(found, BtTasksimError):
+        return type(found), str(found)
+    verdict = found.verdict
+    errors = (verdict.position_error, verdict.angle_error, verdict.penetration)
+    ends = (found.status, found.success, found.leaf, found.why, found.control_steps, found.sim_time)
+    return (*ends, *(None if np.isnan(error) else error for error in errors))
+
+
+def in_batch(build, scene, seeds, worlds, threads=1, **options):
+    runner = BatchRunner(build, scene, EngineOptions(**options), worlds, threads)
+    try:
+        return {seed: facts(found) for seed, found in runner.run(seeds)}
+    finally:
+        runner.close()
+
+
+def one_by_one(build, scene, seeds, **options):
+    runner = Runner(build(), scene, EngineOptions(**options))
+    out = {}
+    for seed in seeds:
+        try:
+            out[seed] = facts(runner.run(seed))
+        except BtTasksimError as error:
+            out[seed] = facts(error)
+    return out
+
+
+@cache
+def expected(scenario, seeds, engines="sapien"):
+    source = load_source(scenario)
+    return one_by_one(source.build, source.scene, seeds, engines=engines)
+
+
+@pytest.mark.parametrize(("worlds", "threads"), [(1, 1), (2, 2), (7, 2)])
+def test_a_seed_comes_to_the_same_in_any_batch(worlds, threads):
+    source, seeds = load_source(SCENARIO), (0, 1, 2, 3, 4)
+    assert in_batch(source.build, source.scene, seeds, worlds, threads) == expected(SCENARIO, seeds)
+
+
+def test_the_order_of_seeds_does_not_matter():
+    source = load_source(SCENARIO)
+    assert in_batch(source.build, source.scene, (4, 2, 0), 2) == {
+        seed: expected(SCENARIO, (0, 1, 2, 3, 4))[seed] for seed in (4, 2, 0)
+    }
+
+
+def test_a_seed_comes_to_the_same_in_mujoco():
+    source, seeds = load_source("pick_and_place"), (0, 1)
+    alone = expected("pick_and_place", seeds, "mujoco")
+    assert in_batch(source.build, source.scene, seeds, 2, 2, engines="mujoco") == alone
+
+
+def test_failures_are_told_as_one_world_tells_them():
+    scene = load_source("pick_and_place").scene
+
+    def build():
+        far = Bring("target", position=(0.3, 5.0, 0.4))
+        late = timeout(0.5, Wait(3.0))
+        return retry(2, sequence("root", Grasp("target"), Pick("target"), late, far))
+
+    alone = one_by_one(build, scene, (0, 1))
+    assert {found[0] for found in alone.values()} == {Status.FAILURE}
+    assert in_batch(build, scene, (0, 1), 2) == alone
+
+
+def test_what_is_out_of_reach_fails_its_leaf():
+    scene = load_source("pick_and_place").scene
+
+    def build():
+        return sequence("root", Grasp("target"), Pick("target"), Bring("target", position=(0.3, 5.0, 0.4)))
+
+    alone = one_by_one(build, scene, (0, 1))
+    assert {found[2] for found in alone.values()} == {"bring target"}
+    assert in_batch(build, scene, (0, 1), 2) == alone
+
+
+def test_an_episode_that_takes_too_long_is_stopped():
+    source = load_source("pick_and_place")
+    runner = BatchRunner(source.build, source.scene, worlds=2, longest=0.5)
+    stopped = dict(runner.run((0, 1, 2)))
+    assert {found.reason for found in stopped.values()} == {"time_over"}
+    assert {found.control_steps for found in stopped.values()} == {10}
+
+
+class Raises(ConceptModel):
+    """Raises where the object stands to the left."""
+
+    target: ObjectName
+
+    def command(self, action, seen, memory):
+        if bool((seen.object(self.target)[:, 1] > -0.14).any()):
+            raise ValueError("to the left")
+        return Command()
+
+    def done(self, seen, memory):
+        return seen.elapsed > 0.2
+
+
+def test_a_leaf_that_raises_in_one_world_leaves_the_others_alone():
+    scene, seeds = load_source("pick_and_place").scene, tuple(range(6))
+    alone = one_by_one(lambda: sequence("root", Raises("target")), scene, seeds)
+    raised = [found for found in alone.values() if found[0] is LeafError]
+    assert 0 < len(raised) < len(seeds), "the cup stands on both sides"
+    assert in_batch(lambda: sequence("root", Raises("target")), scene, seeds, 3) == alone
+
+
+class Counts(Behaviour):
+    """A behaviour of somebody's own: done in its third tick."""
+
+    def initialise(self):
+        self.ticks = 0
+
+    def update(self):
+        self.ticks += 1
+        return Status.RUNNING if self.ticks < 3 else Status.SUCCESS
+
+
+def test_behaviours_of_ones_own_are_ticked_world_by_world(caplog):
+    scene = load_source("pick_and_place").scene
+
+    def build():
+        return sequence("root", Counts("counts"), Success("yes"), Wait(0.1), Counts("again"))
+
+    alone = one_by_one(build, scene, (0, 1, 2))
+    assert in_batch(build, scene, (0, 1, 2), 2) == alone
+    assert sum("Counts" in record.message for record in caplog.records) == 1, "it is said once"
+
+
+def test_no_seeds_are_no_episodes():
+    source = load_source("pick_and_place")
+    assert in_batch(source.build, source.scene, (), 2) == {}
+
+
+def test_seeds_that_are_given_up_leave_the_runner_usable():
+    source = load_source("pick_and_place")
+    runner = BatchRunner(source.build, source.scene, worlds=2)
+    next(iter(runner.run((0, 1, 2))))
+    assert [seed for seed, _ in runner.run((5,))] == [5]
+    runner.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"safety": True}, "of one world"),
+        ({"real_time": True}, "of one world"),
+        ({"engines": "ros:127.0.0.1:9"}, "of one world"),
+        ({"perception": "camera"}, "pictures"),
+        ({"rendering": True}, "film"),
+    ],
+)
+def test_engines_of_one_world_are_refused(options, why):
+    source, chosen = load_source("pick_and_place"), EngineOptions(**options)
+    assert why in why_alone(chosen)
+    with pytest.raises(InputError, match=why):
+        BatchRunner(source.build, source.scene, chosen, 2)
+
+
+def test_nonsense_is_refused():
+    source = load_source("pick_and_place")
+    for counts in ({"worlds": 0}, {"threads": 0}, {"worlds": most_worlds() * 2}):
+        with pytest.raises(InputError, match=r"one world|does not fit"):
+            BatchRunner(source.build, source.scene, **counts)
+
+
+def test_unlike_objects_share_a_batch():
+    source, seeds = load_source("grasp_then_pick"), (0, 1, 2)
+    scene = dataclasses.replace(source.scene, stages=())
+    alone = one_by_one(source.build, scene, seeds)
+    assert in_batch(source.build, scene, seeds, 3) == alone

@@ -1,0 +1,248 @@
+"""Every function of every shipped concept, for worlds that are unlike, in several array libraries.
+
+What a batch gives for one of its worlds is what that world gets alone: to the last bit in NumPy, whatever the
+other worlds are, however many and in which order.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+
+import array_api_strict
+import numpy as np
+import pytest
+
+from bt_tasksim.checking.bundles import different, numbers
+from bt_tasksim.checking.perturbation import changed_memory
+from bt_tasksim.checking.questions import QUESTIONS, Asked, spoken
+from bt_tasksim.checking.situations import alike, perturbed, situation_of, together
+from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes import (
+    AtPose,
+    Bring,
+    Grasp,
+    Holding,
+    Pick,
+    Place,
+    Release,
+    TimePassed,
+    Upright,
+    Wait,
+    catalogue,
+)
+from bt_tasksim.core.bundles import mapped
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.facts import WorldFacts
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import ObjectSpec
+from bt_tasksim.trees.load import load_source
+
+SEEDS = (1, 2)
+"""Draws of which the objects differ in kind and size."""
+EACH = 1
+"""Situations of each concept in each draw."""
+CLOSE = 1e-7
+"""The square root of a difference that rounds off may be as much."""
+SCENES = {
+    "pick_and_place": ("target", "goal"),
+    "shelf_to_shelf": ("cup", "lower_board"),
+    "pick_and_throw": ("cup", "trash_bin"),
+}
+KINDS = ("cube", "box", "cup", "cylinder", "oval", "diamond", "superellipsoid")
+
+
+def concepts(target="target", place="goal"):
+    """The shipped concepts, with parameters that take them through all of their branches."""
+    return {
+        "grasp": Grasp.value(target),
+        "grasp from the side": Grasp.value(target, approach=(1.0, 0.0, 0.0)),
+        "grasp closing along x": Grasp.value(target, closing=(1.0, 0.0, 0.0)),
+        "pick": Pick.value(target, squeeze=10.0),
+        "bring": Bring.value(target, to=place),
+        "bring to a position": Bring.value(target, position=(0.5, 0.1, 0.4)),
+        "bring by the way": Bring.value(target, to=place, via=((0.0, 0.1, 0.2), (0.0, 0.0, 0.2))),
+        "place": Place.value(target, on=place),
+        "place by a distance": Place.value(target, on=place, distance=0.02),
+        "release": Release.value(target),
+        "wait": Wait.value(1.0),
+    }
+
+
+def conditions(target="target", place="goal"):
+    return {
+        "holding": Holding.value(target),
+        "at pose": AtPose.value(target, on=place),
+        "upright": Upright.value(target),
+        "time passed": TimePassed.value(2.0),
+    }
+
+
+class Asking:
+    """Unlike worlds about which a concept is asked, each with a memory of its own making."""
+
+    def __init__(self, model, situations, robot):
+        self.model, self.robot = model, robot
+        rng = np.random.default_rng(0)
+        self.single = [s for s in (self.begun(s, rng) for s in situations) if s is not None]
+        assert self.single, "it begins in none of the worlds"
+        self.batch = together(self.single)
+
+    def begun(self, situation, rng):
+        try:
+            memory = self.model.begin(self.asked(situation).seen)
+        except NoWayError:
+            return None
+        return situation._replace(memory=memory if rng.random() < 0.3 else changed_memory(memory, rng))
+
+    def ask(self, name, situation):
+        return QUESTIONS[name].ask(self.model, self.asked(situation))
+
+    def asked(self, s):
+        seen = Seen(s.observation, s.world, self.robot, s.elapsed)
+        return Asked(seen, s.memory, Known(s.hidden, s.world, s.began))
+
+
+@pytest.fixture(scope="module")
+def worlds(recorded_run):
+    """Situations of unlike worlds by scenario, and the robot: ``worlds("pick_and_place")``."""
+    kept = {}
+
+    def get(scenario):
+        if scenario not in kept:
+            decisions = []
+            for seed in SEEDS:
+                by_leaf = {}
+                for decision in recorded_run(scenario, seed):
+                    by_leaf.setdefault(decision.leaf.name, []).append(decision._replace(memory=None))
+                for found in by_leaf.values():
+                    decisions += found[:: max(1, len(found) // EACH)]
+            decisions = alike(decisions)
+            rng = np.random.default_rng(1)
+            real = [situation_of(d) for d in decisions]
+            robot, target = decisions[0].seen.robot, SCENES[scenario][0]
+            kinds = [facts_of(kind, target, scenario, robot) for kind in KINDS]
+            others = [perturbed(s, rng)._replace(world=kinds[k % len(kinds)]) for k, s in enumerate(real)]
+            kept[scenario] = [*real, *others], robot
+        return kept[scenario]
+
+    return get
+
+
+@pytest.fixture(scope="module")
+def asking(worlds):
+    kept = {}
+
+    def get(scenario, name):
+        if (scenario, name) not in kept:
+            situations, robot = worlds(scenario)
+            kept[scenario, name] = Asking(concepts(*SCENES[scenario])[name], situations, robot)
+        return kept[scenario, name]
+
+    return get
+
+
+def facts_of(kind, target, scenario, robot):
+    """The facts of a scenario's world in which the object is of another kind."""
+    drawn = Scene(objects={target: ObjectSpec(kinds=(kind,), on="table")}).sample(KINDS.index(kind))
+    tips = [tip.name for tip in robot.tips]
+    usual = load_source(scenario).scene.sample(1).world_model(tips, robot.opening)
+    other = drawn.world_model(tips, robot.opening)
+    return WorldFacts.of([dataclasses.replace(usual, objects=other.objects)])
+
+
+def test_the_worlds_are_unlike(worlds):
+    for scenario, (target, _) in SCENES.items():
+        facts = together(worlds(scenario)[0]).world.object(target)
+        assert len(np.unique(facts.extent, axis=0)) >= len(KINDS)
+        assert facts.revolved.any() and facts.cubic.any() and not (facts.revolved | facts.cubic).all()
+        assert len(set(facts.rotation_counts.sum(axis=1).tolist())) > 2
+        assert len(set(np.isfinite(facts.grasp_widths).sum(axis=1).tolist())) > 1
+
+
+def test_all_that_is_shipped_is_asked():
+    asked = {type(m).__name__ for kind in (concepts, conditions) for m in kind().values()}
+    assert asked == set(catalogue())
+
+
+def functions(model):
+    return [
+        n
+        for n in QUESTIONS
+        if (n != "maintained" or model.maintains) and (n != "features" or model.observables)
+    ]
+
+
+@pytest.mark.parametrize("scenario", SCENES)
+@pytest.mark.parametrize("concept", concepts())
+def test_a_world_gets_the_same_in_every_batch_to_the_last_bit(asking, scenario, concept):
+    at, rng = asking(scenario, concept), np.random.default_rng(2)
+    n = len(at.single)
+    orders = [
+        np.arange(n),
+        rng.permutation(n),
+        rng.integers(0, n, 2),
+        rng.integers(0, n, 64),
+        np.arange(n)[::-1],
+    ]
+    for name in functions(at.model):
+        one = [at.ask(name, s) for s in at.single]
+        for order in orders:
+            many = at.ask(name, at.batch.at(order))
+            assert not different(name, [one[k] for k in order.tolist()], many, tolerance=0.0)
+
+
+@pytest.mark.parametrize("scenario", SCENES)
+@pytest.mark.parametrize("condition", conditions())
+def test_a_condition_answers_the_same_in_every_batch(worlds, scenario, condition):
+    (situations, robot), rng = worlds(scenario), np.random.default_rng(2)
+    model = conditions(*SCENES[scenario])[condition]
+    batch, strict = together(situations), array_api_strict.asarray
+
+    def holds(situation):
+        seen = Seen(situation.observation, situation.world, robot, situation.elapsed)
+        return {"holds": model.holds(seen), **(spoken(model.explain(seen), seen.tool.shape[0]) or {})}
+
+    one = [holds(s) for s in situations]
+    for order in (np.arange(len(one)), rng.permutation(len(one)), rng.integers(0, len(one), 64)):
+        assert not different(
+            condition, [one[k] for k in order.tolist()], holds(batch.at(order)), tolerance=0.0
+        )
+    assert not different(condition, one, holds(batch.map(strict)), CLOSE)
+
+
+def libraries():
+    torch = pytest.importorskip("torch")
+    return {
+        "torch": (lambda v: torch.from_numpy(np.array(v)), torch.Tensor),
+        "array_api_strict": (array_api_strict.asarray, type(array_api_strict.asarray(0))),
+    }
+
+
+@pytest.mark.parametrize("library", ["torch", "array_api_strict"])
+@pytest.mark.parametrize("concept", concepts())
+def test_every_library_gives_the_same(asking, concept, library):
+    at, (change, kind) = asking("pick_and_place", concept), libraries()[library]
+    batch = at.batch.map(change)
+    for name in functions(at.model):
+        one = [at.ask(name, s) for s in at.single]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # torch's words about read-only constants
+            found = at.ask(name, batch)
+        assert not different(name, one, found, CLOSE, None if QUESTIONS[name].words else kind)
+
+
+def single(values):
+    return np.asarray(values, np.float32) if np.asarray(values).dtype == np.float64 else np.asarray(values)
+
+
+@pytest.mark.parametrize("concept", concepts())
+def test_single_precision_stays_so_and_a_world_gets_the_same_in_every_batch(asking, concept):
+    at = asking("pick_and_place", concept)
+    batch = at.batch.map(single)
+    ones = [s.map(single) for s in at.single]
+    for name in functions(at.model):
+        many = at.ask(name, batch)
+        assert not different(name, [at.ask(name, s) for s in ones], many, tolerance=0.0)
+        if not QUESTIONS[name].words:
+            mapped(lambda v, name=name: pytest.fail(name) if numbers(v).dtype == np.float64 else v, many)
