@@ -14,7 +14,7 @@ from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.runner import Runner, Step
-from bt_tasksim.training.evaluation import Job, _runner
+from bt_tasksim.training.evaluation import Job, Player
 
 CAMERA = "scene"
 CLOSE = (170, 100, 470, 400)
@@ -42,8 +42,8 @@ def film(job: Job, seed: int, caption: str, count: int = 4, part: tuple[int, int
         count: Moments: the hand before it closes, the grasp's end, and others evenly up to the tree's end.
         part: Part of the picture that is kept.
     """
-    moments = _moments(_runner(job), seed, count)
-    runner = _runner(replace(job, options=replace(job.options, rendering=True)))
+    moments = _moments(Player(job).runner, seed, count)
+    runner = Player(replace(job, options=replace(job.options, rendering=True))).runner
     tick, pictures = 0, []
 
     def draw(step: Step) -> None:

@@ -112,7 +112,7 @@ class InverseKinematics:
         robot: The robot.
         model: Its arm alone, with a frame ``tool``.
         like: An array of the library, type and device to compute with.
-        patience: Seconds after which a search for another posture gives up.
+        patience: Seconds after which a search for another posture ends with what it has.
     """
 
     def __init__(
@@ -198,7 +198,7 @@ class InverseKinematics:
     ) -> Postures:
         """The solutions nearest to a posture from given starts, or else from the first good random one."""
         xp = array_namespace(goal)
-        rows, began = goal.shape[-1], time.monotonic()
+        rows, until = goal.shape[-1], time.monotonic() + self._patience
         posture = xp.broadcast_to(posture, (self._n, rows))
         tries = xp.stack(
             [clip(xp.broadcast_to(x, (self._n, rows)), self._lower, self._upper) for x in starts], axis=1
@@ -210,9 +210,9 @@ class InverseKinematics:
         left = np.arange(rows)
         random = xp.broadcast_to(self._starts[..., None], (self._n, _RESTARTS, rows))
         for begin, all_count in ((tries, True), (random, False)):
-            if not all_count and time.monotonic() - began > self._patience:
+            if not all_count and time.monotonic() > until:
                 break
-            found, least = self._try(found, least, left, taken(begin, left), goal, posture, all_count)
+            found, least = self._try(found, least, left, taken(begin, left), goal, posture, all_count, until)
             left = np.flatnonzero(found.code != Reach.REACHED)
             if not len(left):
                 break
@@ -227,6 +227,7 @@ class InverseKinematics:
         goal: Array,
         posture: Array,
         all_count: bool,
+        until: float,
     ) -> tuple[Postures, Array]:
         """Better solutions of the rows ``left`` from starts ``(n, k, rows)``, tried all at once.
 
@@ -238,12 +239,13 @@ class InverseKinematics:
             goal: Placements of all rows.
             posture: Joints ``(n, N)`` to come near to.
             all_count: The solution nearest to the posture counts, of all starts; else the first start's.
+            until: When to give up, on the clock of `time.monotonic`; what has been found by then counts.
         """
         xp = array_namespace(goal)
         many = starts.shape[1]
         of = np.tile(left, many)
         goals, postures = taken(goal, of), taken(posture, of)
-        reached = self._iterate(xp.reshape(starts, (self._n, len(of))), goals, _HARDER)
+        reached = self._iterate(xp.reshape(starts, (self._n, len(of))), goals, _HARDER, until=until)
         missed = self._missed(reached.seen, goals)
         good = ((host(reached.worst) <= _TOLERANCE) | missed.little).reshape(many, len(left))
         cost = missed.cost.reshape(many, len(left))
@@ -262,6 +264,7 @@ class InverseKinematics:
                 taken(reached.seen, which),
                 taken(goals, which),
                 taken(postures, which),
+                until,
             )
             reached = reached._replace(q=put(reached.q, which, q), seen=put(reached.seen, which, seen))
             apart = host(_square(reached.q - postures)).reshape(many, len(left))
@@ -280,10 +283,14 @@ class InverseKinematics:
         )
         return _with(found, left[better], update), least
 
-    def _settle(self, q: Array, seen: Array, goal: Array, posture: Array) -> tuple[Array, Array]:
+    def _settle(
+        self, q: Array, seen: Array, goal: Array, posture: Array, until: float
+    ) -> tuple[Array, Array]:
         """Moves solutions in their null space towards postures, for as long as the tool stays in place."""
         going = np.arange(goal.shape[-1])
         for _ in range(_SETTLE):
+            if time.monotonic() > until:
+                break
             here, there, towards = taken(q, going), taken(goal, going), taken(posture, going)
             moved = self._iterate(here, there, _TRACK, _SETTLING * (towards - here), taken(seen, going))
             closer = _square(moved.q - towards) <= _square(here - towards)
@@ -305,8 +312,11 @@ class InverseKinematics:
         iterations: int,
         pull: Array | None = None,
         seen: Array | None = None,
+        until: float = math.inf,
     ) -> _Reached:
         """Levenberg-Marquardt from ``q (n, N)``; ``pull`` is a step asked of the null space at the start.
+
+        At the time ``until`` (of `time.monotonic`) it ends where it is.
 
         Returns:
             The joints, within their limits, the chain there, and the largest component of the remaining error
@@ -321,7 +331,7 @@ class InverseKinematics:
                 seen = self.chain.seen(q)
             error = self._error(seen, goal)
             worst = _largest(error)
-            if k == iterations:
+            if k == iterations or (until < math.inf and time.monotonic() > until):
                 break
             if pull is None:
                 done = worst <= _TOLERANCE if stuck is None else (worst <= _TOLERANCE) | stuck

@@ -13,8 +13,8 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.engines.maniskill.environment import Environment
-from bt_tasksim.engines.maniskill.schema import PlaceEntry
-from bt_tasksim.engines.maniskill.shapes import Solid, boxes, solid
+from bt_tasksim.engines.maniskill.schema import TargetEntry
+from bt_tasksim.engines.maniskill.shapes import CollisionSolid, boxes, solid
 from bt_tasksim.engines.physics.sapien_world import array
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 from bt_tasksim.scene.fixtures import Fixture
@@ -27,7 +27,7 @@ NEAR = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Thing:
+class DrawnActor:
     """An object in the simulation.
 
     Attributes:
@@ -36,7 +36,7 @@ class Thing:
     """
 
     body: Any
-    solid: Solid
+    solid: CollisionSolid
 
     def pose(self, to_base: Array) -> Array:
         """Our pose ``(7,)`` of it, for ManiSkill's world seen from the robot base frame ``(7,)``."""
@@ -50,7 +50,7 @@ def body_of(actor: Any) -> Any:
     return next(c for c in actor._objs[0].components if isinstance(c, physx.PhysxRigidBaseComponent))
 
 
-def things(environment: Environment) -> dict[str, Thing]:
+def things(environment: Environment) -> dict[str, DrawnActor]:
     """The objects by name, in the order of the file.
 
     Raises:
@@ -60,7 +60,7 @@ def things(environment: Environment) -> dict[str, Thing]:
     for name, entry in environment.file.object_entries.items():
         called = entry.actor or name
         body = body_of(environment.actor(called))
-        found[name] = Thing(body, solid(body.get_collision_shapes(), entry.kind, f"actor '{called}'"))
+        found[name] = DrawnActor(body, solid(body.get_collision_shapes(), entry.kind, f"actor '{called}'"))
     return found
 
 
@@ -100,7 +100,7 @@ def places(environment: Environment, to_base: Array) -> tuple[PlaceModel, ...]:
     return tuple(found)
 
 
-def _place(name: str, entry: PlaceEntry, pose: Array, fixed: Mapping[str, str]) -> PlaceModel:
+def _place(name: str, entry: TargetEntry, pose: Array, fixed: Mapping[str, str]) -> PlaceModel:
     x = poses.rotate(pose[3:], np.array([1.0, 0.0, 0.0]))
     level = poses.pose(pose[:3], poses.yaw(math.atan2(x[1], x[0])))
     return PlaceModel(

@@ -18,7 +18,7 @@ from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.urdf_links import links_below, load_links, still_links
 
 
-class Robot:
+class EnvironmentRobot:
     """A robot in an environment's present scene.
 
     Args:

@@ -21,7 +21,7 @@ from bt_tasksim.core.typed_file import (
 )
 
 
-class ObjectEntry(Model):
+class ActorEntry(Model):
     """An object that trees name; its size, mass and friction are those of the simulation."""
 
     actor: Text | None = None
@@ -38,7 +38,7 @@ class FixtureEntry(Model):
     """Name of the actor in ManiSkill; by default the fixture's own."""
 
 
-class PlaceEntry(Model):
+class TargetEntry(Model):
     """A place that trees name, where an actor is when the episode begins."""
 
     actor: Text
@@ -77,11 +77,11 @@ class EnvironmentFile(Model):
     """Its id, such as PickCube-v1; one of your own as module:namespace/Id-v0."""
     robots: Annotated[dict[Text, Text], Field(min_length=1)]
     """Our robots by ManiSkill's names of them; the first one is used unless another is asked for."""
-    objects: dict[Name, ObjectEntry | None] = Field(default_factory=dict)
+    objects: dict[Name, ActorEntry | None] = Field(default_factory=dict)
     """Objects by name."""
     fixtures: dict[Name, FixtureEntry | None] = Field(default_factory=dict)
     """Fixtures by name."""
-    places: dict[Name, PlaceEntry] = Field(default_factory=dict)
+    places: dict[Name, TargetEntry] = Field(default_factory=dict)
     """Places by name."""
     distance: DistanceEntry | None = None
     """What results measure besides what the environment says."""
@@ -102,9 +102,9 @@ class EnvironmentFile(Model):
         return self
 
     @property
-    def object_entries(self) -> Mapping[str, ObjectEntry]:
+    def object_entries(self) -> Mapping[str, ActorEntry]:
         """Objects by name, those that the file only names included."""
-        return {name: entry or ObjectEntry() for name, entry in self.objects.items()}
+        return {name: entry or ActorEntry() for name, entry in self.objects.items()}
 
     @property
     def fixture_entries(self) -> Mapping[str, FixtureEntry]:

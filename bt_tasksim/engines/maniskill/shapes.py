@@ -25,7 +25,7 @@ _UPRIGHT = np.array([math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0])
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class CollisionSolid:
     """An object's geometry.
 
     Attributes:
@@ -39,7 +39,7 @@ class Solid:
     frame: Array
 
 
-def solid(shapes: Sequence[Any], kind: str | None, owner: str) -> Solid:
+def solid(shapes: Sequence[Any], kind: str | None, owner: str) -> CollisionSolid:
     """The object that collision shapes come to.
 
     Args:
@@ -55,21 +55,21 @@ def solid(shapes: Sequence[Any], kind: str | None, owner: str) -> Solid:
     if kind is not None:
         shape_kind(kind)
         low, high = _bounds(shapes)
-        return Solid(kind, _size(high - low), poses.pose((low + high) / 2))
+        return CollisionSolid(kind, _size(high - low), poses.pose((low + high) / 2))
     only = shapes[0] if len(shapes) == 1 else None
     frame = None if only is None else array(only.local_pose)
     match type(only).__name__:
         case "PhysxCollisionShapeBox":
             size = _size(2 * np.asarray(only.half_size))  # type: ignore[union-attr]
             assert frame is not None
-            return Solid("cube" if max(size) - min(size) < EQUAL else "box", size, frame)
+            return CollisionSolid("cube" if max(size) - min(size) < EQUAL else "box", size, frame)
         case "PhysxCollisionShapeSphere":
             assert only is not None and frame is not None
-            return Solid("superellipsoid", _size(np.full(3, 2 * only.radius)), frame)
+            return CollisionSolid("superellipsoid", _size(np.full(3, 2 * only.radius)), frame)
         case "PhysxCollisionShapeCylinder":
             assert only is not None and frame is not None
             size = _size(2 * np.array([only.radius, only.radius, only.half_length]))
-            return Solid("cylinder", size, poses.multiply(frame, poses.pose(np.zeros(3), _UPRIGHT)))
+            return CollisionSolid("cylinder", size, poses.multiply(frame, poses.pose(np.zeros(3), _UPRIGHT)))
     raise InputError(
         f"{owner} is made of {len(shapes)} collision shapes or of one that is no box, ball or cylinder: say "
         "with 'kind' what its bounding box is taken for"

@@ -38,6 +38,7 @@ class StatePostProcess(PostProcessEngine):
 
     def __init__(self, robot: RobotDescription, noise: NoiseModel) -> None:
         self.robot = robot
+        self.noise = noise
         self._batch = BatchState(robot, 1, noise)
 
     @classmethod

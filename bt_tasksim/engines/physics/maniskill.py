@@ -15,11 +15,11 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Hidden, JointTarget, WorldState
 from bt_tasksim.engines.base import EngineSetup, PhysicsEngine, RenderingEngine
-from bt_tasksim.engines.maniskill.draw import Thing, body_of, configuration, things
+from bt_tasksim.engines.maniskill.draw import DrawnActor, body_of, configuration, things
 from bt_tasksim.engines.maniskill.environment import Environment
 from bt_tasksim.engines.maniskill.files import bundled, environment_of
 from bt_tasksim.engines.maniskill.rendering import ManiSkillRendering
-from bt_tasksim.engines.maniskill.robot import Robot
+from bt_tasksim.engines.maniskill.robot import EnvironmentRobot
 from bt_tasksim.engines.maniskill.verdict import verdict
 from bt_tasksim.engines.maniskill.world import EnvironmentWorld, environment_seed
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch
@@ -48,8 +48,8 @@ class ManiSkillPhysics(PhysicsEngine):
         InputError: There is no such environment, or its file does not name the robot.
     """
 
-    _robot: Robot
-    _things: dict[str, Thing]
+    _robot: EnvironmentRobot
+    _things: dict[str, DrawnActor]
     _reader: ContactReader
     _touch: Touch
 
@@ -189,7 +189,7 @@ class ManiSkillPhysics(PhysicsEngine):
         environment.reset(seed)
         if environment.base.scene is not self._scene:
             self._scene = environment.base.scene
-            self._robot = Robot(environment, self.robot)
+            self._robot = EnvironmentRobot(environment, self.robot)
             self._things = things(environment)
         self._robot.begin()
 

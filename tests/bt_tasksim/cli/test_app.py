@@ -41,6 +41,9 @@ def test_old_command_lines_mean_what_they_meant(line):
     was = LINES[line]
     if shlex.split(line)[0] == "evaluate":  # never an option of it
         was = {k: v for k, v in was.items() if k != "real_time"}
+        was = {"batch": None, "cluster": None, "resume": False, **was}
+        if "--workers" not in line:
+            was["workers"] = None  # which is 1, but on a cluster
     if line.startswith("run "):
         was = {"video_camera": "overview", "video_size": "", "video_fps": 10.0, **was}
     if line.startswith("new "):
