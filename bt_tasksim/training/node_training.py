@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import logging
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
@@ -16,6 +17,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
+from bt_tasksim.core.fleet import Fleet, Here
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.pipelines import EngineOptions
@@ -34,13 +36,19 @@ from bt_tasksim.training.checkpoint import (
 )
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.env import EpisodeEnv, shared_layout
+from bt_tasksim.training.episode_batch import EpisodeBatch, why_alone_in
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
-from bt_tasksim.training.rollouts import DrawTask, EnvironmentRollout, RolloutTask
+from bt_tasksim.training.rollouts import DrawResult, DrawTask, EnvironmentRollout, RolloutTask, results
 from bt_tasksim.training.subject import training_subject
 from bt_tasksim.trees.nodes.train import Train
 
 if TYPE_CHECKING:
     from bt_tasksim.training.learner import Learner
+
+LOG = logging.getLogger(__name__)
+
+Keeper = EpisodeBatch | EpisodeEnv
+"""What each process keeps: a batch of worlds, or a single one where there is no form for many."""
 
 WARM_UP = 64
 """Decisions of each environment before the first rollout, from which features are normalised."""
@@ -54,7 +62,7 @@ class TrainingTask:
         tree: The tree.
         scene: The scene, with its stages.
         options: Engines.
-        workers: Worker processes.
+        workers: Processes, each with a batch of worlds; one is this process itself.
         name: Name of the tree in the cards.
     """
 
@@ -113,20 +121,30 @@ class NodeTraining:
                 f"there is a training in '{self.folder}' already: go on with --resume, or remove the folder"
             )
 
-        def make() -> EpisodeEnv:
-            task, reward = self.task, self.config.reward
-            return EpisodeEnv(
-                task.tree, task.scene, self.node.name, task.options, reward, policies=self.trained
-            )
+        task, reward = self.task, self.config.reward
+        members = min(task.workers, self.config.n_envs)
+        alone = why_alone_in(task.tree, task.scene, task.options)
 
-        pool = Workers(make, self.task.workers)  # before torch starts threads of its own
+        def make() -> Keeper:
+            about = task.tree, task.scene, self.node.name, task.options, reward
+            if alone:
+                return EpisodeEnv(*about, policies=self.trained)
+            return EpisodeBatch(*about, policies=self.trained, worlds=-(-self.config.n_envs // members))
+
+        if alone:
+            LOG.warning("the episodes run one by one: %s", alone)
+        self._members = members
+        if members > 1:  # before torch starts threads of its own
+            with Workers(make, members) as pool:
+                return self._learn(pool, resume, report)
+        kept = make()
         try:
-            return self._learn(pool, resume, report)
+            return self._learn(Here(kept), resume, report)
         finally:
-            pool.close()
+            kept.close()
 
     def _learn(
-        self, pool: Workers[EpisodeEnv], resume: bool, report: Callable[[Progress], None] | None
+        self, pool: Fleet[Keeper], resume: bool, report: Callable[[Progress], None] | None
     ) -> LearnedPolicy:
         import gymnasium
         import torch
@@ -187,7 +205,7 @@ class NodeTraining:
     # ---- one rollout ------------------------------------------------------------------------------------
 
     def _collect(
-        self, pool: Workers[EpisodeEnv], learner: Learner, decisions: int, warm: bool = False
+        self, pool: Fleet[Keeper], learner: Learner, decisions: int, warm: bool = False
     ) -> list[EnvironmentRollout]:
         arrays, std = learner.network.arrays(), learner.std
         stage = self.stage if self.task.scene.stages else None
@@ -195,18 +213,17 @@ class NodeTraining:
             RolloutTask(arrays, std, (self.config.seed, int(warm), self.iteration, k), decisions, stage)
             for k in range(self.config.n_envs)
         ]
-        found = dict(pool.each(tasks))
-        return [found[k] for k in range(self.config.n_envs)]
+        return results(pool, tasks, self._members)
 
-    def _warm_up(self, pool: Workers[EpisodeEnv], learner: Learner) -> None:
+    def _warm_up(self, pool: Fleet[Keeper], learner: Learner) -> None:
         rollouts = self._collect(pool, learner, WARM_UP, warm=True)
         learner.statistics.update(np.concatenate([rollout.features for rollout in rollouts]))
 
-    def _evaluate(self, pool: Workers[EpisodeEnv], learner: Learner) -> dict[str, Any]:
+    def _evaluate(self, pool: Fleet[Keeper], learner: Learner) -> dict[str, Any]:
         """Successes on held-apart draws, the same ones each time; keeps the best policy so far."""
         arrays = learner.decisive.arrays()
         tasks = [DrawTask(arrays, draw) for draw in range(self.config.evaluation_draws)]
-        found = [result for _, result in pool.each(tasks)]
+        found: list[DrawResult] = results(pool, tasks, self._members)
         if not found:
             return {}
         wins = sum(result.success for result in found)
