@@ -17,9 +17,9 @@ from bt_tasksim.policy.library import find_policy
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import PROGRAMMED, Action, LearnedPolicy, Policy, ProgrammedPolicy
 from bt_tasksim.scene.scene import Scene
+from bt_tasksim.training.collectors import countable
 from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.evaluation_outcomes import wilson
-from bt_tasksim.training.rollouts import _kind
 
 STREAM = "evaluation"
 
@@ -122,7 +122,7 @@ def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
             hidden = env.runner.context.hidden()
             force = 0.0 if hidden is None else float(hidden.hand_force[0, 0])
             done = info["status"] == "SUCCESS"
-            return Draw(seed, bool(info["is_success"]), done, _kind(info), info["why"], decisions, force)
+            return Draw(seed, bool(info["is_success"]), done, countable(info), info["why"], decisions, force)
 
 
 def load(name: str) -> Policy:

@@ -34,11 +34,12 @@ from bt_tasksim.training.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
+from bt_tasksim.training.collectors import DrawResult, DrawTask, EnvironmentRollout, RolloutTask
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.env import EpisodeEnv, shared_layout
 from bt_tasksim.training.episode_batch import EpisodeBatch, why_alone_in
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
-from bt_tasksim.training.rollouts import DrawResult, DrawTask, EnvironmentRollout, RolloutTask, results
+from bt_tasksim.training.rollouts import results
 from bt_tasksim.training.subject import training_subject
 from bt_tasksim.trees.nodes.train import Train
 

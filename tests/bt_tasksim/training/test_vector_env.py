@@ -12,11 +12,12 @@ from toys import DONE, SCENE, STILL, UP, Below, Check, Even, Move, Raise, Turn, 
 from bt_tasksim.concept_nodes import Wait
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
 from bt_tasksim.core.registry import register
+from bt_tasksim.training.collectors import DrawTask, RolloutTask
 from bt_tasksim.training.env import REDRAWS
 from bt_tasksim.training.episode_batch import EpisodeBatch
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.reward_parts import RewardPart
-from bt_tasksim.training.rollouts import DrawTask, RolloutTask, collect, in_batch, judge_draw
+from bt_tasksim.training.rollouts import alone, in_batch
 from bt_tasksim.training.vector_env import EpisodeVectorEnv
 from bt_tasksim.trees import (
     fallback,
@@ -126,7 +127,7 @@ def test_rollouts_are_those_of_an_environment_of_their_own(env_of, batch_of, tre
     tasks = [task(k) for k in range(4)]
     expected = []
     try:
-        expected = [as_bytes(collect(env_of(tree(), longest=longest), t)) for t in tasks]
+        expected = [as_bytes(alone(env_of(tree(), longest=longest), t)) for t in tasks]
     except InputError as error:
         with pytest.raises(InputError) as caught:
             batched(batch_of(tree(), worlds=3, longest=longest), tasks)
@@ -143,7 +144,7 @@ def test_rollouts_are_those_of_an_environment_of_their_own(env_of, batch_of, tre
 def test_held_apart_draws_too(env_of, batch_of, tree):
     tasks = [DrawTask(NETWORK, k) for k in range(8)]
     env = env_of(TREES[tree]())
-    expected = [judge_draw(env, t) for t in tasks]
+    expected = [alone(env, t) for t in tasks]
     found = sorted(in_batch(batch_of(TREES[tree](), worlds=3), tasks))
     assert [result for _, result in found] == expected
 
