@@ -19,10 +19,10 @@ from bt_tasksim.training.collectors import Collector, DrawTask, RolloutTask
 from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.episode_batch import Draws, EpisodeBatch
 
-Task = RolloutTask | DrawTask
+AnyTask = RolloutTask | DrawTask
 
 
-def alone(env: EpisodeEnv, task: Task) -> Any:
+def alone(env: EpisodeEnv, task: AnyTask) -> Any:
     """The result of a task, in an environment of its own."""
     collector: Collector[Any] = task.collector()
     stream, stage = env.stream, env.stage
@@ -45,7 +45,7 @@ def alone(env: EpisodeEnv, task: Task) -> Any:
     return collector.result()
 
 
-def in_batch(batch: EpisodeBatch, tasks: Sequence[Task], /) -> Iterator[tuple[int, Any]]:
+def in_batch(batch: EpisodeBatch, tasks: Sequence[AnyTask], /) -> Iterator[tuple[int, Any]]:
     """Do tasks in the worlds of a batch: each world takes the next one when it has done one.
 
     Yields:
@@ -108,7 +108,7 @@ def in_batch(batch: EpisodeBatch, tasks: Sequence[Task], /) -> Iterator[tuple[in
 
 
 def side_by_side(
-    keeper: EpisodeBatch | EpisodeEnv, shares: Sequence[Sequence[Task]], /
+    keeper: EpisodeBatch | EpisodeEnv, shares: Sequence[Sequence[AnyTask]], /
 ) -> Iterator[tuple[int, list[Any]]]:
     """Work for a fleet whose members keep a batch of worlds, or an environment: do shares of tasks."""
     for index, tasks in enumerate(shares):
@@ -119,7 +119,7 @@ def side_by_side(
         yield index, [done[k] for k in range(len(tasks))]
 
 
-def results(fleet: Fleet[EpisodeBatch | EpisodeEnv], tasks: Sequence[Task], members: int) -> list[Any]:
+def results(fleet: Fleet[EpisodeBatch | EpisodeEnv], tasks: Sequence[AnyTask], members: int) -> list[Any]:
     """The results of tasks, in their order.
 
     Args:
