@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -86,19 +86,14 @@ def judge(
         finally:
             env.close()
     with Workers(lambda: (_env(case, stream), load(case.policy)), workers) as pool:
-        found = dict(pool.each([DrawTask(seed) for seed in seeds]))
+        found = dict(pool.spread(_episodes, seeds))
     return [found[k] for k in range(len(seeds))]
 
 
-@dataclass(frozen=True)
-class DrawTask:
-    """One draw, for a worker that keeps an environment and a policy."""
-
-    seed: int
-
-    def run(self, kept: tuple[EpisodeEnv, Policy], /) -> Draw:
-        """See `episode`."""
-        return episode(*kept, self.seed)
+def _episodes(kept: tuple[EpisodeEnv, Policy], seeds: Sequence[int], /) -> Iterator[tuple[int, Draw]]:
+    """Some of the draws, for a worker that keeps an environment and a policy."""
+    for index, seed in enumerate(seeds):
+        yield index, episode(*kept, seed)
 
 
 def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:

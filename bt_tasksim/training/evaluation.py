@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Self
@@ -57,7 +57,8 @@ class Job:
         options: Which engines.
         policies: Concepts and the policies that their leaves take, whatever the tree itself says.
         plugins: Plugins that the process loads first, by default those of this process.
-        batch: How many worlds are run at once in each process. Outcomes do not depend on it.
+        batch: How many worlds are run at once in each process, by default `usual_batch`. Outcomes do not
+            depend on it.
         threads: How many threads step them.
 
     Raises:
@@ -70,15 +71,14 @@ class Job:
     options: EngineOptions = field(default_factory=EngineOptions)
     policies: tuple[tuple[str, str], ...] = ()
     plugins: tuple[str, ...] = field(default_factory=loaded)
-    batch: int = 1
+    batch: int | None = None
     threads: int = 1
 
     def __post_init__(self) -> None:
-        if self.batch < 1 or self.threads < 1:
-            raise InputError(
-                f"a batch has one world and one thread at least, found {self.batch}, {self.threads}"
-            )
-        if self.batch > 1 and (alone := why_alone(self.options)):
+        batch = 1 if self.batch is None else self.batch
+        if batch < 1 or self.threads < 1:
+            raise InputError(f"a batch has one world and one thread at least, found {batch}, {self.threads}")
+        if batch > 1 and (alone := why_alone(self.options)):
             raise InputError(f"these episodes cannot be run in a batch: {alone}")
 
 
@@ -159,8 +159,10 @@ def evaluate(
         check_seed(seed)
     started = time.perf_counter() - (kept.seconds if kept is not None else 0.0)
     versions = identity()  # before anybody edits a file
+    batch = usual_batch(job.options, 1 if cluster else workers or 1) if job.batch is None else job.batch
+    job = replace(job, batch=batch)
     if cluster is None:
-        check_memory(job.batch * (workers or 1))
+        check_memory(batch * (workers or 1))
     player = Player(job)  # errors show here, before any process starts
     runner = player.runner
     with player:
@@ -198,8 +200,8 @@ def evaluate(
                     progress(outcome)
             with terminable():
                 if todo:
-                    with _fleet(job, player, subject, workers, cluster, len(todo)) as fleet:
-                        share = max(SHARE, SHARES * job.batch)
+                    with _fleet(job, batch, player, subject, workers, cluster, len(todo)) as fleet:
+                        share = max(SHARE, SHARES * batch)
                         for _, outcome in fleet.spread(partial(play, stream=stream), todo, share):
                             ended(outcome)
             if keep is not None:
@@ -221,7 +223,13 @@ def evaluate(
 
 
 def _fleet(
-    job: Job, player: Player, subject: dict[str, str], workers: int | None, cluster: str | None, most: int
+    job: Job,
+    batch: int,
+    player: Player,
+    subject: dict[str, str],
+    workers: int | None,
+    cluster: str | None,
+    most: int,
 ) -> Fleet[Player]:
     """What runs the episodes, of which there are so many."""
     make = partial(_same_player, job, subject)
@@ -229,7 +237,7 @@ def _fleet(
     if cluster is not None:
         drawn = player.runner.pipeline.rendering is not None
         alone = MEMORY_WITH_PICTURES if drawn else MEMORY
-        return Cluster(make, cluster, count, alone + job.batch * WORLD_MEMORY)
+        return Cluster(make, cluster, count, alone + batch * WORLD_MEMORY)
     if count in (None, 1):
         return Here(player)
     return Workers(make, count, "spawn")
@@ -291,13 +299,14 @@ class Player:
             LostEngine: An engine in another process has gone away.
             MachineError: A robot has failed.
         """
-        if self._job.batch == 1 or len(seeds) == 1:
+        batch = usual_batch(self._job.options) if self._job.batch is None else self._job.batch
+        if batch == 1 or len(seeds) == 1:
             for index, seed in enumerate(seeds):
                 yield index, episode(self.runner, seed, stream)
             return
         if self._batch is None:
             job, scene = self._job, self.runner.scene
-            worlds = min(job.batch, len(seeds))
+            worlds = min(batch, len(seeds))
             self._batch = BatchRunner(self._build, scene, job.options, worlds, job.threads)
         index_of = {seed: index for index, seed in enumerate(seeds)}
         for seed, found in self._batch.run(seeds, stream):
