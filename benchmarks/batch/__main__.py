@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.batch import episodes, executor, kinematics, physics, same_ticks
+from benchmarks.batch import episodes, executor, kinematics, physics, same_bits, same_ticks
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
 
@@ -22,6 +22,7 @@ SECTIONS = {
     "physics": physics,
     "episodes": episodes,
     "same-ticks": same_ticks,
+    "same-bits": same_bits,
 }
 
 
