@@ -9,7 +9,7 @@ from bt_tasksim.core.workers import Workers
 from bt_tasksim.policy.network import Network
 from bt_tasksim.training.collectors import DrawTask, RolloutTask
 from bt_tasksim.training.env import EpisodeEnv
-from bt_tasksim.training.rollouts import alone
+from bt_tasksim.training.rollouts import alone, results
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.nodes.train import Train
 
@@ -33,7 +33,7 @@ def as_bytes(found):
 
 def run(tasks, count, maker=make):
     with Workers(maker, count) as pool:
-        return {number: as_bytes(result) for number, result in pool.each(tasks)}
+        return dict(enumerate(map(as_bytes, results(pool, tasks, count))))
 
 
 @pytest.fixture
