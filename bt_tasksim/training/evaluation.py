@@ -17,29 +17,26 @@ from typing import Self
 from py_trees.common import Status
 
 from bt_tasksim.concept.plugins import load_all
-from bt_tasksim.core.cluster import Cluster, check_address
+from bt_tasksim.core.cluster import Cluster
 from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
 from bt_tasksim.core.fleet import Fleet, Here
 from bt_tasksim.core.identity import identity
 from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import outcome_of_error
-from bt_tasksim.core.plugins import load_plugin, loaded
+from bt_tasksim.core.plugins import loaded
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import Runner
-from bt_tasksim.execution.worlds import WORLD_MEMORY, check_memory, most_worlds, why_alone
+from bt_tasksim.execution.worlds import check_memory, most_worlds, why_alone
 from bt_tasksim.scene.configuration import check_seed
 from bt_tasksim.training.evaluation_file import EvaluationFile, KeptEvaluation
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
+from bt_tasksim.training.on_cluster import actor_memory, check_cluster
 
 SHARE = 16
 """Episodes that a member of a fleet takes at a time; a lost one loses the one that it was at."""
-MEMORY = 500_000_000
-"""Bytes that are reserved for an actor of a cluster, without its worlds; 350 MB were measured with one."""
-MEMORY_WITH_PICTURES = 900_000_000
-"""The same where pictures are drawn; 680 MB were measured."""
 BATCH = 64
 """Worlds that run at once, unless somebody says otherwise."""
 SHARES = 8
@@ -152,9 +149,7 @@ def evaluate(
     if workers is not None and workers > 1 and job.options.remote:
         raise InputError("an engine in another process serves one client at a time: evaluate with 1 worker")
     if cluster is not None:
-        if job.options.remote:
-            raise InputError("an engine in another process serves one client at a time: leave --cluster away")
-        check_address(cluster)
+        check_cluster(cluster, job.options)
     for seed in seeds:
         check_seed(seed)
     started = time.perf_counter() - (kept.seconds if kept is not None else 0.0)
@@ -236,8 +231,7 @@ def _fleet(
     count = None if workers is None else min(workers, most)
     if cluster is not None:
         drawn = player.runner.pipeline.rendering is not None
-        alone = MEMORY_WITH_PICTURES if drawn else MEMORY
-        return Cluster(make, cluster, count, alone + batch * WORLD_MEMORY)
+        return Cluster(make, cluster, count, actor_memory(batch, drawn))
     if count in (None, 1):
         return Here(player)
     return Workers(make, count, "spawn")
@@ -365,12 +359,9 @@ def _outcome(result: Result) -> EpisodeOutcome:
 
 
 def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
-    from bt_tasksim.training.subject import evaluation_subject
+    from bt_tasksim.training.subject import code_files, evaluation_subject
 
-    files = {plugin: getattr(load_plugin(plugin), "__file__", None) for plugin in job.plugins}
-    code = {f"plugin {Path(plugin).name}": file for plugin, file in files.items() if file is not None}
-    if job.tree.endswith(".py"):
-        code["tree"] = job.tree
+    code = code_files(job.tree, job.plugins)
     return evaluation_subject(runner.tree, runner.scene, job.options, _policies(runner), code, stream)
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.core.cluster import Cluster
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
 from bt_tasksim.core.fleet import Fleet, Here
@@ -36,8 +37,11 @@ from bt_tasksim.training.checkpoint import (
 )
 from bt_tasksim.training.collectors import DrawResult, DrawTask, EnvironmentRollout, RolloutTask
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.env import EpisodeEnv, shared_layout
-from bt_tasksim.training.episode_batch import EpisodeBatch, why_alone_in
+from bt_tasksim.training.env import shared_layout
+from bt_tasksim.training.episode_batch import why_alone_in
+from bt_tasksim.training.keepers import Keeper, KeeperElsewhere, Keeping
+from bt_tasksim.training.named_tree import NamedTree
+from bt_tasksim.training.on_cluster import actor_memory
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
 from bt_tasksim.training.rollouts import results
 from bt_tasksim.training.subject import training_subject
@@ -47,9 +51,6 @@ if TYPE_CHECKING:
     from bt_tasksim.training.learner import Learner
 
 LOG = logging.getLogger(__name__)
-
-Keeper = EpisodeBatch | EpisodeEnv
-"""What each process keeps: a batch of worlds, or a single one where there is no form for many."""
 
 WARM_UP = 64
 """Decisions of each environment before the first rollout, from which features are normalised."""
@@ -63,8 +64,10 @@ class TrainingTask:
         tree: The tree.
         scene: The scene, with its stages.
         options: Engines.
-        workers: Processes, each with a batch of worlds; one is this process itself.
+        workers: Processes, each with a batch of worlds; one is this process itself. Or actors of a cluster.
         name: Name of the tree in the cards.
+        cluster: Address of a cluster.
+        source: Where its actors find tree and scene.
     """
 
     tree: Behaviour
@@ -72,6 +75,8 @@ class TrainingTask:
     options: EngineOptions
     workers: int
     name: str
+    cluster: str | None = None
+    source: NamedTree | None = None
 
 
 class NodeTraining:
@@ -125,16 +130,21 @@ class NodeTraining:
         task, reward = self.task, self.config.reward
         members = min(task.workers, self.config.n_envs)
         alone = why_alone_in(task.tree, task.scene, task.options)
+        worlds = 0 if alone else -(-self.config.n_envs // members)
+        keeping = Keeping(self.node.name, task.options, reward, self.trained, worlds)
 
         def make() -> Keeper:
-            about = task.tree, task.scene, self.node.name, task.options, reward
-            if alone:
-                return EpisodeEnv(*about, policies=self.trained)
-            return EpisodeBatch(*about, policies=self.trained, worlds=-(-self.config.n_envs // members))
+            return keeping.keeper(task.tree, task.scene)
 
         if alone:
             LOG.warning("the episodes run one by one: %s", alone)
         self._members = members
+        if task.cluster is not None and task.source is not None:
+            elsewhere = KeeperElsewhere.of(keeping, task.source, task.tree, task.scene)
+            pictures = task.options.rendering or task.options.perception != "state"
+            memory = actor_memory(max(1, worlds), pictures)
+            with Cluster(elsewhere, task.cluster, members, memory) as actors:
+                return self._learn(actors, resume, report)
         if members > 1:  # before torch starts threads of its own
             with Workers(make, members) as pool:
                 return self._learn(pool, resume, report)

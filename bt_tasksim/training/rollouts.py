@@ -7,6 +7,7 @@ its own seeds, in a world of its own beside others: so what it comes to does not
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,20 @@ from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.episode_batch import Draws, EpisodeBatch
 
 AnyTask = RolloutTask | DrawTask
+
+
+@dataclass(frozen=True)
+class TaskShare:
+    """What a process does side by side.
+
+    Attributes:
+        tasks: The tasks.
+    """
+
+    tasks: Sequence[AnyTask]
+
+    def __str__(self) -> str:
+        return f"a share of {len(self.tasks)} environments or draws"
 
 
 def alone(env: EpisodeEnv, task: AnyTask) -> Any:
@@ -108,10 +123,11 @@ def in_batch(batch: EpisodeBatch, tasks: Sequence[AnyTask], /) -> Iterator[tuple
 
 
 def side_by_side(
-    keeper: EpisodeBatch | EpisodeEnv, shares: Sequence[Sequence[AnyTask]], /
+    keeper: EpisodeBatch | EpisodeEnv, shares: Sequence[TaskShare], /
 ) -> Iterator[tuple[int, list[Any]]]:
     """Work for a fleet whose members keep a batch of worlds, or an environment: do shares of tasks."""
-    for index, tasks in enumerate(shares):
+    for index, share in enumerate(shares):
+        tasks = share.tasks
         if isinstance(keeper, EpisodeBatch):
             done = dict(in_batch(keeper, tasks))
         else:
@@ -127,7 +143,7 @@ def results(fleet: Fleet[EpisodeBatch | EpisodeEnv], tasks: Sequence[AnyTask], m
         tasks: The tasks.
         members: How many it has; each gets an equal share, so that its worlds have something to do.
     """
-    shares = [tasks[k::members] for k in range(min(members, len(tasks)))]
+    shares = [TaskShare(tasks[k::members]) for k in range(min(members, len(tasks)))]
     out: list[Any] = [None] * len(tasks)
     for k, found in fleet.spread(side_by_side, shares):
         out[k::members] = found

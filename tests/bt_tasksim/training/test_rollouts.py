@@ -33,7 +33,7 @@ def as_bytes(found):
 
 def run(tasks, count, maker=make):
     with Workers(maker, count) as pool:
-        return {number: as_bytes(found) for number, found in enumerate(results(pool, tasks, count))}
+        return dict(enumerate(map(as_bytes, results(pool, tasks, count))))
 
 
 @pytest.fixture
