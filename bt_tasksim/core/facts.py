@@ -156,12 +156,7 @@ class WorldFacts:
             raise InputError("a batch needs at least one world")
         first = worlds[0]
         for world in worlds:
-            if (world.control_period, world.opening, world.tips) != (
-                first.control_period,
-                first.opening,
-                first.tips,
-            ):
-                raise InputError("the worlds of a batch should have one robot and one control rate")
+            _check_alike(first, world)
         if names is None:
             names = list(dict.fromkeys(model.name for world in worlds for model in world.objects))
         if places is None:
@@ -195,6 +190,36 @@ class WorldFacts:
             self.object_facts.map(change),
             self.place_facts.map(change),
             self.obstacle_facts.map(change),
+        )
+
+    def replaced(self, rows: Array, other: WorldFacts) -> WorldFacts:
+        """The same facts, with those of other worlds, of the same columns, at ``rows (k,)``.
+
+        Raises:
+            InputError: They have unlike control rates or hands.
+        """
+        _check_alike(self, other)
+
+        def bundle(kind: str) -> Any:
+            mine, others = getattr(self, kind), getattr(other, kind)
+            return type(mine)(
+                **{
+                    f.name: _with_rows(
+                        getattr(mine, f.name), rows, getattr(others, f.name), _FILLING.get(f.name, 0)
+                    )
+                    for f in fields(mine)
+                }
+            )
+
+        return WorldFacts(
+            self.columns,
+            self.place_columns,
+            self.tips,
+            self.opening,
+            self.control_period,
+            bundle("object_facts"),
+            bundle("place_facts"),
+            bundle("obstacle_facts"),
         )
 
     def column(self, name: str) -> int:
@@ -358,8 +383,8 @@ class FactsTable:
 
     def __init__(self, worlds: int) -> None:
         self._models: list[WorldModel | None] = [None] * worlds
-        self._single: list[WorldFacts | None] = [None] * worlds
         self._facts: WorldFacts | None = None
+        self._stale: set[int] = set()
         self._taken: dict[bytes, WorldFacts] = {}
 
     def replace(self, rows: Array, models: Sequence[WorldModel]) -> None:
@@ -369,8 +394,8 @@ class FactsTable:
             InputError: See `WorldFacts.of`.
         """
         for row, model in zip(rows.tolist(), models, strict=True):
-            self._models[row], self._single[row] = model, None
-        self._facts = None
+            self._models[row] = model
+            self._stale.add(row)
         self._taken.clear()
 
     @property
@@ -380,18 +405,16 @@ class FactsTable:
         Raises:
             InputError: See `WorldFacts.of`.
         """
-        if self._facts is None:
-            first = next((model for model in self._models if model is not None), None)
-            if first is None:
-                return None
-            models = [first if model is None else model for model in self._models]
-            names = list(dict.fromkeys(m.name for model in models for m in model.objects))
-            places = list(dict.fromkeys(name for model in models for name in model.places))
-            for row, model in enumerate(models):
-                known = self._single[row]
-                if known is None or list(known.columns) != names or list(known.place_columns) != places:
-                    self._single[row] = WorldFacts.of([model], names, places)
-            self._facts = joined([facts for facts in self._single if facts is not None])
+        if self._stale:
+            rows, known = sorted(self._stale), self._facts
+            begun = [model for model in self._models if model is not None]
+            if known is None or _names(begun) != (known.columns.keys(), known.place_columns.keys()):
+                self._facts = WorldFacts.of([begun[0] if model is None else model for model in self._models])
+            else:
+                fresh = [model for row in rows if (model := self._models[row]) is not None]
+                anew = WorldFacts.of(fresh, list(known.columns), list(known.place_columns))
+                self._facts = known.replaced(np.array(rows), anew)
+            self._stale.clear()
         return self._facts
 
     def taken(self, rows: Array) -> WorldFacts:
@@ -406,6 +429,11 @@ class FactsTable:
         return self._taken[key]
 
 
+def _names(models: Sequence[WorldModel]) -> tuple[set[str], set[str]]:
+    """Names of all objects, and of all places."""
+    return {n for model in models for n in model.index}, {n for model in models for n in model.places}
+
+
 def joined(worlds: Sequence[WorldFacts]) -> WorldFacts:
     """The facts of several batches as those of one; names are those of the first one.
 
@@ -414,12 +442,7 @@ def joined(worlds: Sequence[WorldFacts]) -> WorldFacts:
     """
     first = worlds[0]
     for other in worlds:
-        if (other.control_period, other.opening, other.tips) != (
-            first.control_period,
-            first.opening,
-            first.tips,
-        ):
-            raise InputError("the worlds of a batch should have one robot and one control rate")
+        _check_alike(first, other)
 
     def join(kind: str) -> Any:
         bundles = [getattr(facts, kind) for facts in worlds]
@@ -447,10 +470,25 @@ def _concatenated(arrays: Sequence[Array], filling: Any) -> Array:
     shapes = {array.shape[1:] for array in arrays}
     if len(shapes) > 1:
         most = tuple(np.max(list(shapes), axis=0).tolist())
-        filled = []
-        for array in arrays:
-            out = np.full((array.shape[0], *most), filling, array.dtype)
-            out[(slice(None), *(slice(0, n) for n in array.shape[1:]))] = array
-            filled.append(out)
-        arrays = filled
+        arrays = [_filled(array, most, filling) for array in arrays]
     return np.concatenate(arrays)
+
+
+def _with_rows(array: Array, rows: Array, values: Array, filling: Any) -> Array:
+    """An array ``(N, ...)`` with other rows ``(k, ...)``; what is shorter is filled up."""
+    most = tuple(max(n, m) for n, m in zip(array.shape[1:], values.shape[1:], strict=True))
+    out = array.copy() if most == array.shape[1:] else _filled(array, most, filling)
+    out[rows] = values if most == values.shape[1:] else _filled(values, most, filling)
+    return out
+
+
+def _filled(array: Array, most: tuple[int, ...], filling: Any) -> Array:
+    """An array ``(n, ...)`` as ``(n, *most)``."""
+    out = np.full((array.shape[0], *most), filling, array.dtype)
+    out[(slice(None), *(slice(0, n) for n in array.shape[1:]))] = array
+    return out
+
+
+def _check_alike(first: WorldModel | WorldFacts, other: WorldModel | WorldFacts) -> None:
+    if (other.control_period, other.opening, other.tips) != (first.control_period, first.opening, first.tips):
+        raise InputError("the worlds of a batch should have one robot and one control rate")
