@@ -408,7 +408,7 @@ class FactsTable:
         if self._stale:
             rows, known = sorted(self._stale), self._facts
             begun = [model for model in self._models if model is not None]
-            if known is None or _names(begun) != (known.columns.keys(), known.place_columns.keys()):
+            if known is None or _names(begun) != (set(known.columns), set(known.place_columns)):
                 self._facts = WorldFacts.of([begun[0] if model is None else model for model in self._models])
             else:
                 fresh = [model for row in rows if (model := self._models[row]) is not None]
