@@ -184,6 +184,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
                 self.errors[row] = error
 
         self._share(build, list(zip(rows.tolist(), configurations, strict=True)))
+        self._begin(rows)
         fresh = [world for row in rows.tolist() if (world := self.simulated[row]) is not None]
         self._widen(
             max((world.n_objects for world in fresh), default=0),
@@ -209,14 +210,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         for (_, world), to, speed in zip(worlds, position.tolist(), velocity.tolist(), strict=True):
             world.drive_to(to, speed)
 
-        def advance(job: tuple[int, W]) -> None:
-            row, world = job
-            try:
-                world.advance()
-            except BtTasksimError as error:
-                self.errors[row] = error
-
-        self._share(advance, worlds)
+        self._advance(worlds)
         self._gather(rows)
 
     def state(self, rows: Array) -> WorldState:
@@ -234,6 +228,21 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         if self._pool is not None:
             self._pool.shutdown()
         self.simulated = [None] * self.worlds
+
+    def _begin(self, rows: Array) -> None:
+        """What is to be done with worlds that were just built; by default nothing."""
+
+    def _advance(self, worlds: Sequence[tuple[int, W]]) -> None:
+        """Let worlds go on by one control period; by default each by itself."""
+
+        def advance(job: tuple[int, W]) -> None:
+            row, world = job
+            try:
+                world.advance()
+            except BtTasksimError as error:
+                self.errors[row] = error
+
+        self._share(advance, worlds)
 
     def _share(self, work: Callable[[T], None], jobs: Sequence[T]) -> None:
         """Do all jobs, each by the thread that is free for it."""
