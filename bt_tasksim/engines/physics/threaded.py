@@ -312,9 +312,9 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             rows, worlds = rows[finite], [world for world, fine in zip(worlds, finite, strict=True) if fine]
             state, hidden = taken(state, finite), taken(hidden, finite)
         if self._state is None or self._hidden is None:
-            self._state, self._hidden = _room(state, self.worlds), _room(hidden, self.worlds)
-        _put(self._state, rows, state)
-        _put(self._hidden, rows, hidden)
+            self._state, self._hidden = rows_for(state, self.worlds), rows_for(hidden, self.worlds)
+        put(self._state, rows, state)
+        put(self._hidden, rows, hidden)
         self._note_motion(worlds, state, hidden)
 
     @staticmethod
@@ -394,8 +394,8 @@ def _unbatched(bundle: B) -> B:
     return type(bundle)(**{name: value[0] for name, value in _arrays(bundle)})
 
 
-def _room(bundle: B, n: int) -> B:
-    """Arrays for ``n`` rows like those of a bundle."""
+def rows_for(bundle: B, n: int) -> B:
+    """Arrays for ``n`` rows like those of a bundle, zero."""
     return type(bundle)(**{name: _rows_like(value, n) for name, value in _arrays(bundle)})
 
 
@@ -403,7 +403,8 @@ def _rows_like(value: Array, n: int) -> Array:
     return np.zeros((n, *value.shape[1:]), value.dtype)
 
 
-def _put(bundle: B, rows: Array, values: B) -> None:
+def put(bundle: B, rows: Array, values: B) -> None:
+    """Write rows of a bundle of arrays."""
     for name, value in _arrays(values):
         getattr(bundle, name)[rows] = value
 

@@ -1,0 +1,69 @@
+"""The device on which Warp works: found, and started without a word."""
+
+from __future__ import annotations
+
+import logging
+import os
+import tempfile
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import warp as wp
+
+from bt_tasksim.core.errors import MachineError
+
+if TYPE_CHECKING:
+    import mujoco_warp
+
+LOG = logging.getLogger("bt_tasksim.engines")
+
+
+def start(name: str) -> wp.Device:
+    """The device of that name; Warp starts with the first one.
+
+    Args:
+        name: ``cpu``, ``cuda`` or ``cuda:N``.
+
+    Raises:
+        MachineError: There is no such GPU.
+    """
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)  # Warp's one setting for the process
+    _choose_cache()
+    wp.init()
+    gpus = wp.get_cuda_device_count()
+    if name != "cpu":
+        number = int(name.partition(":")[2] or 0)
+        if number >= gpus:
+            found = "no GPU that Warp can use" if gpus == 0 else f"{gpus} GPU{'s' * (gpus > 1)}, numbered from 0"
+            raise MachineError(f"the device '{name}' is not there: this machine has {found}")
+        name = f"cuda:{number}"
+    return wp.get_device(name)
+
+
+def mujoco_warp_library() -> ModuleType:
+    """The library, which wants Warp to be started first."""
+    import mujoco_warp
+
+    return mujoco_warp
+
+
+def _choose_cache() -> None:
+    """Keep compiled kernels where Warp keeps them, or for this process alone where nothing can be written.
+
+    Never in a folder of a name that others could guess and fill: what lies there is run.
+    """
+    if wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH"):
+        return
+    try:
+        wp._src.build.init_kernel_cache()
+        with tempfile.TemporaryFile(dir=wp.config.kernel_cache_dir):
+            pass
+    except OSError as error:
+        folder = tempfile.mkdtemp(prefix="bt-tasksim-warp-")
+        LOG.warning(
+            "compiled kernels cannot be kept in Warp's cache (%s): they are compiled anew, in '%s'; "
+            "set WARP_CACHE_PATH to a folder of yours",
+            error,
+            folder,
+        )
+        wp.config.kernel_cache_dir = folder
