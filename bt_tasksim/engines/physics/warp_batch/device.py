@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
 import logging
 import os
+import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 import warp as wp
 
 from bt_tasksim.core.errors import MachineError
-
-if TYPE_CHECKING:
-    import mujoco_warp
 
 LOG = logging.getLogger("bt_tasksim.engines")
 
@@ -29,7 +29,8 @@ def start(name: str) -> wp.Device:
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)  # Warp's one setting for the process
     _choose_cache()
-    wp.init()
+    with nullcontext() if _has_driver() else _silent():
+        wp.init()
     gpus = wp.get_cuda_device_count()
     if name != "cpu":
         number = int(name.partition(":")[2] or 0)
@@ -38,6 +39,33 @@ def start(name: str) -> wp.Device:
             raise MachineError(f"the device '{name}' is not there: this machine has {found}")
         name = f"cuda:{number}"
     return wp.get_device(name)
+
+
+def _has_driver() -> bool:
+    """A driver of GPUs is installed; without one, Warp complains on the C library's standard error."""
+    if not sys.platform.startswith("linux"):
+        return True
+    for name in ("libcuda.so", "libcuda.so.1"):
+        try:
+            ctypes.CDLL(name)
+        except OSError:
+            continue
+        return True
+    return False
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Nothing is said on standard error, by code that is not Python's either."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def mujoco_warp_library() -> ModuleType:

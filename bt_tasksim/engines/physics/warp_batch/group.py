@@ -6,6 +6,8 @@ more steps costs the others nothing, and changes nothing in them.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -75,7 +77,7 @@ class WarpGroup:
 
     def look(self, slots: Array) -> Array:
         """Read worlds ``(k,)`` as they stand; reports ``(k, columns)``."""
-        return self._aside(slots, "look")
+        return self._aside(slots, lambda side, rows: side.look(rows))
 
     def period(self, slots: Array, fine: Array) -> Array:
         """Let worlds go on by one control period.
@@ -88,11 +90,13 @@ class WarpGroup:
             What is read then, ``(k, columns)``.
         """
         assert self._main is not None
-        reports = np.zeros((len(slots), self.columns.width), np.int32)
-        if not fine.all():
-            reports[~fine] = self._main.period(slots[~fine], fine=False)[slots[~fine]]
-        if fine.any():
-            reports[fine] = self._aside(slots[fine], "fine")
+        assert self._side is not None
+        reports, usual = np.zeros((len(slots), self.columns.width), np.int32), slots[~fine]
+        if 2 * len(usual) > self._main.count or len(usual) > self._side.count:
+            reports[~fine] = self._main.period(usual, fine=False)[usual]
+        else:  # the most of them stand still
+            reports[~fine] = self._aside(usual, lambda side, rows: side.period(rows, fine=False))
+        reports[fine] = self._aside(slots[fine], lambda side, rows: side.period(rows, fine=True))
         return reports
 
     def write_targets(self, slots: Array, targets: Array) -> None:
@@ -100,7 +104,7 @@ class WarpGroup:
         assert self._main is not None
         self._main.write_state(slots, "ctrl", targets)
 
-    def _aside(self, slots: Array, what: str) -> Array:
+    def _aside(self, slots: Array, what: Callable[[WarpWorlds, Array], Array]) -> Array:
         main, side = self._main, self._side
         assert main is not None
         assert side is not None
@@ -109,7 +113,7 @@ class WarpGroup:
             some = slots[first : first + side.count]
             there = np.arange(len(some))
             main.copy_to(some, side, there)
-            report = side.look(there) if what == "look" else side.period(there, fine=True)
+            report = what(side, there)
             side.state.copy_to(there, main.state, some)
             reports[first : first + len(some)] = report[there]
         return reports
@@ -117,7 +121,7 @@ class WarpGroup:
     def _grow(self, lacking: int) -> None:
         """Make room for some more worlds."""
         before, n = self._main, 0 if self._main is None else self._main.count
-        count = max(n + lacking, int(GROWTH * n))
+        count = n + lacking if before is None else math.ceil(GROWTH * (n + lacking))
         self._hulls.flush()
         self._main = self._new(count)
         if before is not None:

@@ -144,18 +144,24 @@ def feel_wrist(
     wrist: int,
     root: int,
     tool: int,
-    sample: int,
+    sample: wp.array(dtype=wp.int32),
     felt: wp.array3d(dtype=wp.float32),
 ):
     """What the wrench at the wrist is computed from, see `mujoco_sensing.wrist_wrenches`."""
-    w = wp.tid()
+    w, k = wp.tid(), sample[0]
     for j in range(6):
-        felt[w, sample, j] = inner[w, wrist][j]
+        felt[w, k, j] = inner[w, wrist][j]
     for j in range(3):
-        felt[w, sample, 6 + j] = centre[w, root][j]
-        felt[w, sample, 9 + j] = position[w, tool][j]
+        felt[w, k, 6 + j] = centre[w, root][j]
+        felt[w, k, 9 + j] = position[w, tool][j]
     for j in range(4):
-        felt[w, sample, 12 + j] = rotation[w, tool][j]
+        felt[w, k, 12 + j] = rotation[w, tool][j]
+
+
+@wp.kernel
+def count_up(number: wp.array(dtype=wp.int32)):
+    """One more."""
+    number[0] = number[0] + 1
 
 
 @wp.kernel

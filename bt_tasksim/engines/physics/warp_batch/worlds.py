@@ -81,6 +81,7 @@ class WarpWorlds:
             self._by_link = wp.zeros((n, max(geoms.n_links, 1) * things), dtype=wp.vec3)
             self._hand = wp.zeros((n, things), dtype=wp.float32)
             self._felt = wp.zeros((n, first.timing.sensed, 16), dtype=wp.float32)
+            self._sample = wp.zeros(1, dtype=wp.int32)
             self._distance = wp.zeros((n, things), dtype=wp.float32)
             self._support = wp.zeros((n, things * max(self.n_bodies, 1)), dtype=wp.float32)
             self._poses = wp.zeros((n, 7 * len(bodies.read)), dtype=wp.float32)
@@ -172,58 +173,60 @@ class WarpWorlds:
         """
         timing = self._first.timing
         finer = timing.finer if fine else 1
-        return self._go(rows, f"period, {finer}", timing.step / finer, lambda: self._period(finer))
+        self._begin(rows, timing.step / finer)
+        for k in range(timing.steps):
+            for _ in range(finer):
+                self._run("step", self._step)
+            if k >= timing.steps - timing.sensed:
+                self._run("feel", self._feel)
+        return self._end()
 
     def look(self, rows: Array) -> Array:
         """Read some worlds as they stand, with the forces of this instant; see `period`."""
-        return self._go(rows, "look", self._first.timing.step, self._look)
+        self._begin(rows, self._first.timing.step)
+        self._run("forward", lambda: self._library.forward(self.model, self.data))
+        self._run("feel", self._feel)
+        return self._end()
 
-    def _go(self, rows: Array, name: str, step: float, work: Callable[[], None]) -> Array:
+    def _begin(self, rows: Array, step: float) -> None:
         if self._version != self._hulls.version:
             self._hulls.attach(self.model)
             self._version = self._hulls.version
             self._graphs.clear()
         going = np.zeros(self.count, np.int32)
         going[rows] = 1
-        with wp.ScopedDevice(self._device):
-            self._going.assign(going)
-            self.model.opt.timestep.fill_(step)
-            self._run(name, work)
-            return np.asarray(self._report.numpy())
+        self._going.assign(going)
+        self.model.opt.timestep.fill_(step)
+        self._run("start", self._start)
+
+    def _end(self) -> Array:
+        self._run("finish", self._finish)
+        return np.asarray(self._report.numpy())
 
     def _run(self, name: str, work: Callable[[], None]) -> None:
-        """Do it; on a GPU as a graph from the second time on, when all kernels that it needs are loaded."""
-        if not self._device.is_cuda or name not in self._loaded:
-            work()
-            self._loaded.add(name)
-            return
-        if name not in self._graphs:
-            with wp.ScopedCapture(self._device) as capture:
+        """Do it: the first time launch by launch, which loads all kernels, and then as a graph.
+
+        A graph costs the interpreter nothing, on a GPU and on the CPU.
+        """
+        with wp.ScopedDevice(self._device):
+            if name not in self._loaded:
                 work()
-            self._graphs[name] = capture.graph
-        wp.capture_launch(self._graphs[name])
+                self._loaded.add(name)
+                return
+            if name not in self._graphs:
+                with wp.ScopedCapture(self._device) as capture:
+                    work()
+                self._graphs[name] = capture.graph
+            wp.capture_launch(self._graphs[name])
 
-    def _period(self, finer: int) -> None:
-        timing = self._first.timing
-        self._start()
-        for k in range(timing.steps):
-            for _ in range(finer):
-                self._library.step(self.model, self.data)
-                self._note_depth()
-            if k >= timing.steps - timing.sensed:
-                self._feel(k - (timing.steps - timing.sensed))
-        self._finish()
-
-    def _look(self) -> None:
-        self._start()
-        self._library.forward(self.model, self.data)
-        self._feel(0)
-        self._finish()
+    def _step(self) -> None:
+        self._library.step(self.model, self.data)
+        self._note_depth()
 
     def _start(self) -> None:
         for name, before in self._before.items():
             wp.copy(before, self._words[name])
-        for array in (self._tips, self._hand, self._felt):
+        for array in (self._tips, self._hand, self._felt, self._sample):
             array.zero_()
 
     def _finish(self) -> None:
@@ -270,7 +273,7 @@ class WarpWorlds:
         self._launch(kernels.note_depth, self.data.naconmax, *found)
         self._launch(kernels.note_deepest_pair, self.data.naconmax, *found, self.deepest_pair)
 
-    def _feel(self, sample: int) -> None:
+    def _feel(self) -> None:
         """Take the forces of the last step."""
         model, data, table, bodies = self.model, self.data, self._table, self._bodies
         self._library.rne_postconstraint(model, data)
@@ -304,9 +307,10 @@ class WarpWorlds:
             bodies.wrist,
             bodies.root,
             bodies.tool,
-            sample,
+            self._sample,
             self._felt,
         )
+        self._launch(kernels.count_up, 1, self._sample)
 
     def _launch(self, kernel: Any, size: int | tuple[int, ...], *arguments: Any) -> None:
         wp.launch(kernel, size, list(arguments), device=self._device)
