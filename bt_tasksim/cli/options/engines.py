@@ -48,8 +48,8 @@ class EngineFlags:
         str,
         typer.Option(
             metavar="E",
-            help="Physics: sapien, mujoco, mujoco_warp, maniskill:ENV (which brings its world), remote:HOST:PORT or a "
-            "plugin's; or a robot: ros:HOST:PORT.",
+            help="Physics: sapien, mujoco, mujoco_warp, maniskill:ENV (which brings its world), "
+            "remote:HOST:PORT or a plugin's; or a robot: ros:HOST:PORT.",
         ),
     ] = "sapien"
     perception: Annotated[str, typer.Option(metavar="P", help="state, camera, or remote:HOST:PORT.")] = (

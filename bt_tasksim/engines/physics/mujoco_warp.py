@@ -22,7 +22,7 @@ from bt_tasksim.engines.physics.mujoco_contacts import FINE_STEP, TIMESTEP
 from bt_tasksim.engines.physics.mujoco_model import build_world
 from bt_tasksim.engines.physics.mujoco_sensing import wrist_wrenches
 from bt_tasksim.engines.physics.mujoco_state import StateArrays, states
-from bt_tasksim.engines.physics.threaded import Layout, SimulatedPhysics, ThreadedBatch, put, rows_for, taken
+from bt_tasksim.engines.physics.threaded import Layout, SimulatedPhysics, ThreadedBatch, put, rows_for
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
@@ -146,7 +146,7 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
     def _build(self, row: int, configuration: ActorConfiguration, start: Array) -> WarpWorld:
         if configuration.disturbance is not None:
             raise InputError(
-                "MuJoCo Warp does not simulate disturbances: use --engines mujoco, or a scene without 'disturbed'"
+                "MuJoCo Warp does not simulate disturbances: take --engines mujoco, or a scene without them"
             )
         mujoco = self._mujoco
         world = build_world(mujoco, self.robot, configuration)
@@ -207,7 +207,7 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
         row_of = {id(world): row for row, world in worlds}
         for some in _by_structure([world for _, world in worlds]).values():
             group, slots = some[0].group, np.array([world.slot for world in some])
-            group.write_targets(slots, np.array([world.control for world in some]))
+            group.write(slots, "ctrl", np.array([world.control for world in some]))
             reports = group.period(slots, np.array([world.falling for world in some]))
             full = group.columns.integers(reports, "overflow")[:, 0] & self._overflow
             for world, report, over in zip(some, reports, full.tolist(), strict=True):

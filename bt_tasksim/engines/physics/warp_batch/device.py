@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import importlib
 import logging
 import os
 import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from pathlib import Path
 from types import ModuleType
 
 import warp as wp
@@ -35,7 +37,9 @@ def start(name: str) -> wp.Device:
     if name != "cpu":
         number = int(name.partition(":")[2] or 0)
         if number >= gpus:
-            found = "no GPU that Warp can use" if gpus == 0 else f"{gpus} GPU{'s' * (gpus > 1)}, numbered from 0"
+            found = (
+                "no GPU that Warp can use" if gpus == 0 else f"{gpus} GPU{'s' * (gpus > 1)}, numbered from 0"
+            )
             raise MachineError(f"the device '{name}' is not there: this machine has {found}")
         name = f"cuda:{number}"
     return wp.get_device(name)
@@ -70,9 +74,7 @@ def _silent() -> Iterator[None]:
 
 def mujoco_warp_library() -> ModuleType:
     """The library, which wants Warp to be started first."""
-    import mujoco_warp
-
-    return mujoco_warp
+    return importlib.import_module("mujoco_warp")
 
 
 def _choose_cache() -> None:
@@ -80,13 +82,18 @@ def _choose_cache() -> None:
 
     Never in a folder of a name that others could guess and fill: what lies there is run.
     """
-    if wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH"):
+    if (
+        wp.config.kernel_cache_dir
+        or os.environ.get("WARP_CACHE_PATH")
+        or not sys.platform.startswith("linux")
+    ):
         return
+    usual = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "warp"
     try:
-        wp._src.build.init_kernel_cache()
-        with tempfile.TemporaryFile(dir=wp.config.kernel_cache_dir):
+        usual.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=usual):
             pass
-    except OSError as error:
+    except (OSError, RuntimeError) as error:
         folder = tempfile.mkdtemp(prefix="bt-tasksim-warp-")
         LOG.warning(
             "compiled kernels cannot be kept in Warp's cache (%s): they are compiled anew, in '%s'; "

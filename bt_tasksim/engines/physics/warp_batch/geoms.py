@@ -41,7 +41,8 @@ class GeomTable:
         return cls(
             judged=(role != "base").astype(np.int32),
             link=np.array(
-                [number[b] if r == "link" else -1 for b, r in zip(carrier.tolist(), role, strict=True)], np.int32
+                [number[b] if r == "link" else -1 for b, r in zip(carrier.tolist(), role, strict=True)],
+                np.int32,
             ),
             tip=np.array([body.tip for body in world.bodies], np.int32),
             thing=np.where(role == "object", index, -1).astype(np.int32),

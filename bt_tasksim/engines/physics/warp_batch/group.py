@@ -99,10 +99,10 @@ class WarpGroup:
         reports[fine] = self._aside(slots[fine], lambda side, rows: side.period(rows, fine=True))
         return reports
 
-    def write_targets(self, slots: Array, targets: Array) -> None:
-        """Set the controls ``(k, n_joints)`` of worlds."""
+    def write(self, slots: Array, name: str, values: Array) -> None:
+        """Write numbers ``(k, n)`` into a part of the state of worlds ``(k,)``, such as ``ctrl``."""
         assert self._main is not None
-        self._main.write_state(slots, "ctrl", targets)
+        self._main.write(slots, name, values)
 
     def _aside(self, slots: Array, what: Callable[[WarpWorlds, Array], Array]) -> Array:
         main, side = self._main, self._side

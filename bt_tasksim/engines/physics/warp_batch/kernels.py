@@ -128,7 +128,7 @@ def add_hand_forces(
 ):
     """Add the magnitudes of all links' forces on each object, and forget the forces."""
     w, k = wp.tid()
-    total = float(0.0)
+    total = float(0.0)  # noqa: UP018  # 0.0 alone would be a constant
     for i in range(n_links):
         total += wp.length(by_link[w, i * n_things + k])
         by_link[w, i * n_things + k] = wp.vec3(0.0, 0.0, 0.0)

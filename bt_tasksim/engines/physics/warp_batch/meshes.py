@@ -18,7 +18,7 @@ from bt_tasksim.engines.physics.warp_batch.words import host_words, words, write
 if TYPE_CHECKING:
     import mujoco as mj
 
-PARTS: dict[str, tuple[type, int]] = {
+PARTS: dict[str, tuple[Any, int]] = {
     "vert": (np.float32, 3),
     "polymapadr": (np.int32, 1),
     "polymapnum": (np.int32, 1),
@@ -29,8 +29,8 @@ PARTS: dict[str, tuple[type, int]] = {
     "polyvert": (np.int32, 1),
     "polymap": (np.int32, 1),
 }
-"""What a mesh consists of: type of the numbers, and how many an element has. Fields of the model are ``mesh_``
-and these."""
+"""What a mesh consists of: type of the numbers, and how many an element has. The model's fields are named
+``mesh_`` and these."""
 FIRST_ROOMS = 16
 
 
@@ -193,7 +193,10 @@ class HullStore:
         if not rooms and all(sizes[name] <= self._sizes[name] for name in PARTS):
             return
         # What lies beside each other by corner or by side has rooms of one size.
-        for one, *others in (("vert", "polymapadr", "polymapnum"), ("polynormal", "polyvertadr", "polyvertnum")):
+        for one, *others in (
+            ("vert", "polymapadr", "polymapnum"),
+            ("polynormal", "polyvertadr", "polyvertnum"),
+        ):
             most = max(sizes[one], self._sizes[one])
             self._sizes |= dict.fromkeys((one, *others), most)
         for name in ("graph", "polyvert", "polymap"):

@@ -44,10 +44,16 @@ def copy(source: wp.array, source_rows: Array, target: wp.array, target_rows: Ar
     """Copy rows of words from one array on the device to another."""
     if source.shape[1] == 0 or not len(source_rows):
         return
-    rows = (wp.array(np.asarray(r, np.int32), dtype=wp.int32, device=target.device) for r in (source_rows, target_rows))
+    rows = (
+        wp.array(np.asarray(r, np.int32), dtype=wp.int32, device=target.device)
+        for r in (source_rows, target_rows)
+    )
     mine, its = rows
     wp.launch(
-        kernels.copy_rows, (len(source_rows), source.shape[1]), [source, mine, target, its], device=target.device
+        kernels.copy_rows,
+        (len(source_rows), source.shape[1]),
+        [source, mine, target, its],
+        device=target.device,
     )
 
 

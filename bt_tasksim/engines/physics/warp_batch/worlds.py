@@ -22,11 +22,11 @@ GOING = ("qpos", "qvel", "qacc_warmstart")
 STATE = (*GOING, "ctrl", "xfrc_applied", "geom_xpos", "geom_xmat", "overflow")
 """A state, with what stands still in it, and whether it ever had too little room."""
 CONTACTS = (48, 32)
-"""Contacts that there is room for in each world, and more for each object beyond the first. The room is common
-to the worlds of a group."""
+"""Contacts that there is room for in each world, and more for each object beyond the first. The worlds of a
+group have this room in common."""
 ROWS = 5
-"""Rows of constraints for each of these contacts: between those of a finger's (4) and those of an object's (6);
-besides them each joint has one for its limits."""
+"""Rows of constraints for each of these contacts: a finger's takes 4, one between objects 6. Besides them
+each joint has room for its limits and for following another one."""
 
 
 class WarpWorlds:
@@ -133,7 +133,7 @@ class WarpWorlds:
                 values = np.array([world.state[name] for world in worlds])
             write(target, rows, values)
 
-    def write_state(self, rows: Array, name: str, values: Array) -> None:
+    def write(self, rows: Array, name: str, values: Array) -> None:
         """Write numbers ``(k, n)`` into a part of the state of worlds ``(k,)``."""
         write(self.state.words[name], rows, host_words(values, np.float32))
 

@@ -15,7 +15,7 @@ from physics_cases import G, lifted, scene
 from bt_tasksim.cli.main import main
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError, MachineError
-from bt_tasksim.core.world import Command, JointTarget
+from bt_tasksim.core.world import JointTarget
 from bt_tasksim.engines.base import EngineSetup, engine_class
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physics.mujoco_warp import MujocoWarpPhysics
@@ -36,12 +36,12 @@ def batch_of(engine, worlds, threads=1):
     return engine_class("physics", engine).batch(load_robot("panda"), EngineSetup(engine), worlds, threads)
 
 
-def around(configuration):
-    """The same world, with the open hand around its object."""
-    robot = load_robot("panda")
-    thing = np.array(configuration.objects[0].pose)
-    yaw = 2 * np.arctan2(thing[6], thing[3])
-    joints = PinocchioKinematics(robot).joints_of_hand_start((*thing[:3], yaw))
+def around(configuration, height=0.03, aside=0.0):
+    """The same world, with the open hand around the upper part of its box, or aside along its own y."""
+    kinematics, thing = PinocchioKinematics(load_robot("panda")), np.array(configuration.objects[0].pose)
+    yaw = 2 * np.arctan2(thing[6], thing[3]) - np.arctan2(thing[1], thing[0])  # against the arm's direction
+    place = thing[:3] + poses.rotate(thing[3:], np.array([0.0, aside, height]))
+    joints = kinematics.joints_of_hand_start((*place, yaw))
     return dataclasses.replace(configuration, joint_position=tuple(joints))
 
 
@@ -53,25 +53,15 @@ def ramp(start, end, steps):
 def cases():
     """What is drawn in four worlds, and what their drives are told: hold, push, rest, fall."""
     robot = load_robot("panda")
-    box, rest = around(scene("box", MASS).sample(2)), scene("box", MASS).sample(4)
+    box, rest = around(scene("box", MASS).sample(5)), scene("box", MASS).sample(4)
     fall = lifted(scene("cylinder").sample(1), 0.05, (0.3, 0.2, 0.0))
     open_hand = np.array(box.joint_position)
     shut, n = open_hand.copy(), len(robot.arm_joints)
     shut[n:] = 0.0
-    kinematics, high = PinocchioKinematics(robot), shut.copy()
-    tool = kinematics.forward(shut).copy()
-    batch = batch_of("mujoco", 1)
-    batch.reset(np.zeros(1, int), [box])
-    state = batch.state(np.zeros(1, int))
-    state = type(state)(**{f.name: getattr(state, f.name)[0] for f in dataclasses.fields(state)})
-    kinematics.reset(box)
-    tool[2] += 0.03
-    for _ in range(40):
-        high = kinematics.solve(Command(tool=tool, hand=np.ones(1)), state).position
+    high = np.array(around(box, height=0.08).joint_position)
     high[n:] = 0.0
     hold = [shut] * CLOSING + ramp(shut, high, LIFTING - CLOSING) + [high] * (PERIODS - LIFTING)
-    aside = open_hand.copy()
-    aside[0] += 0.1
+    aside = np.array(around(box, aside=0.06).joint_position)
     push = ramp(open_hand, aside, 20) + [aside] * (PERIODS - 20)
     still = np.concatenate([robot.rest, robot.hand_open])
     return [box, box, rest, fall], np.array([hold, push, [still] * PERIODS, [still] * PERIODS])
@@ -123,17 +113,16 @@ def assert_same(one, row, other, its_row):
         assert np.array_equal(a, b, equal_nan=True), f"{name} at {float(one.time[row]):.2f} s"
 
 
-# ---- the same physics as MuJoCo's ---------------------------------------------------------------------------
+# ---- the same physics as MuJoCo's ------------------------------------------------------------------------
 
 
 def test_states_stay_near_mujocos():
     for mine, its in zip(warp().states, plain().states, strict=True):
-        joints = np.abs(mine.joint_position - its.joint_position).max(axis=1)
-        assert joints[[RESTING, FALLING]].max() < 1e-5 and joints.max() < 2e-3
         off = np.linalg.norm(mine.objects[:, 0, :3] - its.objects[:, 0, :3], axis=-1)
-        assert off[RESTING] < 1e-5 and off.max() < 2e-3
-        assert np.abs(mine.tool_pose - its.tool_pose).max() < 2e-3
-        assert np.abs(mine.tips - its.tips).max() < 2e-3
+        assert off[RESTING] < 1e-5 and off[HELD] < 1e-4 and off[PUSHED] < 2e-3
+        assert mine.time[0] > 0.06 or off[FALLING] < 1e-5, "until it lands: then it rolls as it likes"
+        for name in ("joint_position", "tool_pose", "tips"):
+            assert np.abs(getattr(mine, name) - getattr(its, name)).max() < 1e-3, name
         assert np.array_equal(mine.time, its.time)
 
 
@@ -171,7 +160,7 @@ def test_the_wrist_feels_the_weight_of_what_is_held():
 
 def test_a_grip_holds_and_both_fingertips_press():
     state, hidden = warp().states[-1], warp().hidden[-1]
-    assert state.objects[HELD, 0, 2] > warp().states[0].objects[HELD, 0, 2] + 0.02
+    assert state.objects[HELD, 0, 2] > warp().states[0].objects[HELD, 0, 2] + 0.03
     left, right = state.tip_force[HELD]
     y = poses.rotate(state.tool_pose[HELD, 3:], np.array([0.0, 1.0, 0.0]))
     assert abs(left @ y) > 5.0 and left @ y == pytest.approx(-(right @ y), rel=0.1)
@@ -183,9 +172,7 @@ def test_a_grip_holds_and_both_fingertips_press():
 
 def test_a_push_moves_the_object_as_far_as_in_mujoco():
     moved = [
-        np.linalg.norm(
-            found.states[-1].objects[PUSHED, 0, :2] - found.states[0].objects[PUSHED, 0, :2]
-        )
+        np.linalg.norm(found.states[-1].objects[PUSHED, 0, :2] - found.states[0].objects[PUSHED, 0, :2])
         for found in (warp(), plain())
     ]
     assert moved[1] > 0.01 and moved[0] == pytest.approx(moved[1], abs=2e-3)
@@ -208,7 +195,7 @@ def test_partners_of_contact_are_mujocos_with_three_objects():
     assert mine.penetration == pytest.approx(its.penetration, abs=1e-4)
 
 
-# ---- each world as if it were alone -------------------------------------------------------------------------
+# ---- each world as if it were alone ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("shown", [(HELD,), (FALLING, PUSHED)])
@@ -246,7 +233,7 @@ def test_a_world_that_fails_does_so_alone():
     bad = targets[[HELD, RESTING, RESTING], 0]
     bad[1, 2] = np.nan
     world = batch.simulated[2]
-    world.group.write_state(np.array([world.slot]), "qvel", np.full((1, 15), np.inf))
+    world.group.write(np.array([world.slot]), "qvel", np.full((1, 15), np.inf))
     step(batch, rows, bad)
     assert batch.errors[0] is None
     assert_same(batch.state(rows), 0, warp().states[1], HELD)
@@ -271,7 +258,7 @@ def test_one_world_plays_the_role():
     physics.close()
 
 
-# ---- what it refuses ----------------------------------------------------------------------------------------
+# ---- what it refuses -------------------------------------------------------------------------------------
 
 
 def test_a_disturbance_is_refused_in_its_world_alone():
