@@ -155,7 +155,7 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
         period = 1.0 / configuration.control_frequency
         steps = math.ceil(period / TIMESTEP - 1e-9)
         share = configuration.control_frequency / configuration.physics_frequency
-        timing = self._structure.Timing(
+        timing = self._structure.StepPlan(
             period,
             steps,
             sensed=min(max(round(steps * share), 1), steps),

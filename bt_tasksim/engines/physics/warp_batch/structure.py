@@ -21,7 +21,7 @@ OUT_OF_IT = ("mesh_", "nmesh", "tex_", "ntex", "mat_", "vis_")
 
 
 @dataclass(frozen=True)
-class Timing:
+class StepPlan:
     """How a control period is stepped.
 
     Attributes:
@@ -57,7 +57,7 @@ class Prepared:
     """
 
     world: World
-    timing: Timing
+    timing: StepPlan
     geoms: GeomTable
     hulls: tuple[Hull, ...]
     state: dict[str, Array]
@@ -65,7 +65,7 @@ class Prepared:
     key: bytes = b""
 
 
-def prepare(library: ModuleType, world: World, timing: Timing, state: dict[str, Array]) -> Prepared:
+def prepare(library: ModuleType, world: World, timing: StepPlan, state: dict[str, Array]) -> Prepared:
     """What the device needs of a world.
 
     Args:
