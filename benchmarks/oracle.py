@@ -22,7 +22,7 @@ import json
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -187,19 +187,14 @@ def told(configuration: ActorConfiguration) -> ActorConfiguration:
 def survey(robot: str, seeds: range, workers: int) -> Iterator[dict[str, Any]]:
     """The search for each seed, in the order in which they are done."""
     with Workers(functools.partial(Oracle, robot), workers, "spawn") as pool:
-        for _, found in pool.each([Search(seed) for seed in seeds]):
+        for _, found in pool.spread(_search, seeds):
             yield found
 
 
-@dataclasses.dataclass(frozen=True)
-class Search:
-    """The search in the world of one seed."""
-
-    seed: int
-
-    def run(self, oracle: Oracle, /) -> dict[str, Any]:
-        """See `Oracle.search`."""
-        return oracle.search(self.seed)
+def _search(oracle: Oracle, seeds: Sequence[int], /) -> Iterator[tuple[int, dict[str, Any]]]:
+    """The searches in some of the worlds."""
+    for index, seed in enumerate(seeds):
+        yield index, oracle.search(seed)
 
 
 def by_kind(draws: list[dict[str, Any]]) -> dict[str, dict[str, int]]:

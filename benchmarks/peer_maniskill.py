@@ -1,6 +1,6 @@
-"""ManiSkill's PickCube-v1 in a process of its own, to measure against; used by `benchmarks.learning`.
+"""ManiSkill's PickCube-v1 to measure against: state observations, ``pd_joint_delta_pos``, CPU.
 
-The process keeps Vulkan, SAPIEN and torch's threads away from ours, whose workers are forked. It works only
+`Peer` is a process of its own, which keeps Vulkan, SAPIEN and torch's threads away from ours. It works only
 while it is asked.
 """
 
@@ -19,7 +19,7 @@ EPISODE = 50
 
 
 class Peer:
-    """Measures PickCube-v1: state observations, ``pd_joint_delta_pos``, CPU.
+    """Measures PickCube-v1.
 
     Attributes:
         missing: Why it does not start here; empty when it does.
@@ -36,6 +36,10 @@ class Peer:
     def steps(self, processes: int, n: int) -> float:
         """Steps per second of ``n`` random steps, whole episodes with their resets."""
         return self._ask("steps", processes, n)
+
+    def bare(self, n: int) -> float:
+        """Steps per second of ``n`` random steps in the environment itself, in no wrapper."""
+        return self._ask("bare", 0, n)
 
     def learn(self, processes: int, rollouts: int, settings: dict[str, Any]) -> float:
         """Transitions per second of stable-baselines3's PPO, rollouts and updates."""
@@ -56,24 +60,44 @@ class Peer:
         return float(value)
 
 
-def make() -> Any:
-    """One environment as gymnasium knows them, in NumPy."""
+def environment() -> Any:
+    """The environment itself, in torch, a batch of one."""
     use_software_driver()
     import gymnasium
     import mani_skill.envs  # noqa: F401
+
+    return gymnasium.make(
+        "PickCube-v1", obs_mode="state", control_mode="pd_joint_delta_pos", num_envs=1, sim_backend="cpu"
+    )
+
+
+def rates(env: Any, steps: int) -> tuple[float, float]:
+    """Steps per second of whole episodes of an `environment` with their resets, and of the steps alone."""
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, (steps, *env.action_space.shape)).astype(np.float32)
+    resetting, started = 0.0, time.perf_counter()
+    for k, action in enumerate(actions):
+        if k % EPISODE == 0:
+            begun = time.perf_counter()
+            env.reset(seed=k)
+            resetting += time.perf_counter() - begun
+        env.step(action)
+    total = time.perf_counter() - started
+    return steps / total, steps / (total - resetting)
+
+
+def make() -> Any:
+    """One environment as gymnasium knows them, in NumPy."""
     import torch
     from mani_skill.utils.wrappers.gymnasium import CPUGymWrapper
 
     torch.set_num_threads(1)
-    env = gymnasium.make(
-        "PickCube-v1", obs_mode="state", control_mode="pd_joint_delta_pos", num_envs=1, sim_backend="cpu"
-    )
-    return CPUGymWrapper(env)
+    return CPUGymWrapper(environment())
 
 
 def _serve(pipe: Any) -> None:
     try:
-        envs: dict[int, Any] = {1: _vector(1)}
+        envs: dict[int, Any] = {1: _vector(1)}  # by processes, the bare environment as of none
         pipe.send("")
     except Exception as error:  # any reason it does not start here
         pipe.send(f"{type(error).__name__}: {error}")
@@ -85,8 +109,8 @@ def _serve(pipe: Any) -> None:
             break
         try:
             if processes not in envs:
-                envs[processes] = _vector(processes)
-            work = _steps if what == "steps" else _learn
+                envs[processes] = _vector(processes) if processes else environment()
+            work = {"steps": _steps, "bare": _bare, "learn": _learn}[what]
             pipe.send(("done", work(envs[processes], *rest)))
         except Exception as error:
             pipe.send(("error", f"{type(error).__name__}: {error}"))
@@ -100,6 +124,10 @@ def _vector(processes: int) -> Any:
     if processes == 1:
         return DummyVecEnv([make])
     return SubprocVecEnv([make] * processes, start_method="spawn")
+
+
+def _bare(env: Any, n: int) -> float:
+    return rates(env, n)[0]
 
 
 def _steps(env: Any, n: int) -> float:

@@ -24,6 +24,7 @@ import numpy as np
 import py_trees
 from py_trees.common import Status
 
+from benchmarks.peer_maniskill import environment, rates
 from bt_tasksim.concept.leaf import ONE, ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.files import write_text
@@ -36,8 +37,6 @@ from bt_tasksim.trees.load import load_source
 
 PURE = ("initial_state", "begin", "violated", "maintained", "carry_out", "explain")
 """The concepts' own functions that a tick calls, besides the policy's."""
-MANISKILL_EPISODE = 50
-"""Steps of an episode of PickCube-v1, its own limit."""
 BARS = {"steps_ratio": 3.0, "outside_us": 250.0, "tick_ratio": 1.5, "help_s": 0.5}
 
 
@@ -87,7 +86,7 @@ def throughput(rounds: int, episodes: int) -> dict[str, Any]:
         total = time.perf_counter() - started
         ours.append((len(counted) / total, len(counted) / (total - sum(begins))))
         if peer is not None:
-            theirs.append(_maniskill_rate(peer, 150))
+            theirs.append(rates(peer, 150))
     out: dict[str, Any] = {
         "steps_per_s": statistics.median(a for a, _ in ours),
         "steps_alone_per_s": statistics.median(a for _, a in ours),
@@ -104,33 +103,12 @@ def throughput(rounds: int, episodes: int) -> dict[str, Any]:
 
 
 def _maniskill() -> tuple[Any, str]:
-    use_software_driver()
     try:
-        import gymnasium
-        import mani_skill.envs  # noqa: F401
-
-        env = gymnasium.make(
-            "PickCube-v1", obs_mode="state", control_mode="pd_joint_delta_pos", num_envs=1, sim_backend="cpu"
-        )
+        env = environment()
         env.reset(seed=0)
     except Exception as error:  # any reason it does not start here
         return None, f"{type(error).__name__}: {error}"
     return env, ""
-
-
-def _maniskill_rate(env: Any, steps: int) -> tuple[float, float]:
-    """Steps per second of whole episodes of 50 steps with their resets, and of the steps alone."""
-    rng = np.random.default_rng(0)
-    actions = rng.uniform(-1, 1, (steps, *env.action_space.shape)).astype(np.float32)
-    resetting, started = 0.0, time.perf_counter()
-    for k, action in enumerate(actions):
-        if k % MANISKILL_EPISODE == 0:
-            begun = time.perf_counter()
-            env.reset(seed=k)
-            resetting += time.perf_counter() - begun
-        env.step(action)
-    total = time.perf_counter() - started
-    return steps / total, steps / (total - resetting)
 
 
 def outside_physics(episodes: int, robot: str = "panda") -> dict[str, Any]:

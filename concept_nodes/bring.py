@@ -29,7 +29,7 @@ from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.facts import ObjectFacts, take_rows
-from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.core.poses import Array, array_namespace, constant, host
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Obstacle
 from bt_tasksim.planning.reference_motion import plan
@@ -153,7 +153,7 @@ class Bring(Carry):
         middle, turns = _by_neutral(seen, tool_goal)
         held, exits = poses.inverse(grip), self._exits(seen)
         arrays = (seen.tool, tool_goal, middle, held, extent, *exits)
-        start, goal, middle, held, extent, out, into = (np.asarray(values) for values in arrays)
+        start, goal, middle, held, extent, out, into = (host(values) for values in arrays)
         ways = []
         for k in range(goal.shape[0]):
             carried = Carried(seen.robot.envelope, tuple(extent[k].tolist()), held[k])
@@ -179,7 +179,7 @@ class Bring(Carry):
 def obstacles_of(seen: Seen, world: int) -> list[Obstacle]:
     """What is to be kept clear of in one world, by its row."""
     boxes = seen.world.obstacle_facts
-    there, pose, size = (np.asarray(values[world, ...]) for values in (boxes.present, boxes.pose, boxes.size))
+    there, pose, size = (host(values[world, ...]) for values in (boxes.present, boxes.pose, boxes.size))
     return [Obstacle(pose[k], tuple(size[k].tolist()), "") for k in np.flatnonzero(there).tolist()]
 
 

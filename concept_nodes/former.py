@@ -19,7 +19,7 @@ from bt_tasksim.concept_nodes import holding as held
 from bt_tasksim.core.bundles import mapped
 from bt_tasksim.core.facts import FactArrays
 from bt_tasksim.core.outcomes import PRECONDITION_UNMET, TEXT, Possible, Statement
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace, host
 from bt_tasksim.planning import reference_motion
 from bt_tasksim.planning.reference_motion import Path
 
@@ -43,8 +43,8 @@ class OneWorld:
 
 def _without(value: Any) -> Any:
     if isinstance(value, FactArrays):
-        return value.map(lambda values: np.asarray(values)[0])
-    return np.asarray(value)[0] if getattr(value, "ndim", 0) else value
+        return value.map(lambda values: host(values)[0])
+    return host(value)[0] if getattr(value, "ndim", 0) else value
 
 
 def _worlds(seen: Seen) -> list[OneWorld]:
@@ -67,7 +67,7 @@ def _initial_state(function: Callable[..., Any]) -> Callable[..., Any]:
         if isinstance(seen, OneWorld):
             return function(self, seen)
         said = tuple(str(function(self, one) or "") for one in _worlds(seen))
-        cannot = array_namespace(seen.tool).asarray([bool(text) for text in said])
+        cannot = array_namespace(seen.tool).asarray([bool(text) for text in said], device=seen.tool.device)
         return Possible(cannot, PRECONDITION_UNMET(text=said))
 
     return initial_state
@@ -78,9 +78,9 @@ def _begin(function: Callable[..., Any]) -> Callable[..., Any]:
     def begin(self: Any, seen: Any) -> Any:
         if isinstance(seen, OneWorld):
             return function(self, seen)
-        xp = array_namespace(seen.tool)
+        xp, device = array_namespace(seen.tool), seen.tool.device
         memories = [function(self, one) for one in _worlds(seen)]
-        return mapped(lambda *values: xp.asarray(np.stack([np.asarray(v) for v in values])), *memories)
+        return mapped(lambda *v: xp.asarray(np.stack([host(x) for x in v]), device=device), *memories)
 
     return begin
 
@@ -90,7 +90,7 @@ def _explain(function: Callable[..., Any]) -> Callable[..., Any]:
     def explain(self: Any, seen: Any, memory: Any) -> Any:
         if isinstance(seen, OneWorld):
             return function(self, seen, memory)
-        rows = [mapped(lambda values, k=k: np.asarray(values[k]), memory) for k in range(seen.tool.shape[0])]
+        rows = [mapped(lambda values, k=k: host(values[k, ...]), memory) for k in range(seen.tool.shape[0])]
         said = [function(self, one, row) for one, row in zip(_worlds(seen), rows, strict=True)]
         return TEXT(
             text=tuple(one.sentence if isinstance(one, Statement) else str(one or "") for one in said)
@@ -104,7 +104,7 @@ _CHANGES = {"initial_state": _initial_state, "begin": _begin, "explain": _explai
 
 def plan(waypoints: Sequence[Array], *arguments: Any, **settings: Any) -> Path:
     """See `bt_tasksim.planning.reference_motion.plan`; the path ``(n, 7)`` of one world."""
-    path = reference_motion.plan([np.asarray(w)[None] for w in waypoints], *arguments, **settings)
+    path = reference_motion.plan([host(w)[None] for w in waypoints], *arguments, **settings)
     return Path(path.table[0], path.duration[0])
 
 

@@ -241,7 +241,8 @@ def rows_alike():
     def check(function: Callable[[Any], Any], n: int) -> Any:
         whole = function(np.arange(n))
         mixed = np.random.default_rng(n).permutation(n)
-        for rows in (*np.arange(n)[:, None], mixed, mixed[: n // 2], np.arange(n)[::-1], mixed[n // 3 :]):
+        some = (mixed[:2], mixed[: n // 2], mixed[n // 3 :], mixed[:64])
+        for rows in (*np.arange(n)[:, None], mixed, np.arange(n)[::-1], *some):
             if len(rows):
                 assert same_bits(function(rows), taken(whole, rows)), f"rows {rows} differ in company"
         return whole

@@ -13,7 +13,6 @@ ALIKE = {
     "Command": "what a tick asks of the robot; a command of the command line, as Typer calls it",
     "ContactReader": "the same of two simulators",
     "Policy": "what decides in a leaf; what a limit of a robot does, in its file",
-    "Task": "what a demonstration shows; what a worker process is given to do",
     "World": "the same of two simulators",
 }
 """Names that several modules give, and to what."""

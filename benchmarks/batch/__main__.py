@@ -12,11 +12,18 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.batch import executor, kinematics, physics, same_ticks
+from benchmarks.batch import episodes, executor, kinematics, physics, same_bits, same_ticks
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
 
-SECTIONS = {"executor": executor, "kinematics": kinematics, "physics": physics, "same-ticks": same_ticks}
+SECTIONS = {
+    "executor": executor,
+    "kinematics": kinematics,
+    "physics": physics,
+    "episodes": episodes,
+    "same-ticks": same_ticks,
+    "same-bits": same_bits,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

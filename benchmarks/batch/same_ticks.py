@@ -268,12 +268,15 @@ def by_py_trees(case: Case) -> Trace:
 
 @dataclass
 class BatchedLeaf(BatchLeaf):
-    """The same leaf in all worlds at once; ``halts`` says where its tick stands still."""
+    """The same leaf in all worlds at once; ``halts`` says where its tick stands still.
+
+    ``put`` makes an array of the batch's library and device of one of NumPy's.
+    """
 
     name: str
     script: np.ndarray
     logs: list[list[str]]
-    arrays: Any
+    put: Callable[[np.ndarray], Any]
     halts: Callable[[int], np.ndarray]
     asked: np.ndarray = field(init=False)
     outcomes: dict[int, Outcome | None] = field(init=False, default_factory=dict)
@@ -315,11 +318,15 @@ class BatchedLeaf(BatchLeaf):
         return answers
 
     def _given(self, statuses: np.ndarray) -> Any:
-        return self.arrays.asarray(statuses, dtype=self.arrays.int8)
+        return self.put(statuses.astype(np.int8, copy=False))
 
 
 def by_executor(
-    case: Case, xp: Any = np, standing: float = 0.0, know: Callable[[str], bool] | None = None
+    case: Case,
+    xp: Any = np,
+    standing: float = 0.0,
+    know: Callable[[str], bool] | None = None,
+    device: Any = None,
 ) -> Trace:
     """What the executor does: worlds are ticked with others that are elsewhere in their episodes.
 
@@ -328,6 +335,7 @@ def by_executor(
         xp: The array library.
         standing: How often the tick of a leaf stands still, for others to go on meanwhile.
         know: Whether it knows a leaf; the others are ticked world by world.
+        device: One of the library's devices; None: its default.
     """
     rng = np.random.default_rng(case.seed)
     worlds, ticks = case.anew.shape
@@ -342,7 +350,7 @@ def by_executor(
         name = type(node).__name__
         if know is not None and not know(name):
             return None
-        return BatchedLeaf(name, case.outcomes[k], logs, batch_xp, lambda n: rng.random(n) < standing)
+        return BatchedLeaf(name, case.outcomes[k], logs, put, lambda n: rng.random(n) < standing)
 
     def copy() -> Behaviour:
         tree = build(case.shape)
@@ -351,14 +359,16 @@ def by_executor(
         copies.append(tree)
         return tree
 
-    batch_xp = Arrays(1, xp).xp
-    tree = BatchTree(build(case.shape), worlds, leaf, build=copy, contexts=contexts.__getitem__, xp=xp)
+    put = partial(Arrays(1, xp).xp.asarray, device=device)
+    tree = BatchTree(
+        build(case.shape), worlds, leaf, build=copy, contexts=contexts.__getitem__, xp=xp, device=device
+    )
     out: Trace = [[] for _ in range(worlds)]
     done, now = np.zeros(worlds, int), np.zeros(worlds)
     waits = np.zeros(worlds, bool)
 
     def rows_of(numbers: np.ndarray) -> Any:
-        return batch_xp.asarray(numbers, dtype=batch_xp.int64)
+        return put(numbers.astype(np.int64, copy=False))
 
     def took(numbers: np.ndarray, found: Any) -> None:
         status = tree.status
@@ -383,7 +393,7 @@ def by_executor(
             now[anew] = 0.0
             for world in free:
                 contexts[world].times = now[[world]]
-            took(free, tree.tick(rows_of(free), batch_xp.asarray(now[free])))
+            took(free, tree.tick(rows_of(free), put(now[free])))
         stand = np.flatnonzero(waits)
         stand = rng.permutation(stand[rng.random(len(stand)) < rng.choice([0.5, 1.0])])
         if len(stand):

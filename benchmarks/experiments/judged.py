@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -17,9 +17,9 @@ from bt_tasksim.policy.library import find_policy
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import PROGRAMMED, Action, LearnedPolicy, Policy, ProgrammedPolicy
 from bt_tasksim.scene.scene import Scene
+from bt_tasksim.training.collectors import countable
 from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.evaluation_outcomes import wilson
-from bt_tasksim.training.rollouts import _kind
 
 STREAM = "evaluation"
 
@@ -86,19 +86,14 @@ def judge(
         finally:
             env.close()
     with Workers(lambda: (_env(case, stream), load(case.policy)), workers) as pool:
-        found = dict(pool.each([DrawTask(seed) for seed in seeds]))
+        found = dict(pool.spread(_episodes, seeds))
     return [found[k] for k in range(len(seeds))]
 
 
-@dataclass(frozen=True)
-class DrawTask:
-    """One draw, for a worker that keeps an environment and a policy."""
-
-    seed: int
-
-    def run(self, kept: tuple[EpisodeEnv, Policy], /) -> Draw:
-        """See `episode`."""
-        return episode(*kept, self.seed)
+def _episodes(kept: tuple[EpisodeEnv, Policy], seeds: Sequence[int], /) -> Iterator[tuple[int, Draw]]:
+    """Some of the draws, for a worker that keeps an environment and a policy."""
+    for index, seed in enumerate(seeds):
+        yield index, episode(*kept, seed)
 
 
 def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
@@ -122,7 +117,7 @@ def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
             hidden = env.runner.context.hidden()
             force = 0.0 if hidden is None else float(hidden.hand_force[0, 0])
             done = info["status"] == "SUCCESS"
-            return Draw(seed, bool(info["is_success"]), done, _kind(info), info["why"], decisions, force)
+            return Draw(seed, bool(info["is_success"]), done, countable(info), info["why"], decisions, force)
 
 
 def load(name: str) -> Policy:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim.core.bundles import mapped, parts
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, host
 
 TOLERANCE = 1e-6
 """Difference of two numbers, in double precision, up to which they count as the same."""
@@ -25,9 +25,7 @@ def joined(bundles: Sequence[Any]) -> Any:
 
 def numbers(value: Any) -> Array:
     """An answer as a NumPy array."""
-    if is_tensor(value):
-        return value.detach().cpu().numpy()
-    return np.asarray(getattr(value, "_array", value))
+    return host(value.detach() if is_tensor(value) else value)
 
 
 def is_array(value: Any) -> bool:

@@ -30,7 +30,7 @@ from bt_tasksim.core.outcomes import (
     Outcome,
     Statement,
 )
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace, host
 from bt_tasksim.policy.policy import Action
 
 LOST_TICKS = 3
@@ -132,10 +132,10 @@ class Activation:
         model, context, statuses = self._model, self._context, judged.statuses
         if not len(judged.rows):
             return statuses
-        nearer = self._nearer[judged.rows] + np.asarray(action.terminate)
+        nearer = self._nearer[judged.rows] + host(action.terminate)
         self._nearer[judged.rows] = nearer
         done = nearer >= 1.0
-        late = ~done & (np.asarray(judged.seen.elapsed) > model.timeout)
+        late = ~done & (host(judged.seen.elapsed) > model.timeout)
         ended = done | late
         if ended.any():
             positions = np.flatnonzero(ended)
@@ -179,7 +179,7 @@ class Activation:
         self._started[begins] = context.times[begins]
         seen = self.seen(begins)
         unmet = sequence_of(model.initial_state(seen), type(model).__name__)
-        cannot = np.asarray(any_of(seen.tool, unmet))
+        cannot = host(any_of(seen.tool, unmet))
         if cannot.any():
             for k in np.flatnonzero(cannot).tolist():
                 why = first_of(unmet, k)
@@ -214,14 +214,14 @@ class Activation:
     def _kept(self, rows: Array, judged: Judged) -> Judged:
         """Those of them in which no limit is exceeded and no goal lost."""
         model, context, seen = self._model, self._context, judged.seen
-        broken = np.asarray(model.violated(seen, judged.memory))
+        broken = host(model.violated(seen, judged.memory))
         lost = np.zeros(len(judged.rows), bool)
         missing = np.zeros(len(judged.rows), bool)
         for goal in model.maintains:
             held = context.reached(goal, model.actor, judged.rows)
             if not held.any():
                 continue
-            gone = held & ~np.asarray(model.maintained(goal, seen, judged.memory)) & ~missing & ~broken
+            gone = held & ~host(model.maintained(goal, seen, judged.memory)) & ~missing & ~broken
             missing |= gone
             over = gone & (self._lost[judged.rows] + 1 >= LOST_TICKS)
             for k in np.flatnonzero(over).tolist():
@@ -252,7 +252,7 @@ class Activation:
     def _say_end(self, ends: Judged, done: Array) -> None:
         """How it ended where it was done, or late."""
         said = as_statement(self._model.explain(ends.seen, ends.memory))
-        elapsed = np.asarray(ends.seen.elapsed).tolist()
+        elapsed = host(ends.seen.elapsed).tolist()
         for k, row in enumerate(ends.rows.tolist()):
             measured = None if said is None else said.at(k)
             if done[k]:

@@ -12,7 +12,7 @@ from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.batch_leaf import FAILURE, PENDING, SUCCESS, BatchLeaf
 from bt_tasksim.core.outcomes import Outcome
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, host
 from bt_tasksim.policy.policy import Action
 
 
@@ -39,7 +39,7 @@ class ConceptInBatch(BatchLeaf):
             return judged.statuses
         if not leaf.under_training:
             return activation.act(judged, leaf.policy_in_use.act(leaf.model, judged.seen, judged.memory))
-        due = np.asarray(leaf.model.decides(judged.seen, judged.memory))
+        due = host(leaf.model.decides(judged.seen, judged.memory))
         if not due.all():
             free = judged.at(np.flatnonzero(~due))
             activation.act(free, no_action(free, leaf.model.actions))
@@ -79,7 +79,7 @@ class ConditionInBatch(BatchLeaf):
     def tick(self, rows: Array, fresh: Array) -> Array:
         """See `BatchLeaf.tick`."""
         seen = self._context.seen(rows, np.zeros(len(rows)))
-        holds = np.asarray(self._leaf.model.holds(seen))
+        holds = host(self._leaf.model.holds(seen))
         self._answers.update((row, (seen, holds, k)) for k, row in enumerate(rows.tolist()))
         return np.where(holds, SUCCESS, FAILURE).astype(np.int8)
 

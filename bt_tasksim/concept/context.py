@@ -19,7 +19,7 @@ from bt_tasksim.core.errors import CommandConflictError, LeafError
 from bt_tasksim.core.facts import FactsTable, WorldFacts
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.plain import shown
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace, host
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.robot.description import RobotDescription
 
@@ -263,7 +263,7 @@ class _Part:
             return None
         xp = array_namespace(self._values)
         finite = xp.all(xp.isfinite(self._values), axis=-1)
-        for world in np.flatnonzero(np.asarray(~finite) & (self._by != NOBODY)).tolist():
+        for world in np.flatnonzero(host(~finite) & (self._by != NOBODY)).tolist():
             leaf = self._leaves[int(self._by[world])]
             raise LeafError(
                 f"leaf '{leaf.name}' commands a {self._name} target that is not finite: {self._values[world]}"

@@ -11,35 +11,18 @@ import traceback
 from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from bt_tasksim.core.culprit import users_place
 from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
 
 StateT = TypeVar("StateT")
-StateT_contra = TypeVar("StateT_contra", contravariant=True)
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
-ResultT_co = TypeVar("ResultT_co", covariant=True)
 
 Work = Callable[[StateT, Sequence[ItemT]], Iterator[tuple[int, ResultT]]]
 """What is done with what a member keeps and a share of the items: gives the index of each item and its result
 as they are done, in any order. It is pickled, and so are items and results."""
-
-
-class Task(Protocol[StateT_contra, ResultT_co]):
-    """What a worker is to do; it is pickled, and so is its result."""
-
-    def run(self, state: StateT_contra, /) -> ResultT_co:
-        """Do it with what the worker keeps."""
-
-
-def one_by_one(
-    state: StateT_contra, tasks: Sequence[Task[StateT_contra, ResultT]], /
-) -> Iterator[tuple[int, ResultT]]:
-    """Do tasks one after the other."""
-    for index, task in enumerate(tasks):
-        yield index, task.run(state)
 
 
 class Fleet(ABC, Generic[StateT]):
@@ -67,10 +50,6 @@ class Fleet(ABC, Generic[StateT]):
             InputError: A user's own code raised in a member; says where.
             MachineError: A member ended and could not be made up for, or something else was raised in it.
         """
-
-    def each(self, tasks: Sequence[Task[StateT, ResultT]]) -> Iterator[tuple[int, ResultT]]:
-        """The tasks' numbers and results, see `spread`."""
-        return self.spread(one_by_one, tasks)
 
     def close(self, patience: float = 2.0) -> None:  # not every one has members to end
         """End the members.

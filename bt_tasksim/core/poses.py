@@ -68,6 +68,20 @@ def constant(value: Any, like: Array) -> Array:
     return array_namespace(like).asarray(value, dtype=like.dtype, device=like.device)
 
 
+def host(array: Array) -> np.ndarray:
+    """An array, or a number, in NumPy's form, wherever it is; what is not NumPy's may be a view."""
+    if isinstance(array, np.ndarray):
+        return array
+    try:
+        return np.asarray(array)
+    except (TypeError, RuntimeError, ValueError):  # it is on another device
+        pass
+    try:
+        return np.from_dlpack(array)
+    except (BufferError, RuntimeError, ValueError):  # and NumPy cannot look into that one's memory
+        return np.from_dlpack(array_api_compat.to_device(array, "cpu"))
+
+
 def clip(x: Array, low: Any, high: Any) -> Array:
     """``x (...)`` between bounds that broadcast against it."""
     xp = array_namespace(x)
@@ -233,7 +247,7 @@ def interpolate(a: Array, b: Array, fraction: Array) -> Array:
         fraction: ``(...)``, usually in [0, 1].
     """
     xp = array_namespace(a, b)
-    share = xp.asarray(fraction, dtype=a.dtype)[..., None]
+    share = constant(fraction, a)[..., None]
     turn = rotation_vector(quat_multiply(quat_conjugate(a[..., 3:]), b[..., 3:]))
     rotation = quat_multiply(a[..., 3:], from_rotation_vector(share * turn))
     position = a[..., :3] + share * (b[..., :3] - a[..., :3])
@@ -292,7 +306,7 @@ def to_matrix(q: Array) -> Array:
     """Rotation matrices ``(..., 3, 3)`` of unit quaternions ``(..., 4)``."""
     xp = array_namespace(q)
     axes = constant(_AXES, q)
-    return xp.stack([rotate(q, axes[i]) for i in range(3)], axis=-1)
+    return xp.stack([rotate(q, axes[i, :]) for i in range(3)], axis=-1)
 
 
 def shifted(pose: Array, by: Array) -> Array:

@@ -91,6 +91,7 @@ class BatchTree:
         self._enter, self._leave = [0] * len(self.nodes), [0] * len(self.nodes)
         self._resume: dict[int, int] = {}
         self._listeners: dict[int, tuple[int, Callable[[Array], None]]] = {}
+        self._watchers: dict[int, Callable[[Array, Array], Array | None]] = {}
         self._at: tuple[int, Array] | None = None
         children, self._ends = _shape(tree)
         self.compiled: dict[int, BatchNode | BatchLeaf] = {}
@@ -159,6 +160,26 @@ class BatchTree:
                 self._waiting -= len(there)
         self.stop_node(0, rows)
 
+    def watch(self, node: int, callback: Callable[[Array, Array], Array | None]) -> None:
+        """Be told whenever a node ends its tick in some worlds.
+
+        Of several watched nodes, those that a world's tick visits first are told first.
+
+        Args:
+            node: The node, by number.
+            callback: Takes worlds ``(k,)`` and the statuses ``(k,)`` that the node has there now. Gives
+                booleans ``(k,)``, or None for all: where the tick goes on. Elsewhere it is broken off where
+                it stands, and `reset` comes next.
+
+        Raises:
+            InputError: It stands below a node that is ticked world by world.
+        """
+        if node not in self.compiled:
+            raise InputError(
+                f"'{self.nodes[node].name}' cannot be watched: a node above it has no form for many worlds"
+            )
+        self._watchers[node] = callback
+
     def speaker(self, row: int) -> Behaviour | None:
         """The node that made the tree fail in a world: the one that was decided last, with words to say."""
         found = self.reasons.speaker(0, row)
@@ -183,7 +204,19 @@ class BatchTree:
             if len(invalid):
                 self.stop_node(node, rows[invalid])
         self._status_of[node][rows] = status
+        if node in self._watchers:
+            rows, status = self._watched(node, rows, status)
+            if not len(rows):
+                return
         self._send(self._leave[node], (rows, status))
+
+    def _watched(self, node: int, rows: Array, status: Array) -> tuple[Array, Array]:
+        """The worlds in which a tick goes on after a watched node has ended, and its statuses there."""
+        going = self._watchers[node](rows, status)
+        if going is None:
+            return rows, status
+        on = self.arrays.where(going)
+        return rows[on], status[on]
 
     def stop_node(self, node: int, rows: Array) -> None:
         """Stop a node and all below it; for nodes, see `trees.nodes.batch.Batch`."""
@@ -274,6 +307,10 @@ class BatchTree:
             if not len(rows):
                 return
         self._status_of[node][rows] = status
+        if node in self._watchers:
+            rows, status = self._watched(node, rows, status)
+            if not len(rows):
+                return
         self._handlers[self._leave[node]](rows, status)
 
     def _compile(

@@ -101,7 +101,7 @@ class LearnedPolicy:
     def act(self, model: Decidable[ViewT], seen: ViewT, memory: Any) -> Action:
         """See `Policy.act`; where the concept takes no decision, its reference motion goes on."""
         xp = array_namespace(seen.tool)
-        decides = xp.asarray(model.decides(seen, memory))
+        decides = xp.asarray(model.decides(seen, memory), device=seen.tool.device)
         if not bool(xp.any(decides)):
             still = xp.zeros_like(seen.tool[..., 0])
             return Action(xp.broadcast_to(still[..., None], (*still.shape, model.actions)), still)

@@ -22,6 +22,7 @@ from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.episodes import Episode
 from bt_tasksim.training.reward import Reward
+from bt_tasksim.training.reward_parts import Decided
 from bt_tasksim.training.transitions import Transitions
 from bt_tasksim.trees.nodes.train import Train, concepts_in, train_nodes
 
@@ -93,9 +94,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         self.reward = reward or Reward()
         self.stream, self.stage, self.render_mode = stream, stage, render_mode
         self.layout = shared_layout(self.train, self.learners, self.runner.robot)
-        n, m = sum(self.layout.values()), self.learners[0].model.actions
-        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (n,), np.float32)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (m + 1,), np.float32)
+        m = self.learners[0].model.actions
+        self.observation_space, self.action_space = spaces_of(self.layout, m)
         self._action_shape = (m + 1,)
         self.redrawn = 0
         """Draws so far in which the subtree was never active."""
@@ -134,10 +134,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             redrawn += 1
             if redrawn >= REDRAWS or given is not None:
                 leaf = speaker(self.tree)
-                raise InputError(
-                    f"'{self.train.name}' was not reached in {redrawn} draws; the last one (seed {draw}) "
-                    f"ended with {self.tree.status.name}: {leaf.feedback_message if leaf is not None else ''}"
-                )
+                why = leaf.feedback_message if leaf is not None else ""
+                raise not_reached(self.train.name, redrawn, draw, self.tree.status.name, why)
         self.redrawn += redrawn
         self._transitions = Transitions(decision, self.reward.gamma)
         return self._features(decision), {"draw": draw, "redrawn": redrawn}
@@ -200,16 +198,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         ending = episode.ending(self.reward.sufficient)
         parts = self.reward.pay(transitions.to_end(ending.end, ending.kept))
         self.discarded += ending.discarded
-        info = {
-            "reward": parts,
-            "is_success": ending.is_success,
-            "status": ending.status,
-            "follower": "" if ending.judged is None else ending.judged.status,
-            "reason": "" if ending.outcome is None else ending.outcome.cause.reason.name,
-            "why": "" if ending.outcome is None else ending.outcome.sentence,
-            "discarded": ending.discarded,
-            "seconds": ending.seconds,
-        }
+        info = ending.info(parts)
         features = self._features(transitions.decision)
         self._drop()
         return features, sum(parts.values()), not ending.truncated, ending.truncated, info
@@ -220,7 +209,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             self._episode.close()
             self._episode = self._transitions = None
 
-    def _features(self, decision: Decision) -> Array:
+    def _features(self, decision: Decided) -> Array:
         """What the leaf sees."""
         model = decision.leaf.model
         found = np.asarray(model.features(decision.seen, decision.memory)[0], np.float32)
@@ -230,6 +219,34 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
                 f"{self.observation_space.shape}"
             )
         return found
+
+
+def not_reached(train: str, redrawn: int, draw: int, status: str, why: str) -> InputError:
+    """Says that a Train node was never active.
+
+    Args:
+        train: Its name.
+        redrawn: In how many draws.
+        draw: The last one.
+        status: Status of the tree at the end of that.
+        why: What the tree says.
+    """
+    return InputError(
+        f"'{train}' was not reached in {redrawn} draws; the last one (seed {draw}) ended with {status}: {why}"
+    )
+
+
+def spaces_of(layout: Mapping[str, int], actions: int) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:
+    """What is observed, and what is decided: a motion, and last the completion signal.
+
+    Args:
+        layout: Sizes of the parts of the features, by name.
+        actions: Size of the motion.
+    """
+    return (
+        gymnasium.spaces.Box(-np.inf, np.inf, (sum(layout.values()),), np.float32),
+        gymnasium.spaces.Box(-1.0, 1.0, (actions + 1,), np.float32),
+    )
 
 
 def find_train(tree: Behaviour, name: str | None = None) -> Train:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -64,6 +65,61 @@ class Ending:
         """An error spoiled the judgement."""
         return self.judged is not None and self.judged.discarded
 
+    def info(self, paid: dict[str, float]) -> dict[str, Any]:
+        """What gymnasium's ``info`` says of an episode's last step.
+
+        Args:
+            paid: What it paid, by part.
+        """
+        return {
+            "reward": paid,
+            "is_success": self.is_success,
+            "status": self.status,
+            "follower": "" if self.judged is None else self.judged.status,
+            "reason": "" if self.outcome is None else self.outcome.cause.reason.name,
+            "why": "" if self.outcome is None else self.outcome.sentence,
+            "discarded": self.discarded,
+            "seconds": self.seconds,
+        }
+
+
+def ending_of(
+    cut: Outcome | None,
+    judged: SignalOutcome | None,
+    outcome: Outcome | None,
+    said: Outcome | None,
+    sufficient: bool,
+    status: str,
+    seconds: float,
+) -> Ending:
+    """How an episode ended.
+
+    Args:
+        cut: What broke it off; None: nothing did.
+        judged: What became of the completion signal; None without one.
+        outcome: How the leaf ended that decided last; None where it runs, or says nothing.
+        said: What the node says that made the subtree fail.
+        sufficient: What follows pays.
+        status: Status of the subtree.
+        seconds: Simulated time since the world was drawn.
+    """
+    end: End = "cut"
+    truncated = False
+    if cut is not None:
+        outcome, truncated = cut, cut.is_a(TIME_OVER)
+    elif judged is not None:
+        outcome, truncated = judged.outcome, judged.discarded
+        if not judged.discarded and sufficient:
+            end = "success" if judged.success else "failure"
+    elif outcome is not None and outcome.is_a(LIMIT_VIOLATED):
+        end = "violated"
+    elif outcome is not None and outcome.is_a(TIMED_OUT):
+        end = "timeout"
+    else:
+        outcome, end = said or outcome, "failure"
+    kept = truncated or (judged is not None and (judged.success or not sufficient))
+    return Ending(end, outcome, truncated, kept, judged, status, seconds)
+
 
 class Episode:
     """Drives a tree from decision to decision; everything that is true of one episode alone is here.
@@ -103,31 +159,15 @@ class Episode:
         Args:
             sufficient: What follows pays.
         """
-        judged, truncated = self._judged, False
-        end: End = "cut"
-        outcome = None if self._last is None else self._last.leaf.outcome
-        if self._cut is not None:
-            outcome, truncated = self._cut, self._cut.is_a(TIME_OVER)
-        elif judged is not None:
-            outcome, truncated = judged.outcome, judged.discarded
-            if not judged.discarded and sufficient:
-                end = "success" if judged.success else "failure"
-        elif outcome is not None and outcome.is_a(LIMIT_VIOLATED):
-            end = "violated"
-        elif outcome is not None and outcome.is_a(TIMED_OUT):
-            end = "timeout"
-        else:
-            failed = speaker(self._train)
-            outcome = (outcome_of(failed) if failed is not None else None) or outcome
-            end = "failure"
-        return Ending(
-            end=end,
-            outcome=outcome,
-            truncated=truncated,
-            kept=truncated or (judged is not None and (judged.success or not sufficient)),
-            judged=judged,
-            status=self._train.status.name,
-            seconds=self._runner.context.now,
+        failed = speaker(self._train)
+        return ending_of(
+            self._cut,
+            self._judged,
+            None if self._last is None else self._last.leaf.outcome,
+            None if failed is None else outcome_of(failed),
+            sufficient,
+            self._train.status.name,
+            self._runner.context.now,
         )
 
     def close(self) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Self
@@ -17,29 +17,26 @@ from typing import Self
 from py_trees.common import Status
 
 from bt_tasksim.concept.plugins import load_all
-from bt_tasksim.core.cluster import Cluster, check_address
+from bt_tasksim.core.cluster import Cluster
 from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
 from bt_tasksim.core.fleet import Fleet, Here
 from bt_tasksim.core.identity import identity
 from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import outcome_of_error
-from bt_tasksim.core.plugins import load_plugin, loaded
+from bt_tasksim.core.plugins import loaded
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import Runner
-from bt_tasksim.execution.worlds import WORLD_MEMORY, check_memory, most_worlds, why_alone
+from bt_tasksim.execution.worlds import check_memory, most_worlds, why_alone
 from bt_tasksim.scene.configuration import check_seed
 from bt_tasksim.training.evaluation_file import EvaluationFile, KeptEvaluation
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
+from bt_tasksim.training.on_cluster import actor_memory, check_cluster
 
 SHARE = 16
 """Episodes that a member of a fleet takes at a time; a lost one loses the one that it was at."""
-MEMORY = 500_000_000
-"""Bytes that are reserved for an actor of a cluster, without its worlds; 350 MB were measured with one."""
-MEMORY_WITH_PICTURES = 900_000_000
-"""The same where pictures are drawn; 680 MB were measured."""
 BATCH = 64
 """Worlds that run at once, unless somebody says otherwise."""
 SHARES = 8
@@ -57,7 +54,8 @@ class Job:
         options: Which engines.
         policies: Concepts and the policies that their leaves take, whatever the tree itself says.
         plugins: Plugins that the process loads first, by default those of this process.
-        batch: How many worlds are run at once in each process. Outcomes do not depend on it.
+        batch: How many worlds are run at once in each process, by default `usual_batch`. Outcomes do not
+            depend on it.
         threads: How many threads step them.
 
     Raises:
@@ -70,15 +68,14 @@ class Job:
     options: EngineOptions = field(default_factory=EngineOptions)
     policies: tuple[tuple[str, str], ...] = ()
     plugins: tuple[str, ...] = field(default_factory=loaded)
-    batch: int = 1
+    batch: int | None = None
     threads: int = 1
 
     def __post_init__(self) -> None:
-        if self.batch < 1 or self.threads < 1:
-            raise InputError(
-                f"a batch has one world and one thread at least, found {self.batch}, {self.threads}"
-            )
-        if self.batch > 1 and (alone := why_alone(self.options)):
+        batch = 1 if self.batch is None else self.batch
+        if batch < 1 or self.threads < 1:
+            raise InputError(f"a batch has one world and one thread at least, found {batch}, {self.threads}")
+        if batch > 1 and (alone := why_alone(self.options)):
             raise InputError(f"these episodes cannot be run in a batch: {alone}")
 
 
@@ -152,15 +149,15 @@ def evaluate(
     if workers is not None and workers > 1 and job.options.remote:
         raise InputError("an engine in another process serves one client at a time: evaluate with 1 worker")
     if cluster is not None:
-        if job.options.remote:
-            raise InputError("an engine in another process serves one client at a time: leave --cluster away")
-        check_address(cluster)
+        check_cluster(cluster, job.options)
     for seed in seeds:
         check_seed(seed)
     started = time.perf_counter() - (kept.seconds if kept is not None else 0.0)
     versions = identity()  # before anybody edits a file
+    batch = usual_batch(job.options, 1 if cluster else workers or 1) if job.batch is None else job.batch
+    job = replace(job, batch=batch)
     if cluster is None:
-        check_memory(job.batch * (workers or 1))
+        check_memory(batch * (workers or 1))
     player = Player(job)  # errors show here, before any process starts
     runner = player.runner
     with player:
@@ -198,8 +195,8 @@ def evaluate(
                     progress(outcome)
             with terminable():
                 if todo:
-                    with _fleet(job, player, subject, workers, cluster, len(todo)) as fleet:
-                        share = max(SHARE, SHARES * job.batch)
+                    with _fleet(job, batch, player, subject, workers, cluster, len(todo)) as fleet:
+                        share = max(SHARE, SHARES * batch)
                         for _, outcome in fleet.spread(partial(play, stream=stream), todo, share):
                             ended(outcome)
             if keep is not None:
@@ -221,15 +218,20 @@ def evaluate(
 
 
 def _fleet(
-    job: Job, player: Player, subject: dict[str, str], workers: int | None, cluster: str | None, most: int
+    job: Job,
+    batch: int,
+    player: Player,
+    subject: dict[str, str],
+    workers: int | None,
+    cluster: str | None,
+    most: int,
 ) -> Fleet[Player]:
     """What runs the episodes, of which there are so many."""
     make = partial(_same_player, job, subject)
     count = None if workers is None else min(workers, most)
     if cluster is not None:
         drawn = player.runner.pipeline.rendering is not None
-        alone = MEMORY_WITH_PICTURES if drawn else MEMORY
-        return Cluster(make, cluster, count, alone + job.batch * WORLD_MEMORY)
+        return Cluster(make, cluster, count, actor_memory(batch, drawn))
     if count in (None, 1):
         return Here(player)
     return Workers(make, count, "spawn")
@@ -291,13 +293,14 @@ class Player:
             LostEngine: An engine in another process has gone away.
             MachineError: A robot has failed.
         """
-        if self._job.batch == 1 or len(seeds) == 1:
+        batch = usual_batch(self._job.options) if self._job.batch is None else self._job.batch
+        if batch == 1 or len(seeds) == 1:
             for index, seed in enumerate(seeds):
                 yield index, episode(self.runner, seed, stream)
             return
         if self._batch is None:
             job, scene = self._job, self.runner.scene
-            worlds = min(job.batch, len(seeds))
+            worlds = min(batch, len(seeds))
             self._batch = BatchRunner(self._build, scene, job.options, worlds, job.threads)
         index_of = {seed: index for index, seed in enumerate(seeds)}
         for seed, found in self._batch.run(seeds, stream):
@@ -356,12 +359,9 @@ def _outcome(result: Result) -> EpisodeOutcome:
 
 
 def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
-    from bt_tasksim.training.subject import evaluation_subject
+    from bt_tasksim.training.subject import code_files, evaluation_subject
 
-    files = {plugin: getattr(load_plugin(plugin), "__file__", None) for plugin in job.plugins}
-    code = {f"plugin {Path(plugin).name}": file for plugin, file in files.items() if file is not None}
-    if job.tree.endswith(".py"):
-        code["tree"] = job.tree
+    code = code_files(job.tree, job.plugins)
     return evaluation_subject(runner.tree, runner.scene, job.options, _policies(runner), code, stream)
 
 

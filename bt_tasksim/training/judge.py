@@ -105,16 +105,44 @@ class Judgement:
         return None
 
     def _judged_by(self, node: Behaviour) -> SignalOutcome:
-        name = "" if self.follower is None else node.status.name
-        hidden = self._context.hidden()
+        status = "" if self.follower is None else node.status.name
         if node.status == Status.FAILURE:
-            outcome = _failed(node) or FOLLOWER_FAILED(node=node.name)
-            return SignalOutcome(False, name, outcome, discarded=outcome.is_a(OUT_OF_REACH))
-        if self._cost >= self.tolerance:
-            return SignalOutcome(False, name, self._missed, cost=self._cost)
-        if hidden is not None and float(hidden.penetration[0]) > DEEPEST:
-            return SignalOutcome(False, name, PENETRATION(depth=hidden.penetration[0]), cost=self._cost)
-        return SignalOutcome(True, name, FOLLOWED(node=node.name), cost=self._cost)
+            return judged_failed(node.name, status, _failed(node))
+        hidden = self._context.hidden()
+        depth = None if hidden is None else float(hidden.penetration[0])
+        missed = self._missed if self._cost >= self.tolerance else None
+        return judged_done(node.name, status, self._cost, missed, depth)
+
+
+def judged_failed(node: str, status: str, why: Outcome | None) -> SignalOutcome:
+    """What judges a completion signal has failed: the signal was wrong, or nobody can say.
+
+    Args:
+        node: Its name.
+        status: Its status; empty where nothing follows.
+        why: What it says; None where it says nothing.
+    """
+    outcome = why or FOLLOWER_FAILED(node=node)
+    return SignalOutcome(False, status, outcome, discarded=outcome.is_a(OUT_OF_REACH))
+
+
+def judged_done(
+    node: str, status: str, cost: float, missed: Outcome | None, depth: float | None
+) -> SignalOutcome:
+    """What judges a completion signal has succeeded: the hidden state has the last word.
+
+    Args:
+        node: Its name.
+        status: Its status; empty where nothing follows.
+        cost: Largest sufficient cost of what succeeded.
+        missed: The goal that was missed by more than is tolerable; None: none was.
+        depth: Deepest overlap of two bodies, metres; None where nobody knows it.
+    """
+    if missed is not None:
+        return SignalOutcome(False, status, missed, cost=cost)
+    if depth is not None and depth > DEEPEST:
+        return SignalOutcome(False, status, PENETRATION(depth=depth), cost=cost)
+    return SignalOutcome(True, status, FOLLOWED(node=node), cost=cost)
 
 
 def _failed(root: Behaviour) -> Outcome | None:

@@ -17,8 +17,8 @@ from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
+from bt_tasksim.training.collectors import EnvironmentRollout
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.rollouts import EnvironmentRollout
 
 
 class _Spaces(gymnasium.Env[Array, Array]):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import logging
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
@@ -14,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.core.cluster import Cluster
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
+from bt_tasksim.core.fleet import Fleet, Here
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.pipelines import EngineOptions
@@ -32,15 +35,22 @@ from bt_tasksim.training.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
+from bt_tasksim.training.collectors import DrawResult, DrawTask, EnvironmentRollout, RolloutTask
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.env import EpisodeEnv, shared_layout
+from bt_tasksim.training.env import shared_layout
+from bt_tasksim.training.episode_batch import why_alone_in
+from bt_tasksim.training.keepers import Keeper, KeeperElsewhere, Keeping
+from bt_tasksim.training.named_tree import NamedTree
+from bt_tasksim.training.on_cluster import actor_memory
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
-from bt_tasksim.training.rollouts import DrawTask, EnvironmentRollout, RolloutTask
+from bt_tasksim.training.rollouts import results
 from bt_tasksim.training.subject import training_subject
 from bt_tasksim.trees.nodes.train import Train
 
 if TYPE_CHECKING:
     from bt_tasksim.training.learner import Learner
+
+LOG = logging.getLogger(__name__)
 
 WARM_UP = 64
 """Decisions of each environment before the first rollout, from which features are normalised."""
@@ -54,8 +64,10 @@ class TrainingTask:
         tree: The tree.
         scene: The scene, with its stages.
         options: Engines.
-        workers: Worker processes.
+        workers: Processes, each with a batch of worlds; one is this process itself. Or actors of a cluster.
         name: Name of the tree in the cards.
+        cluster: Address of a cluster.
+        source: Where its actors find tree and scene.
     """
 
     tree: Behaviour
@@ -63,6 +75,8 @@ class TrainingTask:
     options: EngineOptions
     workers: int
     name: str
+    cluster: str | None = None
+    source: NamedTree | None = None
 
 
 class NodeTraining:
@@ -113,20 +127,35 @@ class NodeTraining:
                 f"there is a training in '{self.folder}' already: go on with --resume, or remove the folder"
             )
 
-        def make() -> EpisodeEnv:
-            task, reward = self.task, self.config.reward
-            return EpisodeEnv(
-                task.tree, task.scene, self.node.name, task.options, reward, policies=self.trained
-            )
+        task, reward = self.task, self.config.reward
+        members = min(task.workers, self.config.n_envs)
+        alone = why_alone_in(task.tree, task.scene, task.options)
+        worlds = 0 if alone else -(-self.config.n_envs // members)
+        keeping = Keeping(self.node.name, task.options, reward, self.trained, worlds)
 
-        pool = Workers(make, self.task.workers)  # before torch starts threads of its own
+        def make() -> Keeper:
+            return keeping.keeper(task.tree, task.scene)
+
+        if alone:
+            LOG.warning("the episodes run one by one: %s", alone)
+        self._members = members
+        if task.cluster is not None and task.source is not None:
+            elsewhere = KeeperElsewhere.of(keeping, task.source, task.tree, task.scene)
+            pictures = task.options.rendering or task.options.perception != "state"
+            memory = actor_memory(max(1, worlds), pictures)
+            with Cluster(elsewhere, task.cluster, members, memory) as actors:
+                return self._learn(actors, resume, report)
+        if members > 1:  # before torch starts threads of its own
+            with Workers(make, members) as pool:
+                return self._learn(pool, resume, report)
+        kept = make()
         try:
-            return self._learn(pool, resume, report)
+            return self._learn(Here(kept), resume, report)
         finally:
-            pool.close()
+            kept.close()
 
     def _learn(
-        self, pool: Workers[EpisodeEnv], resume: bool, report: Callable[[Progress], None] | None
+        self, pool: Fleet[Keeper], resume: bool, report: Callable[[Progress], None] | None
     ) -> LearnedPolicy:
         import gymnasium
         import torch
@@ -187,7 +216,7 @@ class NodeTraining:
     # ---- one rollout ------------------------------------------------------------------------------------
 
     def _collect(
-        self, pool: Workers[EpisodeEnv], learner: Learner, decisions: int, warm: bool = False
+        self, pool: Fleet[Keeper], learner: Learner, decisions: int, warm: bool = False
     ) -> list[EnvironmentRollout]:
         arrays, std = learner.network.arrays(), learner.std
         stage = self.stage if self.task.scene.stages else None
@@ -195,18 +224,17 @@ class NodeTraining:
             RolloutTask(arrays, std, (self.config.seed, int(warm), self.iteration, k), decisions, stage)
             for k in range(self.config.n_envs)
         ]
-        found = dict(pool.each(tasks))
-        return [found[k] for k in range(self.config.n_envs)]
+        return results(pool, tasks, self._members)
 
-    def _warm_up(self, pool: Workers[EpisodeEnv], learner: Learner) -> None:
+    def _warm_up(self, pool: Fleet[Keeper], learner: Learner) -> None:
         rollouts = self._collect(pool, learner, WARM_UP, warm=True)
         learner.statistics.update(np.concatenate([rollout.features for rollout in rollouts]))
 
-    def _evaluate(self, pool: Workers[EpisodeEnv], learner: Learner) -> dict[str, Any]:
+    def _evaluate(self, pool: Fleet[Keeper], learner: Learner) -> dict[str, Any]:
         """Successes on held-apart draws, the same ones each time; keeps the best policy so far."""
         arrays = learner.decisive.arrays()
         tasks = [DrawTask(arrays, draw) for draw in range(self.config.evaluation_draws)]
-        found = [result for _, result in pool.each(tasks)]
+        found: list[DrawResult] = results(pool, tasks, self._members)
         if not found:
             return {}
         wins = sum(result.success for result in found)

@@ -1,186 +1,169 @@
-"""Episodes collected over worker processes, the same whatever their number.
+"""Episodes collected in batches of worlds, the same whatever their size and the number of processes.
 
 A rollout is a fixed number of environments. Each runs its own episodes for a fixed number of decisions, with
-its own seeds, in whichever worker is free: so the number of workers changes the time and nothing else.
+its own seeds, in a world of its own beside others: so what it comes to does not depend on these.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.fleet import Fleet
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
-from bt_tasksim.policy.policy import split_action
+from bt_tasksim.training.collectors import Collector, DrawTask, RolloutTask
 from bt_tasksim.training.env import EpisodeEnv
+from bt_tasksim.training.episode_batch import Draws, EpisodeBatch
 
-
-class EpisodeEnd(NamedTuple):
-    """How an episode of a rollout ended.
-
-    Attributes:
-        success: The completion signal was right.
-        decisions: How many it had.
-        total: What it paid in all.
-        reason: A countable one: ``success``, ``discarded``, ``violated``, ``timeout``, ``follower failed``
-            or ``failed``.
-    """
-
-    success: bool
-    decisions: int
-    total: float
-    reason: str
-
-
-class DrawResult(NamedTuple):
-    """What came of a held-apart draw.
-
-    Attributes:
-        draw: The seed of its world.
-        success: The completion signal was right.
-        reason: As of an `EpisodeEnd`, or why the draw has no episode.
-    """
-
-    draw: int
-    success: bool
-    reason: str
+AnyTask = RolloutTask | DrawTask
 
 
 @dataclass(frozen=True)
-class EnvironmentRollout:
-    """What one environment brought back; ``n`` decisions.
+class TaskShare:
+    """What a process does side by side.
 
     Attributes:
-        features: ``(n, n_features)`` as the concept gave them.
-        actions: ``(n, n_actions)`` as drawn, before they were cut off.
-        rewards: ``(n,)``.
-        starts: ``(n,)`` boolean, the decision is the first one of its episode.
-        cut: Features ``(k, n_features)`` after decisions ``cut_at (k,)`` at which an episode was truncated.
-        cut_at: See ``cut``; the environment's last decision is among them unless its episode ended there.
-        ends: One for each episode that ended.
-        redrawn: Draws in which the subtree was never active.
+        tasks: The tasks.
     """
 
-    features: Array
-    actions: Array
-    rewards: Array
-    starts: Array
-    cut: Array
-    cut_at: Array
-    ends: list[EpisodeEnd]
-    redrawn: int
+    tasks: Sequence[AnyTask]
+
+    def __str__(self) -> str:
+        return f"a share of {len(self.tasks)} environments or draws"
 
 
-@dataclass(frozen=True)
-class RolloutTask:
-    """An environment of a rollout, for a worker that keeps an environment.
-
-    Attributes:
-        network: Arrays of the policy's network.
-        std: Standard deviations ``(n_actions,)`` of the noise on its outputs.
-        seed: Of draws and noise.
-        decisions: How many.
-        stage: Number of the scene's stage that worlds are drawn from; None: the scene itself.
-    """
-
-    network: dict[str, Array]
-    std: Array
-    seed: tuple[int, ...]
-    decisions: int
-    stage: int | None = None
-
-    def run(self, env: EpisodeEnv, /) -> EnvironmentRollout:
-        """See `collect`."""
-        return collect(env, self)
-
-
-@dataclass(frozen=True)
-class DrawTask:
-    """The evaluation of one held-apart draw, for a worker that keeps an environment.
-
-    Attributes:
-        network: Arrays of the policy's network.
-        draw: The seed of its world.
-    """
-
-    network: dict[str, Array]
-    draw: int
-
-    def run(self, env: EpisodeEnv, /) -> DrawResult:
-        """See `judge_draw`."""
-        return judge_draw(env, self)
-
-
-def collect(env: EpisodeEnv, task: RolloutTask) -> EnvironmentRollout:
-    """One environment: episodes until there are enough decisions."""
-    network = Network.from_arrays(task.network)
-    env.stage = task.stage
-    rng = np.random.default_rng(task.seed)
-    noise = rng.standard_normal((task.decisions, network.outputs)).astype(np.float32) * task.std
-    draws = rng.integers(2**31, size=task.decisions + 1).tolist()
-    before = env.redrawn
-    features, info = env.reset(seed=draws[0])
-    rows, actions, rewards, starts, ends = [], [], [], [True], []
-    cut, cut_at = [], []
-    total, length, episode = 0.0, 0, 0
-    for k in range(task.decisions):
-        action = network(features) + noise[k]
-        rows.append(features)
-        actions.append(action)
-        features, reward, terminated, truncated, info = env.step(np.minimum(np.maximum(action, -1.0), 1.0))
-        rewards.append(reward)
-        total, length = total + reward, length + 1
-        over = terminated or truncated
-        if truncated or (k == task.decisions - 1 and not over):
-            cut.append(features)
-            cut_at.append(k)
-        if over:
-            ends.append(EpisodeEnd(bool(info["is_success"]), length, total, _kind(info)))
-            total, length, episode = 0.0, 0, episode + 1
-            if k < task.decisions - 1:
-                features, info = env.reset(seed=draws[episode])
-        starts.append(over)
-    return EnvironmentRollout(
-        features=np.array(rows, np.float32),
-        actions=np.array(actions, np.float32),
-        rewards=np.array(rewards, np.float32),
-        starts=np.array(starts[:-1]),
-        cut=np.array(cut, np.float32).reshape(len(cut), network.inputs),
-        cut_at=np.array(cut_at, np.int64),
-        ends=ends,
-        redrawn=env.redrawn - before,
-    )
-
-
-def judge_draw(env: EpisodeEnv, task: DrawTask) -> DrawResult:
-    """One held-apart draw with the policy's own decisions."""
-    network = Network.from_arrays(task.network)
-    env.stage = None
-    stream, env.stream = env.stream, "validation"
+def alone(env: EpisodeEnv, task: AnyTask) -> Any:
+    """The result of a task, in an environment of its own."""
+    collector: Collector[Any] = task.collector()
+    stream, stage = env.stream, env.stage
     try:
-        features, info = env.reset(seed=task.draw, options={"draw": task.draw})
-        nearer = 0.0
-        while True:
-            motion, done = split_action(network(features), network.signal_std)
-            nearer += float(done)
-            action = np.append(motion, 1.0 if nearer >= 1.0 else -1.0)
-            features, _, terminated, truncated, info = env.step(action)
-            if terminated or truncated:
-                return DrawResult(task.draw, bool(info["is_success"]), _kind(info))
+        while (wanted := collector.begin()) is not None:
+            env.stream, env.stage = wanted.stream, wanted.stage
+            options = None if wanted.draw is None else {"draw": wanted.draw}
+            features, info = env.reset(seed=wanted.seed, options=options)
+            collector.began(int(info["redrawn"]))
+            over = False
+            while not over:
+                action = collector.action(features, collector.network(features))
+                features, reward, terminated, truncated, info = env.step(action)
+                ended = terminated or truncated
+                over = collector.paid(features, reward, info if ended else None, truncated) or ended
     except InputError as error:
-        return DrawResult(task.draw, False, str(error))
+        collector.failed(error)
     finally:
-        env.stream = stream
+        env.stream, env.stage = stream, stage
+    return collector.result()
 
 
-def _kind(info: dict[str, Any]) -> str:
-    """A countable reason for the end of an episode."""
-    if info["is_success"]:
-        return "success"
-    if info["discarded"]:
-        return "discarded"
-    part = next((p for p in ("violated", "timeout") if info["reward"][p] != 0.0), "")
-    return part or ("follower failed" if info["status"] == "SUCCESS" else "failed")
+def in_batch(batch: EpisodeBatch, tasks: Sequence[AnyTask], /) -> Iterator[tuple[int, Any]]:
+    """Do tasks in the worlds of a batch: each world takes the next one when it has done one.
+
+    Yields:
+        The index of a task and its result, as they are done; these depend on nothing but the task.
+    """
+    waiting = iter(enumerate(tasks))
+    collectors: dict[int, tuple[int, Collector[Any]]] = {}
+    networks: dict[int, Network] = {}  # by the identity of their arrays, of which tasks share one
+    done: list[tuple[int, Any]] = []
+
+    def next_task(row: int) -> None:
+        """A world takes the next task, if there is one."""
+        collectors.pop(row, None)
+        for index, task in waiting:
+            collector = task.collector()
+            collector.network = networks.setdefault(id(task.network), collector.network)
+            collectors[row] = index, collector
+            if next_episode(row):
+                return
+
+    def next_episode(row: int) -> bool:
+        """The collector of a world goes on, or is done."""
+        index, collector = collectors[row]
+        wanted = collector.begin()
+        if wanted is None:
+            done.append((index, collector.result()))
+            return False
+        rng = np.random.default_rng(wanted.seed)
+        batch.begin(row, Draws(rng, wanted.draw, wanted.stream, wanted.stage))
+        return True
+
+    for row in range(batch.count):
+        next_task(row)
+    try:
+        while collectors:
+            asked: list[tuple[int, Array]] = []
+            for event in batch.go_on():
+                row, (_, collector) = event.row, collectors[event.row]
+                over = event.ending is not None or event.error is not None
+                if event.error is not None:
+                    collector.failed(event.error)
+                elif event.paid is None:
+                    collector.began(event.redrawn)
+                else:
+                    reward = sum(event.paid.values())
+                    said = None if event.ending is None else event.ending.info(event.paid)
+                    truncated = event.ending is not None and event.ending.truncated
+                    over = collector.paid(event.features, reward, said, truncated) or over
+                if not over:
+                    asked.append((row, event.features))
+                elif not next_episode(row):
+                    batch.leave(row)
+                    next_task(row)
+            yield from done
+            done.clear()
+            _decide(batch, collectors, asked)
+    finally:
+        for row in collectors:
+            batch.leave(row)
+
+
+def side_by_side(
+    keeper: EpisodeBatch | EpisodeEnv, shares: Sequence[TaskShare], /
+) -> Iterator[tuple[int, list[Any]]]:
+    """Work for a fleet whose members keep a batch of worlds, or an environment: do shares of tasks."""
+    for index, share in enumerate(shares):
+        tasks = share.tasks
+        if isinstance(keeper, EpisodeBatch):
+            done = dict(in_batch(keeper, tasks))
+        else:
+            done = {k: alone(keeper, task) for k, task in enumerate(tasks)}
+        yield index, [done[k] for k in range(len(tasks))]
+
+
+def results(fleet: Fleet[EpisodeBatch | EpisodeEnv], tasks: Sequence[AnyTask], members: int) -> list[Any]:
+    """The results of tasks, in their order.
+
+    Args:
+        fleet: Does them.
+        tasks: The tasks.
+        members: How many it has; each gets an equal share, so that its worlds have something to do.
+    """
+    shares = [TaskShare(tasks[k::members]) for k in range(min(members, len(tasks)))]
+    out: list[Any] = [None] * len(tasks)
+    for k, found in fleet.spread(side_by_side, shares):
+        out[k::members] = found
+    return out
+
+
+def _decide(
+    batch: EpisodeBatch,
+    collectors: Mapping[int, tuple[int, Collector[Any]]],
+    asked: Sequence[tuple[int, Array]],
+) -> None:
+    """Decide in all worlds ``asked``, each with what it sees: one call for each network."""
+    groups: dict[int, list[tuple[int, Array]]] = {}
+    for row, features in asked:
+        groups.setdefault(id(collectors[row][1].network), []).append((row, features))
+    for group in groups.values():
+        rows = np.array([row for row, _ in group])
+        outputs = collectors[group[0][0]][1].network(np.stack([features for _, features in group]))
+        actions = [
+            collectors[row][1].action(features, output)
+            for (row, features), output in zip(group, outputs, strict=True)
+        ]
+        batch.decide(rows, np.stack(actions))

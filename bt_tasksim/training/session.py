@@ -22,6 +22,8 @@ from bt_tasksim.core.typed_file import record_model, validate
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.policy.files import CHECKPOINT, training_folder
 from bt_tasksim.training.config import TrainConfig
+from bt_tasksim.training.named_tree import NamedTree
+from bt_tasksim.training.on_cluster import check_cluster
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
 
 
@@ -37,7 +39,8 @@ class Request:
         out: The policy's folder, or None for `default_out`.
         steps: Decisions, or None for the settings' own.
         seed: Seed, or None for the settings' own.
-        workers: Worker processes, or None for one for each core.
+        workers: Worker processes or actors, or None for as many as `bt_tasksim.training.ppo.train` takes.
+        cluster: Address of a Ray cluster, or None for this machine's processes.
         settings: File of settings, or None.
         resume: Go on from the checkpoint.
         backward: Fine-tune from the last Train node to the first afterwards.
@@ -51,6 +54,7 @@ class Request:
     steps: int | None = None
     seed: int | None = None
     workers: int | None = None
+    cluster: str | None = None
     settings: Path | None = None
     resume: bool = False
     backward: bool = False
@@ -60,7 +64,7 @@ class Request:
         out = ["bt-tasksim", "train", self.tree]
         for plugin in loaded():
             out += ["--plugin", plugin]
-        for name in ("scene", "robot", "engines", "out", "steps", "seed", "workers", "settings"):
+        for name in ("scene", "robot", "engines", "out", "steps", "seed", "workers", "cluster", "settings"):
             value = getattr(self, name)
             if value is not None:
                 out += [f"--{name}", str(value)]
@@ -76,18 +80,19 @@ def run(request: Request, report: Callable[[Progress], None]) -> str:
 
     Raises:
         InputError: Anything that was asked for is no good; then nothing was written.
-        MachineError: The libraries for training are missing, or a worker ended.
+        MachineError: The libraries for training are missing, a worker ended, or the cluster does not answer.
         KeyboardInterrupt: Ended by the user, SIGTERM or SIGHUP; says how to go on.
     """
-    from bt_tasksim.trees.load import load_source
-
     config = load_settings(request.settings)
     changes = {name: getattr(request, name) for name in ("steps", "seed")}
     config = dataclasses.replace(config, **{k: v for k, v in changes.items() if v is not None})
     options = EngineOptions(noise="original")
     if request.engines is not None:
         options = dataclasses.replace(options, engines=request.engines)
-    source = load_source(request.tree, request.robot, request.scene, world=options.own_world())
+    if request.cluster is not None:
+        check_cluster(request.cluster, options)
+    named = NamedTree(request.tree, request.scene, request.robot)
+    source = named.load(options)
     out = request.out or default_out(source.name, source.scene.robot)
     ppo, find_train = _ppo()
     tree = source.build()
@@ -107,6 +112,8 @@ def run(request: Request, report: Callable[[Progress], None]) -> str:
                 backward=request.backward,
                 report=report,
                 name=source.name,
+                cluster=request.cluster,
+                source=named,
             )
     except KeyboardInterrupt as stop:
         kept = any((training_folder(folder) / CHECKPOINT).is_file() for folder in places.values())

@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.core.plugins import load_plugin
 from bt_tasksim.core.renamed import former_names
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.run_log import tree_text
@@ -67,6 +68,18 @@ def evaluation_subject(
         "choice of policies": _hash(policies),
         "stream of draws": stream,
     }
+
+
+def code_files(tree: str, plugins: Iterable[str]) -> dict[str, str]:
+    """Files of Python whose code takes part, by what they are.
+
+    Args:
+        tree: Name or file of the tree.
+        plugins: Plugins, loaded.
+    """
+    files = {plugin: getattr(load_plugin(plugin), "__file__", None) for plugin in plugins}
+    code = {f"plugin {Path(plugin).name}": file for plugin, file in files.items() if file is not None}
+    return code | ({"tree": tree} if tree.endswith(".py") else {})
 
 
 def _tree(tree: Behaviour) -> Any:

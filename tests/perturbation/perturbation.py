@@ -26,23 +26,22 @@ NUDGE, SHIFT = "TESTS_NUDGE_TARGETS", "TESTS_SHIFT_SEEDS"
 
 
 def nudge_targets(radians: float) -> dict[str, Callable[[ModuleType], None]]:
-    """What to do to each module of a physics engine so that its drives' targets are off by a constant."""
+    """What to do to the module of simulated worlds so that their drives' targets are off by a constant.
 
-    def change(name: str, module: ModuleType) -> None:
-        engine = getattr(module, name)
-        step = engine.step
+    All engines step there, those of one world, too.
+    """
+
+    def change(module: ModuleType) -> None:
+        step = module.ThreadedBatch.step
 
         @functools.wraps(step)
         def nudged(self: Any, target: Any, *rest: Any, **options: Any) -> Any:
             moved = dataclasses.replace(target, position=target.position + radians)
             return step(self, moved, *rest, **options)
 
-        engine.step = nudged
+        module.ThreadedBatch.step = nudged
 
-    return {
-        "bt_tasksim.engines.physics.sapien": functools.partial(change, "SapienPhysics"),
-        "bt_tasksim.engines.physics.mujoco": functools.partial(change, "MujocoPhysics"),
-    }
+    return {"bt_tasksim.engines.physics.threaded": change}
 
 
 def shift_seeds(shift: int) -> dict[str, Callable[[ModuleType], None]]:

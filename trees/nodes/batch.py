@@ -248,7 +248,7 @@ class PassesOn(BatchNode):
         """Back with the status."""
         found = status
         for said, meant in self.instead.items():
-            found = self.xp.where(status == said, self.xp.asarray(meant, dtype=status.dtype), found)
+            found = self.xp.where(status == said, self.xp.full_like(status, meant), found)
         self.end(rows, found)
 
     def says(self, row: int) -> Statement | None:

@@ -81,7 +81,7 @@ def evaluate(
         tree.robot,
         options,
         chosen,
-        batch=evaluation.usual_batch(options, workers or 1) if batch is None else batch,
+        batch=batch,
         threads=os.cpu_count() or 1 if alone_here else 1,
     )
     keep = None if json_ is None else EvaluationFile(json_)

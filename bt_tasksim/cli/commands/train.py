@@ -29,8 +29,15 @@ def train(
     workers: Annotated[
         int | None,
         typer.Option(
-            parser=arguments.workers, metavar="W", help="Worker processes.  [default: one for each core]"
+            parser=arguments.workers,
+            metavar="W",
+            help="Worker processes, or actors of a cluster.",
+            show_default="one for each core; of a cluster of others one for 16 environments",
         ),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="A", help="Run on a Ray cluster: local, or its address HOST:PORT."),
     ] = None,
     engines: Annotated[
         str | None,
@@ -62,6 +69,7 @@ def train(
         steps=steps,
         seed=seed,
         workers=workers,
+        cluster=cluster,
         settings=settings,
         resume=resume,
         backward=backward,

@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 import numpy as np
 import pinocchio as pin
 
-from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.core.poses import Array, array_namespace, constant, host
 from bt_tasksim.core.world import Command, JointTarget, WorldState
 from bt_tasksim.engines.kinematics.chain import placements, poses_of
 from bt_tasksim.engines.kinematics.failures import Failures, Reach
@@ -26,7 +26,6 @@ from bt_tasksim.engines.kinematics.rows import (
     either,
     every,
     highest,
-    host,
     put,
     some,
     taken,
@@ -213,7 +212,7 @@ class BatchKinematics:
 
     def tool_pose(self, joints: Array) -> Array:
         """Tool poses ``(k, 7)``, robot base frame, of joints ``(k, n)``: the arms', or all of them."""
-        return poses_of(self.inverse.chain.seen(columns(joints[:, : self._arm]))[0])
+        return poses_of(self.inverse.chain.seen(columns(joints[:, : self._arm]))[0, ...])
 
     def _begun(self, memory: _Memory, joints: Array) -> _Memory:
         """Worlds that have no target yet get their joints' positions ``(k, n_joints)``, within the limits."""
@@ -226,7 +225,7 @@ class BatchKinematics:
         return memory._replace(
             target=put(memory.target, new, start),
             goal=put(memory.goal, new, start),
-            seen=put(memory.seen, new, self.inverse.chain.seen(start[: self._arm])),
+            seen=put(memory.seen, new, self.inverse.chain.seen(start[: self._arm, ...])),
             begun=xp.ones_like(memory.begun),
         )
 
@@ -245,7 +244,7 @@ class BatchKinematics:
                 moved = True
                 index = where_true(fresh)
                 arm, seen, failures = self._near(memory, asked, index)
-                goal = xp.concat([arm, goal[self._arm :]], axis=0)
+                goal = xp.concat([arm, goal[self._arm :, ...]], axis=0)
                 if failures:
                     fresh = fresh & ~xp.asarray(failures.mask, device=goal.device)
                 memory = memory._replace(goal=goal, seen=seen, tool=xp.where(fresh, asked, memory.tool))
@@ -256,8 +255,8 @@ class BatchKinematics:
                 fresh = fresh & ~xp.asarray(failures.mask, device=goal.device)
             if some(fresh):
                 moved = True
-                fingers = xp.where(fresh, columns(self.robot.hand_position(hand)), goal[self._arm :])
-                goal = xp.concat([goal[: self._arm], fingers], axis=0)
+                fingers = xp.where(fresh, columns(self.robot.hand_position(hand)), goal[self._arm :, ...])
+                goal = xp.concat([goal[: self._arm, ...], fingers], axis=0)
                 memory = memory._replace(goal=goal, hand=xp.where(fresh, asked, memory.hand))
         return memory, moved, failures
 
@@ -267,7 +266,7 @@ class BatchKinematics:
 
     def _near(self, memory: _Memory, tool: Array, index: np.ndarray) -> tuple[Array, Array, Failures]:
         """The arms ``(n, N)`` for tool poses ``(7, N)`` of the rows that ask, and what their chains see."""
-        last, seen, n = memory.goal[: self._arm], memory.seen, tool.shape[-1]
+        last, seen, n = memory.goal[: self._arm, ...], memory.seen, tool.shape[-1]
         turns = _turns(tool)
         codes, misses = np.zeros(n, int), np.zeros((2, n))
         if not every(taken(turns, index)):
@@ -302,11 +301,11 @@ class BatchKinematics:
             goal = xp.where(xp.asarray(failures.mask, device=goal.device), memory.target, goal)
         step = goal - memory.target
         share = abs(step) * memory.per_step
-        arm, hand = highest(share[:n]), highest(share[n:])
+        arm, hand = highest(share[:n, ...]), highest(share[n:, ...])
         fastest = xp.maximum(arm, hand)
         target, limited = goal, fastest > 1.0
         if some(limited):
-            slowed = [step[:n] / at_least(arm, 1.0), step[n:] / at_least(hand, 1.0)]
+            slowed = [step[:n, ...] / at_least(arm, 1.0), step[n:, ...] / at_least(hand, 1.0)]
             step = xp.concat(slowed, axis=0)
             target = xp.where(limited, memory.target + step, target)
         asked = JointTarget(_rows(target), _rows(step * memory.rate))
@@ -322,7 +321,7 @@ def _new(asked: Array, before: Array) -> Array:
 
 def _turns(poses: Array) -> Array:
     """The quaternions of poses ``(7, N)`` are, but for rounding, unit ones ``(N,)``."""
-    square = total(poses[3:] * poses[3:])
+    square = total(poses[3:, ...] * poses[3:, ...])
     return (square > _UNIT[0]) & (square < _UNIT[1])
 
 

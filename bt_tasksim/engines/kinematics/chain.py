@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from bt_tasksim.core.poses import Array, array_namespace, constant, from_matrix
+from bt_tasksim.engines.kinematics.linear import total
 from bt_tasksim.engines.kinematics.rows import chosen, some
 
 _NEARLY_PI = 3e-2
@@ -85,20 +86,21 @@ class Chain:
         n, rows = q.shape
         angle = q * self.turns if self.slides else q
         c, s = xp.cos(angle)[:, None, :], xp.sin(angle)[:, None, :]
-        x, y, z, offset = self.before[:, :, 0], self.before[:, :, 1], self.before[:, :, 2], self.offset
+        x, y, z = self.before[:, :, 0, ...], self.before[:, :, 1, ...], self.before[:, :, 2, ...]
+        offset = self.offset
         first, second = c * x + s * y, c * y - s * x
         if self.slides:
             way = (q - angle)[:, None, None, :] * z[:, :, None, :]
             offset = xp.concat([xp.zeros_like(way)] * 3 + [way], axis=2) + offset
         out = xp.empty((n + 1, 3, 4, rows), dtype=q.dtype, device=q.device)
-        out[n] = self.tool
-        here = out[n]
+        out[n, ...] = self.tool
+        here = out[n, ...]
         for i in range(n - 1, -1, -1):
-            moved = first[i][:, None, :] * here[0]
-            moved += second[i][:, None, :] * here[1]
-            moved += z[i][:, None, :] * here[2]
-            moved += offset[i]
-            out[i] = here = moved
+            moved = first[i, :, None, ...] * here[0, ...]
+            moved += second[i, :, None, ...] * here[1, ...]
+            moved += z[i, :, None, ...] * here[2, ...]
+            moved += offset[i, ...]
+            out[i, ...] = here = moved
         return out
 
     def jacobian(self, seen: Array) -> Array:
@@ -108,9 +110,10 @@ class Chain:
             seen: What `seen` says.
         """
         xp = array_namespace(seen)
-        joints = seen[1:]
-        turning = joints[:, 2, :3]
-        moving = joints[:, 0, 3:] * joints[:, 1, :3] - joints[:, 1, 3:] * joints[:, 0, :3]
+        joints = seen[1:, ...]
+        turning = joints[:, 2, :3, ...]
+        moving = joints[:, 0, 3:, ...] * joints[:, 1, :3, ...]
+        moving = moving - joints[:, 1, 3:, ...] * joints[:, 0, :3, ...]
         if self.slides:
             hinge = self.turns[:, None, :]
             moving, turning = hinge * moving + (1.0 - hinge) * turning, hinge * turning
@@ -129,29 +132,28 @@ def _turned_to(axis: Array) -> Array:
 def placements(poses: Array) -> Array:
     """Rotation and position ``(3, 4, N)`` of poses ``(7, N)``, with quaternions of any length."""
     xp = array_namespace(poses)
-    q = poses[3:]
-    products = q[:, None] * q[None, :]
-    square = products[0, 0] + products[1, 1] + products[2, 2] + products[3, 3]
+    q = poses[3:, ...]
+    products = q[:, None, ...] * q[None, :, ...]
+    square = total(q * q)
     flat = xp.reshape(products * (2.0 / square), (16, q.shape[1]))
     whole, one, sign = (constant(x, poses) for x in (_WHOLE, _ONE, _SIGN))
     rotation = whole + one * chosen(flat, _FIRST) + sign * chosen(flat, _SECOND)
-    return xp.concat([xp.reshape(rotation, (3, 3, q.shape[1])), poses[:3, None]], axis=1)
+    return xp.concat([xp.reshape(rotation, (3, 3, q.shape[1])), poses[:3, None, ...]], axis=1)
 
 
 def turned(placements: Array, vectors: Array) -> Array:
     """Vectors ``(k, 3, N)`` given in the frames of placements ``(3, 4, N)``, in their parent's."""
-    r = placements[:, :3]
-    x, y, z = vectors[:, :1], vectors[:, 1:2], vectors[:, 2:]
-    return r[:, 0] * x + r[:, 1] * y + r[:, 2] * z
+    x, y, z = (placements[:, i, ...] * vectors[:, i : i + 1, ...] for i in range(3))
+    return x + y + z
 
 
 def poses_of(placements: Array) -> Array:
     """Poses ``(N, 7)`` of placements ``(3, 4, N)``; of the two quaternions the one that Eigen gives."""
     xp = array_namespace(placements)
-    rotation = xp.permute_dims(placements[:, :3], (2, 0, 1))
+    rotation = xp.permute_dims(placements[:, :3, ...], (2, 0, 1))
     q = from_matrix(rotation)
     q = xp.where((q[:, :1] < -0.5), -q, q)
-    return xp.concat([xp.permute_dims(placements[:, 3], (1, 0)), q], axis=-1)
+    return xp.concat([xp.permute_dims(placements[:, 3, ...], (1, 0)), q], axis=-1)
 
 
 # A rotation matrix, row by row: whole + one * q_a q_b + sign * q_c q_d, the products times two.
@@ -169,21 +171,20 @@ def difference(here: Array, there: Array) -> Array:
     """
     xp = array_namespace(here, there)
     rows = here.shape[-1]
-    gap = xp.concat([there[:, :3], there[:, 3:] - here[:, 3:]], axis=1)
-    way = here[0, :3][:, None] * gap[0]
-    way += here[1, :3][:, None] * gap[1]
-    way += here[2, :3][:, None] * gap[2]
+    gap = xp.concat([there[:, :3, ...], there[:, 3:, ...] - here[:, 3:, ...]], axis=1)
+    way = here[0, :3, None, ...] * gap[0, ...]
+    way += here[1, :3, None, ...] * gap[1, ...]
+    way += here[2, :3, None, ...] * gap[2, ...]
     flat = xp.reshape(way, (12, rows))
     skew = chosen(flat, _LEFT) - chosen(flat, _RIGHT)
-    squares = skew * skew
-    sine = xp.sqrt(squares[0] + squares[1] + squares[2] + _LEAST)  # both are twice what they are called
-    cosine = flat[0] + flat[5] + flat[10] - 1.0
+    sine = xp.sqrt(total(skew * skew) + _LEAST)  # both are twice what they are called
+    cosine = flat[0, ...] + flat[5, ...] + flat[10, ...] - 1.0
     angle = xp.atan2(sine, cosine)
     turn = (angle / sine) * skew
     half = angle > math.pi - _NEARLY_PI
     if some(half):
         turn = xp.where(half, _half_turn(way, skew, angle), turn)
-    return xp.concat([way[:, 3], turn], axis=0)
+    return xp.concat([way[:, 3, ...], turn], axis=0)
 
 
 _LEAST = 1e-37
@@ -195,13 +196,15 @@ def _half_turn(way: Array, skew: Array, angle: Array) -> Array:
     """Rotation vectors ``(3, N)`` of rotation matrices in ``way (3, 4, N)`` of nearly half a turn."""
     xp = array_namespace(way)
     cosine = xp.cos(angle)
-    size = xp.stack([way[i, i] - cosine for i in range(3)], axis=0)  # (1 - cosine) axis_i^2
+    size = xp.stack([way[i, i, ...] - cosine for i in range(3)], axis=0)  # (1 - cosine) axis_i^2
     best = xp.argmax(size, axis=0)
     axis = xp.zeros_like(size)
     for i in range(3):
-        row = xp.stack([way[i, j] + way[j, i] for j in range(3)], axis=0)
-        row = xp.concat([row[:i], 2.0 * size[i : i + 1], row[i + 1 :]], axis=0)  # along the axis
+        row = xp.stack([way[i, j, ...] + way[j, i, ...] for j in range(3)], axis=0)
+        row = xp.concat(
+            [row[:i, ...], 2.0 * size[i : i + 1, ...], row[i + 1 :, ...]], axis=0
+        )  # along the axis
         axis = xp.where(best == i, row, axis)
-    axis = axis / xp.sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2])
-    along = skew[0] * axis[0] + skew[1] * axis[1] + skew[2] * axis[2]
+    axis = axis / xp.sqrt(total(axis * axis) + _LEAST)  # other rows may have no turn at all
+    along = total(skew * axis)
     return xp.where(along < 0.0, -axis, axis) * angle

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from bt_tasksim.core.poses import Array, array_namespace, clip, constant
+from bt_tasksim.core.poses import Array, array_namespace, clip, constant, host
 from bt_tasksim.engines.kinematics.chain import Chain, difference
 from bt_tasksim.engines.kinematics.failures import Reach
 from bt_tasksim.engines.kinematics.linear import solve_symmetric, total
@@ -29,7 +29,6 @@ from bt_tasksim.engines.kinematics.rows import (
     either,
     every,
     highest,
-    host,
     joined,
     put,
     some,
@@ -203,7 +202,8 @@ class InverseKinematics:
         tries = xp.stack(
             [clip(xp.broadcast_to(x, (self._n, rows)), self._lower, self._upper) for x in starts], axis=1
         )
-        at = best or _Reached(taken(tries, np.arange(rows))[:, 0], self.chain.seen(tries[:, 0]), goal[0, 0])
+        first = tries[:, 0, ...]
+        at = best or _Reached(first, self.chain.seen(first), goal[0, 0, ...])
         missed = self._missed(at.seen, goal)
         least = missed.cost if best is not None else np.full(rows, np.inf)
         found = Postures(at.q, at.seen, np.full(rows, Reach.UNREACHABLE), missed.distance, missed.angle)
@@ -379,10 +379,10 @@ class InverseKinematics:
 
     def _step(self, jacobian: Array, error: Array, damping: Array, pull: Array | None) -> Array:
         """Damped least squares with a null-space step: ``z + J^T (J J^T + damping)^-1 (e - J z)``."""
-        square = total(jacobian[:, :, None] * jacobian[:, None, :]) + damping * self._eye
+        square = total(jacobian[:, :, None, ...] * jacobian[:, None, :, ...]) + damping * self._eye
         if pull is None:
             return _along(jacobian, solve_symmetric(square, error))
-        return pull + _along(jacobian, solve_symmetric(square, error - total(jacobian * pull[:, None])))
+        return pull + _along(jacobian, solve_symmetric(square, error - total(jacobian * pull[:, None, ...])))
 
     def _saturate(self, q: Array, jacobian: Array, error: Array, damping: Array, pull: Array) -> Array:
         """The step's result within the limits: joints that pass one are set on it, the worst first."""
@@ -391,8 +391,8 @@ class InverseKinematics:
         joint = xp.asarray(np.arange(self._n)[:, None], device=q.device)
         for _ in range(self._n):
             held = step * (1.0 - free)
-            left = error - total(jacobian * held[:, None])
-            moved = self._step(jacobian * free[:, None], left, damping, pull * free) * free
+            left = error - total(jacobian * held[:, None, ...])
+            moved = self._step(jacobian * free[:, None, ...], left, damping, pull * free) * free
             moved = moved * (_LONGEST / at_least(_largest(moved), _LONGEST))
             step = moved + held
             excess = xp.where(free > 0.0, xp.maximum(q + step - self._upper, self._lower - q - step), 0.0 * q)
@@ -406,18 +406,18 @@ class InverseKinematics:
 
     def _error(self, seen: Array, goal: Array) -> Array:
         """What is left of the way in the components that are asked for ``(m, N)``, m and rad."""
-        way = difference(seen[0], goal)
+        way = difference(seen[0, ...], goal)
         return way if self._asked is None else chosen(way, self._asked)
 
     def _missed(self, seen: Array, goal: Array) -> _Missed:
         """How far the tool is from its placements."""
         xp = array_namespace(goal)
-        way = difference(seen[0], goal) * self._counted
+        way = difference(seen[0, ...], goal) * self._counted
         square = way * way
         weighed = self._error(seen, goal) * self._weights
         return _Missed(
-            host(xp.sqrt(square[0] + square[1] + square[2])),
-            host(xp.sqrt(square[3] + square[4] + square[5])),
+            host(xp.sqrt(total(square[:3, ...]))),
+            host(xp.sqrt(total(square[3:, ...]))),
             host(total(weighed * weighed)),
         )
 
@@ -430,9 +430,9 @@ def _with(found: Postures, rows: np.ndarray, other: Postures) -> Postures:
 def _along(jacobian: Array, force: Array) -> Array:
     """``J^T y (n, N)`` of a transposed Jacobian ``(n, m, N)`` and ``y (m, N)``."""
     terms = jacobian * force
-    out = terms[:, 0]
+    out = terms[:, 0, ...]
     for i in range(1, force.shape[0]):
-        out = out + terms[:, i]
+        out = out + terms[:, i, ...]
     return out
 
 

@@ -7,9 +7,9 @@ from bt_tasksim.core.poses import Array, array_namespace
 
 def total(terms: Array) -> Array:
     """Sum ``(...)`` of terms ``(k, ...)`` in their order; none have another order, whatever their number."""
-    out = terms[0]
+    out = terms[0, ...]
     for i in range(1, terms.shape[0]):
-        out = out + terms[i]
+        out = out + terms[i, ...]
     return out
 
 
@@ -21,9 +21,9 @@ def solve_symmetric(matrix: Array, right: Array) -> Array:
     """
     xp = array_namespace(matrix, right)
     m = matrix.shape[0]
-    whole = xp.concat([matrix, right[:, None]], axis=1)
+    whole = xp.concat([matrix, right[:, None, ...]], axis=1)
     for j in range(m):
-        row = whole[j, j + 1 :] / whole[j, j]
-        whole[:, j + 1 :] -= whole[:, j][:, None] * row
-        whole[j, j + 1 :] = row
-    return whole[:, m]
+        row = whole[j, j + 1 :, ...] / whole[j, j, ...]
+        whole[:, j + 1 :, ...] -= whole[:, j, None, ...] * row
+        whole[j, j + 1 :, ...] = row
+    return whole[:, m, ...]

@@ -4,20 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import array_api_compat
 import numpy as np
 
-from bt_tasksim.core.poses import Array, array_namespace
-
-
-def host(array: Array) -> np.ndarray:
-    """An array in NumPy's form, wherever it is."""
-    if isinstance(array, np.ndarray):
-        return array
-    try:
-        return np.asarray(array)
-    except (TypeError, RuntimeError, ValueError):
-        return np.from_dlpack(array_api_compat.to_device(array, "cpu"))
+from bt_tasksim.core.poses import Array, array_namespace, host
 
 
 def where_true(mask: Array) -> np.ndarray:

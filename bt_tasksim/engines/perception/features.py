@@ -9,11 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import NamedTuple
 
-import array_api_compat
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.core.poses import Array, array_namespace, constant, host
 from bt_tasksim.core.world import Observation, WorldState
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -51,9 +50,9 @@ class Instant(NamedTuple):
     def object(self, which: Array) -> Array:
         """Poses ``(k, 7)`` of one object in each world; those of the first where the index is -1."""
         xp = array_namespace(self.objects)
-        out = self.objects[:, 0]
+        out = self.objects[:, 0, :]
         for i in range(1, self.objects.shape[1]):
-            out = xp.where((which == i)[:, None], self.objects[:, i], out)
+            out = xp.where((which == i)[:, None], self.objects[:, i, :], out)
         return out
 
 
@@ -96,8 +95,8 @@ def contact_points(surfaces: Surfaces, rows: np.ndarray, now: Instant, tips: Arr
     none = which < 0
     if bool(xp.all(none)):
         return xp.asarray(tips, copy=True)
-    there = xp.where(none[:, None], xp.ones_like(now.tool), now.object(which))[:, None]
-    joined = surfaces.of(rows, np.asarray(array_api_compat.to_device(which, "cpu")))
+    there = xp.where(none[:, None], xp.ones_like(now.tool), now.object(which))[:, None, :]
+    joined = surfaces.of(rows, host(which))
     local = joined.nearest(poses.transform(poses.inverse(there), tips))
     return xp.where(none[:, None, None], tips, poses.transform(there, local))
 

@@ -103,7 +103,7 @@ class BatchState:
             self._look(state.objects, index)
         assert self._local is not None
         local = self._local if rows is None else rows_of(self._local, rows)
-        estimate = poses.multiply(state.objects, local[:, : state.objects.shape[1]])
+        estimate = poses.multiply(state.objects, local[:, : state.objects.shape[1], :])
         return self._builder.build(state, estimate, rows)
 
     def _look(self, objects: Array, rows: np.ndarray) -> None:

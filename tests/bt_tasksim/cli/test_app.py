@@ -54,7 +54,7 @@ def test_old_command_lines_mean_what_they_meant(line):
         was = {**was, "logs": [was["log"]]}
         del was["log"]
     if line.startswith("train"):
-        was = {"engines": None, **was}
+        was = {"engines": None, "cluster": None, **was}
     if line.startswith("replay"):
         was = {"tree": None, "robot": None, "policy": [], "objects": None, **was}
     assert found == {"nodes": None, **was} if "nodes" in found else found == was

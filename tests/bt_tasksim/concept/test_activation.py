@@ -31,6 +31,7 @@ from bt_tasksim.core.units import METRES, NEWTONS, SECONDS
 from bt_tasksim.core.world import Command, ObjectModel, WorldModel
 from bt_tasksim.policy.policy import Action
 from bt_tasksim.robot.description import load_robot
+from tests.array_libraries import elsewhere
 
 ROBOT = load_robot("panda")
 TOO_HIGH = register_reason("test_starts_too_high", "the tool is {value} high", value=METRES)
@@ -229,6 +230,27 @@ def test_whatever_happens_in_one_tick_each_world_is_as_it_is_alone():
         (False, True), (False, False), (True, False), (False, True)
     ]  # fmt: skip
     assert [t.activations for t in now] == [1] * 9
+
+
+class Elsewhere(Task):
+    """The same, whose answers are on another device."""
+
+    def initial_state(self, seen):
+        high = elsewhere(seen.tool[:, 2])
+        return TOO_HIGH.where(high > 0.6, value=high)
+
+    def violated(self, seen, memory):
+        return elsewhere(super().violated(seen, memory))
+
+    def maintained(self, goal, seen, memory):
+        return elsewhere(super().maintained(goal, seen, memory))
+
+    def done(self, seen, memory):
+        return elsewhere(super().done(seen, memory))
+
+
+def test_answers_are_taken_from_whatever_device_they_are_on():
+    assert told(eventful(), range(9), Elsewhere.value()) == told(eventful(), range(9))
 
 
 def test_a_time_out_counts_from_the_begin_in_each_world():

@@ -37,6 +37,8 @@ def collect(state, items):
         state.append(item)
         if item == "error":
             raise LeafError("leaf 'a' is broken")
+        if item == "mine":
+            raise ZeroDivisionError("no such thing")
         if item == "always" or (item != "error" and os.path.isabs(item) and not os.path.exists(item)):
             if item != "always":
                 open(item, "w").close()

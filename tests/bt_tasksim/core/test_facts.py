@@ -9,6 +9,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.facts import FactArrays, FactsTable, WorldFacts, joined, rotations, take_rows
 from bt_tasksim.core.world import ObjectModel, Obstacle, PlaceModel, WorldModel
+from tests.array_libraries import agree
 
 KINDS = {
     "box": (2, False, ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)), (0.04, 0.07)),
@@ -236,22 +237,26 @@ def test_many_choices_of_rows_are_not_kept_for_ever():
 # ---- taking rows ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("library", ["numpy", "torch"])
 @pytest.mark.parametrize("inner", [(), (3,), (2, 4)])
-def test_of_each_row_the_entry_that_is_asked_for(library, inner):
+def test_of_each_row_the_entry_that_is_asked_for(inner):
     values = np.arange(5 * 6 * int(np.prod(inner, initial=1)), dtype=float).reshape(5, 6, *inner)
     index = np.array([0, 5, 2, 2, 1])
     expected = np.stack([values[k, i] for k, i in enumerate(index)])
-    if library == "torch":
-        torch = pytest.importorskip("torch")
-        found = take_rows(torch.from_numpy(values), torch.from_numpy(index)).numpy()
-    else:
-        found = take_rows(values, index)
-    assert np.array_equal(found, expected)
+    assert np.array_equal(agree(take_rows, values, index), expected)
 
 
-def test_facts_are_brought_to_torch():
-    torch = pytest.importorskip("torch")
-    facts = WorldFacts.of(UNLIKE).map(torch.from_numpy)
-    assert isinstance(facts.object_facts, FactArrays) and type(facts.object("cup").extent) is torch.Tensor
-    assert facts.place("table").rim.tolist() == [0.0] * 4 and facts.worlds == 4
+def asked(facts, index):
+    cup, table, there = facts.object("cup"), facts.place("table"), facts.place_at(index)
+    assert isinstance(cup, FactArrays) and facts.worlds == index.shape[0]
+    boxes = facts.obstacle_facts
+    return cup.standing_height, table.rim, there.rim, cup, table, there, boxes
+
+
+def test_facts_are_the_same_in_every_library_and_on_every_device():
+    agree(asked, WorldFacts.of(UNLIKE), np.array([0, 2, 1, 1]))
+
+
+def test_unlike_worlds_say_the_same_in_any_company(rows_alike):
+    facts = WorldFacts.of([UNLIKE[k % 4] for k in range(65)])
+    index = np.arange(65) % len(facts.place_columns)
+    rows_alike(lambda rows: asked(facts.map(lambda values: values[rows]), index[rows]), 65)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from bt_tasksim.core import poses
+from tests.array_libraries import LIBRARIES, agree
 
 torch = pytest.importorskip("torch")
 
@@ -171,6 +172,9 @@ FUNCTIONS = {
     "from_matrix": (lambda q: poses.from_matrix(poses.to_matrix(q)), Q),
     "frame_from_axes": (poses.frame_from_axes, V, V),
     "interpolate": (lambda a, b: poses.interpolate(a, b, abs(a[..., 0]) / 3.0), P, P),
+    "interpolate by one share": (lambda a, b: poses.interpolate(a, b, 0.3), P, P),
+    "z_axis": (poses.z_axis, Q),
+    "clip": (lambda v: poses.clip(v, [-1.0, -2.0, 0.0], 1.0), V),
 }
 
 
@@ -200,17 +204,55 @@ def test_one_batch_and_torch_compute_the_same(name, seed):
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_row_is_the_same_bits_in_any_company_and_however_it_lies_in_memory(rows_alike, name):
     function, *parts = FUNCTIONS[name]
-    batch = np.random.default_rng(4).uniform(-3.0, 3.0, (len(parts), 37, 7))
+    batch = np.random.default_rng(4).uniform(-3.0, 3.0, (len(parts), 65, 7))
     batch[..., 3:] = poses.normalise(batch[..., 3:])
     slices = [batch[i][..., part] for i, part in enumerate(parts)]
     copies = [np.ascontiguousarray(part) for part in slices]
     columns = [np.asfortranarray(part) for part in slices]
     spread = [np.repeat(part, 2, axis=-1)[..., ::2] for part in slices]
-    whole = rows_alike(lambda rows: function(*(part[rows] for part in slices)), 37)
+    whole = rows_alike(lambda rows: function(*(part[rows] for part in slices)), 65)
     for lying in (slices, copies, columns, spread):
         assert np.array_equal(function(*lying), whole)
-        for k in range(0, 37, 6):
+        for k in range(0, 65, 6):
             assert np.array_equal(function(*(part[k : k + 1] for part in lying)), whole[k : k + 1])
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_library_and_device_gives_the_same(name):
+    function, *parts = FUNCTIONS[name]
+    batch = np.random.default_rng(6).uniform(-3.0, 3.0, (len(parts), 65, 7))
+    batch[..., 3:] = poses.normalise(batch[..., 3:])
+    batch[:, 0, 3:] = IDENTITY[3:]
+    if name != "tilt against another":  # an arc cosine near 1 has no more digits
+        batch[:, 1, 3:] = IDENTITY[[4, 3, 5, 6]]
+    agree(function, *(batch[i][..., part] for i, part in enumerate(parts)), single_close=None)
+
+
+class OnAnotherDevice(torch.Tensor):
+    """A tensor into which NumPy cannot look, as one on a GPU."""
+
+    def __array__(self, *_, **__):
+        raise TypeError("can't convert a device tensor to numpy")
+
+    def __dlpack__(self, *_, **__):
+        raise BufferError("unsupported device")
+
+    def to(self, device):
+        assert device == "cpu"
+        return self.as_subclass(torch.Tensor)
+
+
+def test_an_array_is_brought_to_numpy_from_wherever_it_is():
+    for values in (np.arange(3.0), np.array([True, False]), np.arange(2), np.float32(0.5)):
+        assert poses.host(values).dtype == values.dtype
+        for put in LIBRARIES.values():
+            found = poses.host(put(values))
+            assert type(found) is np.ndarray and found.dtype == values.dtype
+            assert np.array_equal(found, values)
+    far = torch.arange(3.0).as_subclass(OnAnotherDevice)
+    assert np.array_equal(poses.host(far), [0.0, 1.0, 2.0])
+    same = np.arange(3.0)
+    assert poses.host(same) is same and poses.host(True) == np.array(True)
 
 
 def test_relative_and_localise_are_what_their_names_say():

@@ -12,7 +12,15 @@ from pathlib import Path
 import pytest
 
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, NoWayError
+from bt_tasksim.core.fleet import results_of
 from bt_tasksim.core.workers import Workers
+
+
+def one_by_one(kept, tasks, /):
+    """Work of a fleet: does tasks one after the other."""
+    for index, task in enumerate(tasks):
+        yield index, task.run(kept)
+
 
 METHODS = pytest.mark.parametrize("method", ["fork", "spawn"])
 
@@ -73,7 +81,7 @@ def alive(pid):
 def test_every_worker_keeps_its_own(method):
     with Workers(list, 2, method) as pool:
         pids = set(pool.pids)
-        found = dict(pool.each([Append(k) for k in range(6)]))
+        found = dict(pool.spread(one_by_one, [Append(k) for k in range(6)]))
     assert sorted(found) == list(range(6))
     assert {pid for pid, _ in found.values()} <= pids and os.getpid() not in pids
     for pid in {pid for pid, _ in found.values()}:
@@ -86,7 +94,7 @@ def test_every_worker_keeps_its_own(method):
 @pytest.mark.parametrize("error", [LeafError("leaf 'a' is broken"), NoWayError("too far")])
 def test_an_error_comes_as_it_is(method, error):
     with pytest.raises(type(error), match=f"^{error}$"), Workers(list, 1, method) as pool:
-        list(pool.each([Raising(error)]))
+        list(pool.spread(one_by_one, [Raising(error)]))
 
 
 def broken():
@@ -95,7 +103,7 @@ def broken():
 
 def test_an_error_that_cannot_come_is_one_of_its_kind_with_its_sentence():
     with pytest.raises(InputError, match=r"^this and that$"), Workers(list, 1) as pool:
-        list(pool.each([RaisingFussy()]))
+        list(pool.spread(one_by_one, [RaisingFussy()]))
 
 
 @dataclass(frozen=True)
@@ -111,12 +119,12 @@ def test_what_else_is_raised_is_one_error():
         pytest.raises(InputError, match=r"^test_workers.py:\d+: ZeroDivisionError: no such thing$"),
         Workers(broken, 2) as pool,
     ):
-        list(pool.each([Append(0), Append(1)]))
+        list(pool.spread(one_by_one, [Append(0), Append(1)]))
     with (
-        pytest.raises(MachineError, match="AttributeError"),
+        pytest.raises(MachineError, match="TypeError"),
         Workers(list, 1) as pool,
     ):  # not in a user's code
-        list(pool.each([None]))
+        list(pool.spread(results_of, [None]))
 
 
 @METHODS
@@ -125,14 +133,14 @@ def test_a_worker_that_is_killed_is_an_error_and_no_waiting(method):
         pytest.raises(MachineError, match=r"^a worker process ended; is there enough memory\?$"),
         Workers(list, 2, method) as pool,
     ):
-        list(pool.each([Append(0), Killed(), Append(2)]))
+        list(pool.spread(one_by_one, [Append(0), Killed(), Append(2)]))
 
 
 def test_what_they_are_doing_is_not_waited_for_where_it_is_broken_off():
     began = time.monotonic()
     with pytest.raises(InputError), Workers(list, 2) as pool:
         pids = pool.pids
-        list(pool.each([Sleeping(), Raising(InputError("no good"))]))
+        list(pool.spread(one_by_one, [Sleeping(), Raising(InputError("no good"))]))
     assert time.monotonic() - began < 60.0 and not any(alive(pid) for pid in pids)
 
 
@@ -175,7 +183,7 @@ class Threads:
 def test_spawned_ones_take_one_thread_each_and_the_parent_what_it_took():
     before = threads()
     with Workers(partial(list), 1, "spawn") as pool:
-        assert dict(pool.each([Threads()])) == {0: ["1", "1"]}
+        assert dict(pool.spread(one_by_one, [Threads()])) == {0: ["1", "1"]}
     assert threads() == before
 
 
@@ -197,8 +205,8 @@ def test_they_find_no_modules_in_the_current_folder(tmp_path):
 
 SPAWNING = """
 from bt_tasksim.core.workers import Workers
-from test_workers import Append
+from test_workers import Append, one_by_one
 if __name__ == "__main__":
     with Workers(list, 1, "spawn") as pool:
-        print(*[kept for _, (_, kept) in pool.each([Append(0)])])
+        print(*[kept for _, (_, kept) in pool.spread(one_by_one, [Append(0)])])
 """

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 from py_trees.common import Status
 
+from bt_tasksim.concept.context import one_world
 from bt_tasksim.concept_nodes import Grasp, Pick
 from bt_tasksim.core import poses
 from bt_tasksim.core.world import JointTarget
@@ -71,7 +72,7 @@ def holding(kind="box", mass=0.2, engine="sapien", **settings):
             runner.tick()
             if tree.status != Status.RUNNING:
                 break
-            runner.context.advance(runner.pipeline.step(runner.context.command))
+            runner.context.advance(one_world(runner.pipeline.step(runner.context.command)))
         if tree.status == Status.SUCCESS:
             return runner
         why.append(tree.tip().feedback_message)
@@ -87,7 +88,7 @@ def episode(runner, seed):
         states.append(runner.pipeline.state)
         if runner.tree.status != Status.RUNNING:
             return states
-        runner.context.advance(runner.pipeline.step(runner.context.command))
+        runner.context.advance(one_world(runner.pipeline.step(runner.context.command)))
 
 
 def runner_of(scenario, engine="sapien"):

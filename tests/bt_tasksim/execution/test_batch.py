@@ -124,6 +124,18 @@ def test_torch_does_the_same():
         assert why is None, why
 
 
+def test_nothing_is_left_on_another_device():
+    torch = pytest.importorskip("torch")
+    for seed in range(3100, 3112):
+        case = draw(seed)
+        with torch.device("meta"):  # where all is that nobody has put on the batch's device
+            found = by_executor(
+                case, xp=torch, standing=0.2, know=lambda name, seed=seed: known(seed, name), device="cpu"
+            )
+        why = difference(case, by_py_trees(case), found)
+        assert why is None, why
+
+
 def test_a_world_does_not_feel_its_neighbours():
     for seed in range(4000, 4020):
         case = draw(seed, worlds=5)

@@ -16,8 +16,7 @@ from bt_tasksim.planning.reference_motion import (
     plan,
     sample,
 )
-
-torch = pytest.importorskip("torch")
+from tests.array_libraries import agree
 
 
 def random_poses(seed, n):
@@ -129,7 +128,7 @@ def test_it_waits_before_the_begin_and_after_the_end():
 
 # ---- many worlds ------------------------------------------------------------------------------------------
 
-WORLDS = 24
+WORLDS = 65
 
 
 def unlike(seed, corners=4, worlds=WORLDS):
@@ -175,16 +174,23 @@ def test_a_waypoint_that_is_repeated_at_the_end_changes_no_bit(corners, scale):
     assert np.array_equal(padded.table, path.table)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_torch_plans_and_samples_the_same(seed):
-    points = unlike(seed)
-    path, other = plan(points, 0.4), plan([torch.from_numpy(pose) for pose in points], 0.4)
-    assert type(other.table) is torch.Tensor and other.duration.dtype == torch.float64
-    assert np.allclose(other.duration.numpy(), path.duration, rtol=0, atol=1e-12)
-    assert np.allclose(other.table.numpy(), path.table, rtol=0, atol=1e-10)
-    times = np.random.default_rng(seed).uniform(-0.2, 1.2, WORLDS) * path.duration
-    in_torch = sample(Path(*(torch.from_numpy(x) for x in path)), torch.from_numpy(times))
-    assert np.allclose(in_torch.numpy(), sample(path, times), rtol=0, atol=1e-12)
+@pytest.mark.parametrize("corners", range(1, 6))
+@pytest.mark.parametrize("settings_", [{}, {"samples": 2, "acceleration": 3.0}])
+def test_every_library_and_device_plans_and_samples_the_same(corners, settings_):
+    points = unlike(corners, 4)[:corners] if corners < 5 else unlike(corners, 5)
+    path = agree(lambda points: plan(points, 0.4, **settings_), points, single_close=None)
+    times = np.random.default_rng(corners).uniform(-0.2, 1.2, WORLDS) * path.duration
+    agree(sample, path, times, close=1e-12, single_close=1e-5)
+    half = plan([pose.astype(np.float32) for pose in points], 0.4, **settings_)
+    assert np.abs(half.duration - path.duration).max() < 1e-3
+    assert np.abs(half.table[:, [0, -1], :3] - path.table[:, [0, -1], :3]).max() < 1e-6
+
+
+@pytest.mark.parametrize("shape", [(65,), (5, 13)])
+def test_every_library_and_device_has_the_same_minimum_jerk(shape):
+    places = np.linspace(0.0, 1.0, 65).reshape(shape)
+    agree(minimum_jerk, places, close=1e-12)
+    agree(minimum_jerk_time, places[..., 1:-1], close=1e-12, single_close=1e-3)
 
 
 def test_a_minimum_jerks_time_is_the_way_back_from_its_place(rows_alike):

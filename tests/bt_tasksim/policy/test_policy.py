@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from statistics import NormalDist
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from bt_tasksim.report.write import write_run
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.scenarios import pick_and_place
+from tests.array_libraries import agree
 
 pytestmark = pytest.mark.physical
 
@@ -101,6 +103,20 @@ def test_a_learned_policy_decides_only_where_the_concept_asks():
         one = policy.act(Model(), Seen(rows[[k]]), asked[[k]])
         assert np.array_equal(one.motion, batch.motion[[k]])
         assert np.array_equal(one.terminate, batch.terminate[[k]])
+
+
+def test_every_library_and_device_decides_the_same():
+    rng = np.random.default_rng(0)
+    net = Network(np.zeros(3), np.ones(3), [(np.eye(3), np.zeros(3))], 0.2)
+    asked = rng.random(65) < 0.5
+
+    def decided(rows, asked):
+        return LearnedPolicy(net, "x@1").act(Model(), SimpleNamespace(tool=rows), asked)
+
+    found = agree(decided, rng.normal(size=(65, 3)), asked, close=1e-5, single_close=1e-5)
+    assert (found.motion == 0.0).all(axis=1).tolist() == (~asked).tolist()
+    agree(decided, rng.normal(size=(65, 3)), asked & False)
+    agree(lambda out: split_action(out), rng.normal(size=(65, 3)))
 
 
 # ---- names ------------------------------------------------------------------------------------------------

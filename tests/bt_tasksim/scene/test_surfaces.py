@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, constant
 from bt_tasksim.scene.surfaces import Ellipse, ManySurfaces, OuterSurface, Polygon, PrismSurface
 from bt_tasksim.scene.surfaces import SuperellipsoidSurface as Egg
+from tests.array_libraries import agree
 
 
 class Flat:
     """A surface of somebody else's, that nobody can join with others."""
 
     def nearest(self, point: Array) -> Array:
-        return point * np.array([1.0, 1.0, 0.0])
+        return point * constant([1.0, 1.0, 0.0], point)
 
 
 def corners(n: int, size: float) -> tuple[tuple[float, float], ...]:
@@ -37,12 +38,12 @@ SURFACES: list[OuterSurface] = [
 @pytest.mark.parametrize("tips", [1, 2, 5])
 def test_many_are_as_each_alone_bit_by_bit(tips: int) -> None:
     rng = np.random.default_rng(0)
-    which = rng.integers(0, len(SURFACES), 64)
-    points = rng.normal(scale=0.04, size=(64, tips, 3))
+    which = rng.integers(0, len(SURFACES), 65)
+    points = rng.normal(scale=0.04, size=(65, tips, 3))
     points[::9] = 0.0
     points[1::9, :, :2] = 0.0
     together = ManySurfaces([SURFACES[i] for i in which]).nearest(points)
-    for order in ([3], [40, 7], rng.permutation(64).tolist()):
+    for order in ([3], [40, 7], list(range(64)), rng.permutation(65).tolist()):
         some = ManySurfaces([SURFACES[which[i]] for i in order]).nearest(points[order])
         np.testing.assert_array_equal(some, together[order])
     for i, surface in enumerate(which):
@@ -58,13 +59,11 @@ def test_points_of_polygons_do_not_depend_on_how_many_corners_others_have() -> N
     np.testing.assert_allclose(alone[0, 3:6], points[0, 3:6], atol=1e-15)
 
 
-@pytest.mark.parametrize("surface", [s for s in SURFACES if not isinstance(s, Flat)])
-def test_single_precision_and_torch(surface: OuterSurface) -> None:
-    torch = pytest.importorskip("torch")
-    points = np.random.default_rng(1).normal(scale=0.04, size=(3, 2, 3))
-    expected = ManySurfaces([surface] * 3).nearest(points)
-    single = ManySurfaces([surface] * 3).nearest(points.astype(np.float32))
-    assert single.dtype == np.float32
-    np.testing.assert_allclose(single, expected, atol=1e-6)
-    found = ManySurfaces([surface] * 3).nearest(torch.asarray(points))
-    np.testing.assert_allclose(found.numpy(), expected, atol=1e-12)
+@pytest.mark.parametrize("surfaces", [*([surface] * 3 for surface in SURFACES), SURFACES], ids=len)
+def test_every_library_and_device_finds_the_same_and_single_precision_stays_so(
+    surfaces: list[OuterSurface],
+) -> None:
+    points = np.random.default_rng(1).normal(scale=0.04, size=(len(surfaces), 2, 3))
+    agree(ManySurfaces(surfaces).nearest, points, close=1e-12, single_close=1e-5)
+    points[0], points[1, :, :2] = 0.0, 0.0
+    agree(ManySurfaces(surfaces).nearest, points, close=1e-12, single_close=None)

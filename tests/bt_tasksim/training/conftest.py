@@ -13,7 +13,7 @@ import toys
 @pytest.fixture
 def toy_engines(monkeypatch):
     """Every pipeline that is built is a toy world."""
-    monkeypatch.setattr("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: toys.World())
+    toys.instead_of_engines(monkeypatch.setattr)
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from bt_tasksim.policy.network import Network
+from bt_tasksim.training.collectors import EnvironmentRollout
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.learner import Learner, Statistics
-from bt_tasksim.training.rollouts import EnvironmentRollout
 
 torch.set_num_threads(1)
 N, M = 5, 3

@@ -83,7 +83,7 @@ def undisturbed(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         import toys
 
-        patch.setattr("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: toys.World())
+        toys.instead_of_engines(patch.setattr)
         seen = []
         learn(out, report=seen.append)
     return out, seen
@@ -139,7 +139,9 @@ import sys
 sys.path.insert(0, {here!r})
 import toys
 import bt_tasksim.execution.runner
+import bt_tasksim.training.episode_batch
 bt_tasksim.execution.runner.build_pipeline = lambda robot, options: toys.World()
+bt_tasksim.training.episode_batch.Worlds = toys.Worlds
 from bt_tasksim.scene.scene import CurriculumStage
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.trees.nodes.train import Train

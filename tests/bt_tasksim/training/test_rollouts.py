@@ -7,8 +7,9 @@ from toys import SCENE, Check, Even, Raise, Unprogrammed
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.policy.network import Network
+from bt_tasksim.training.collectors import DrawTask, RolloutTask
 from bt_tasksim.training.env import EpisodeEnv
-from bt_tasksim.training.rollouts import DrawTask, RolloutTask, collect, judge_draw
+from bt_tasksim.training.rollouts import alone, results
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.nodes.train import Train
 
@@ -32,7 +33,7 @@ def as_bytes(found):
 
 def run(tasks, count, maker=make):
     with Workers(maker, count) as pool:
-        return {number: as_bytes(result) for number, result in pool.each(tasks)}
+        return dict(enumerate(map(as_bytes, results(pool, tasks, count))))
 
 
 @pytest.fixture
@@ -41,8 +42,8 @@ def maker(toy_engines):
     return make
 
 
-def test_a_lane_is_whole_episodes_in_a_row(maker):
-    found = collect(maker(), environment(0, decisions=60))
+def test_an_environment_is_whole_episodes_in_a_row(maker):
+    found = alone(maker(), environment(0, decisions=60))
     assert found.features.shape == (60, 3) and found.actions.shape == (60, 2)
     assert found.features.dtype == found.actions.dtype == np.float32
     assert found.starts[0] and int(found.starts.sum()) in (len(found.ends), len(found.ends) + 1)
@@ -63,15 +64,15 @@ def test_a_truncated_episode_is_marked(maker):
         return EpisodeEnv(sequence("s", Train(Raise()), Check()), SCENE, longest=0.2)
 
     still = Network(np.zeros(3), np.ones(3), [(np.zeros((2, 3)), np.zeros(2))]).arrays()
-    found = collect(short(), environment(0, decisions=12, network=still, std=0.0))
+    found = alone(short(), environment(0, decisions=12, network=still, std=0.0))
     assert found.cut_at.tolist() == [4, 9, 11] and found.cut.shape == (3, 3)
     assert [end.reason for end in found.ends] == ["failed", "failed"]
     assert found.starts.tolist() == [k in (0, 5, 10) for k in range(12)]
 
 
-def test_lanes_are_the_same_whatever_the_workers_and_their_order(maker):
+def test_environments_are_the_same_whatever_the_workers_and_their_order(maker):
     tasks = [environment(k) for k in range(5)]
-    here = {k: as_bytes(collect(maker(), task)) for k, task in enumerate(tasks)}
+    here = {k: as_bytes(alone(maker(), task)) for k, task in enumerate(tasks)}
     assert run(tasks, 1) == run(tasks, 2) == here
     back = run(tasks[::-1], 2)
     assert [back[k] for k in range(5)] == [here[4 - k] for k in range(5)]
@@ -81,13 +82,13 @@ def test_lanes_are_the_same_whatever_the_workers_and_their_order(maker):
 def test_held_apart_draws_are_judged_without_noise_and_apart(maker):
     env = maker()
     tasks = [DrawTask(UP, k) for k in range(8)]
-    found = [judge_draw(env, task) for task in tasks]
+    found = [alone(env, task) for task in tasks]
     assert [k for k, _, _ in found] == list(range(8))
     reached = [SCENE.sample(k, "validation").objects[0].pose[0] > 0.5 for k in range(8)]
     assert [won for _, won, _ in found] == reached and 0 < sum(reached) < 8
     assert all("was not reached" in why for _, won, why in found if not won)
     assert env.stream == "training"
-    assert [judge_draw(env, task) for task in tasks[::-1]] == found[::-1]
+    assert [alone(env, task) for task in tasks[::-1]] == found[::-1]
 
 
 def test_a_worker_that_finds_an_error_says_it(maker):

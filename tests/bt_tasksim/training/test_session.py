@@ -188,10 +188,12 @@ def test_a_tree_whose_node_is_never_reached(refused, tiny):
 
 
 def test_words_of_a_request_that_goes_on():
-    asked = command.Request("t.xml", robot="panda", out=Path("my policy"), steps=5, backward=True)
+    asked = command.Request(
+        "t.xml", robot="panda", out=Path("my policy"), steps=5, cluster="local", backward=True
+    )
     assert asked.words() == [
         "bt-tasksim", "train", "t.xml", "--robot", "panda", "--out", "my policy", "--steps", "5",
-        "--backward", "--resume",
+        "--cluster", "local", "--backward", "--resume",
     ]  # fmt: skip
 
 

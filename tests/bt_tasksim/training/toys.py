@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,11 @@ from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Flag, Metres, ObjectName, Ratio
 from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.core.errors import BtTasksimError, UnreachableError
 from bt_tasksim.core.outcomes import Form
 from bt_tasksim.core.units import METRES
 from bt_tasksim.core.world import Command, Hidden
+from bt_tasksim.execution.worlds import Unreached
 
 _spec = importlib.util.spec_from_file_location("toy_world", Path(__file__).parents[2] / "conftest.py")
 _shared = importlib.util.module_from_spec(_spec)
@@ -58,6 +61,76 @@ class World(_shared.ToyWorld):
 
     def close(self) -> None:
         self.closed += 1
+
+
+class Worlds:
+    """Several toy worlds in place of `bt_tasksim.execution.worlds.Worlds`.
+
+    Attributes:
+        each: The worlds.
+        sizes: In how many worlds each control period was.
+    """
+
+    made: list[Any] = []
+    """Those that a test has made."""
+
+    def __init__(self, robot: Any, options: Any, count: int, threads: int) -> None:
+        self.each, self.threads = [World() for _ in range(count)], threads
+        self.robot, self.observation, self.physics = robot, None, self
+        self._seen: list[Any] = [None] * count
+        self._failed: dict[int, Any] = {}
+        self.sizes: list[int] = []
+        Worlds.made.append(self)
+
+    def reset(self, rows: Any, configurations: Any) -> dict[int, Any]:
+        tips = [tip.name for tip in self.robot.tips]
+        for row, drawn in zip(rows.tolist(), configurations, strict=True):
+            self._failed.pop(row, None)
+            self._seen[row] = self.each[row].reset(drawn, drawn.world_model(tips, self.robot.opening))
+        return {}
+
+    def errors(self, rows: Any) -> dict[int, Any]:
+        return {row: self._failed[row] for row in rows.tolist() if row in self._failed}
+
+    def observe(self, rows: Any) -> Any:
+        some = next(seen for seen in self._seen if seen is not None)
+        self.observation = stacked([some if seen is None else seen for seen in self._seen])
+        return self.observation
+
+    def step(self, tool: Any, hand: Any, rows: Any) -> list[Unreached]:
+        unreached = []
+        self.sizes.append(len(rows))
+        for k, row in enumerate(rows.tolist()):
+            parts = [None if p is None or np.isnan(p[k]).any() else p[k] for p in (tool, hand)]
+            try:
+                self._seen[row] = self.each[row].step(Command(*parts))
+            except UnreachableError as error:
+                unreached.append(Unreached(row, error))
+                self._seen[row] = self.each[row].step(Command())
+            except BtTasksimError as error:
+                self._failed[row] = error
+        return unreached
+
+    def hidden(self, rows: Any = None) -> Hidden:
+        each = self.each if rows is None else [self.each[row] for row in rows.tolist()]
+        return stacked([world.hidden() for world in each])
+
+    def close(self) -> None:
+        for world in self.each:
+            world.close()
+
+
+def instead_of_engines(put: Any) -> None:
+    """Every world is a toy from now on; ``put(path, value)`` puts a value in the place of another."""
+    put("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: World())
+    put("bt_tasksim.training.episode_batch.Worlds", Worlds)
+    put("toys.Worlds.made", [])
+
+
+def stacked(bundles: list[Any]) -> Any:
+    """Observations or hidden states of single worlds as one of several."""
+    names = [field.name for field in dataclasses.fields(bundles[0])]
+    return type(bundles[0])(**{n: np.stack([np.asarray(getattr(b, n)) for b in bundles]) for n in names})
 
 
 HIGH = Form("the tool is {height:.0f} high", {"height": METRES})

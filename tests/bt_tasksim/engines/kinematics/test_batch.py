@@ -10,14 +10,16 @@ import pytest
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError, UnreachableError
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, host
 from bt_tasksim.core.world import Command, WorldState
+from bt_tasksim.engines.kinematics import inverse
 from bt_tasksim.engines.kinematics.batch import BatchKinematics, Solution
 from bt_tasksim.engines.kinematics.failures import Reach
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.robot.description import load_robot
+from tests.array_libraries import LIBRARIES
 
-STEPS, WORLDS = 12, 64
+STEPS, WORLDS = 12, 65
 
 
 def batch(name: str, n: int, like: Array | None = None) -> BatchKinematics:
@@ -88,7 +90,7 @@ def test_a_world_does_not_feel_its_neighbours(name: str) -> None:
     whole = together(name)
     shuffled = np.random.default_rng(0).permutation(WORLDS).tolist()
     np.testing.assert_array_equal(numbers(follow(name, shuffled)), whole[shuffled])
-    for worlds in ([0], [5], [7], [14, 5], [3, 60], [21, 1, 5]):
+    for worlds in ([0], [5], [7], [14, 5], [3, 60], [21, 1, 5], list(range(64)), shuffled[:64]):
         np.testing.assert_array_equal(numbers(follow(name, worlds)), whole[worlds])
 
 
@@ -192,12 +194,57 @@ def test_single_precision_is_as_good_as_it_can_be() -> None:
     assert apart.max() < 2e-3
 
 
-def test_torch_gives_the_same_joints() -> None:
-    torch = pytest.importorskip("torch")
-    found = follow("panda", list(range(8)), torch.empty(0, dtype=torch.float64))
-    expected = together("panda")[:8]
-    n = found[0].target.position.shape[1]
+@pytest.mark.parametrize(
+    ("name", "library"),
+    [
+        *(("panda", library) for library in LIBRARIES),
+        *((n, "another device") for n in ("xarm7_ability", "so100")),
+    ],
+)
+def test_every_library_and_device_gives_the_same_joints(name: str, library: str) -> None:
+    like, worlds = LIBRARIES[library](np.zeros(1)), [0, 1, 2, 7, 9]
+    found, expected = follow(name, worlds, like), together(name)[worlds]
     for i, solution in enumerate(found):
-        assert isinstance(solution.target.position, torch.Tensor)
-        np.testing.assert_allclose(solution.target.position.numpy(), expected[:, i, :n], atol=1e-9)
+        position, velocity = solution.target.position, solution.target.velocity
+        assert type(position) is type(velocity) is type(like)
+        assert position.device == velocity.device == like.device
+        n = position.shape[1]
+        np.testing.assert_allclose(host(position), expected[:, i, :n], atol=1e-7)
+        np.testing.assert_allclose(host(velocity), expected[:, i, n : 2 * n], atol=1e-6)
         np.testing.assert_array_equal(solution.failures.code, expected[:, i, 2 * n])
+        np.testing.assert_allclose(solution.failures.distance, expected[:, i, 2 * n + 1], atol=1e-7)
+
+
+@pytest.mark.parametrize("library", LIBRARIES)
+def test_every_library_and_device_misses_by_the_same(library: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inverse, "_HARDER", 20)  # it is for the way there, not for how far it goes
+    put, (joints, tool, hand) = LIBRARIES[library], story("panda")
+    usual, other = batch("panda", 2), batch("panda", 2, put(np.zeros(1)))
+    rows, far = [4, 5], tool[-1, [4, 5]]
+    for asked in (tool[4, rows], far):
+        wanted = usual.track(asked, hand[6, rows], joints[rows])
+        found = other.track(put(asked), put(hand[6, rows]), put(joints[rows]))
+        assert found.failures.code.tolist() == wanted.failures.code.tolist()
+        np.testing.assert_allclose(host(found.target.position), wanted.target.position, atol=1e-7)
+    assert found.failures.mask.tolist() == [False, True]
+    np.testing.assert_allclose(found.failures.distance, wanted.failures.distance, atol=1e-4)
+
+
+@pytest.mark.parametrize("library", LIBRARIES)
+def test_every_library_and_device_is_asked_apart_and_finds_joints_for_poses(library: str) -> None:
+    """Rows of their own, worlds that begin anew, a pose without a rotation, and postures from nowhere."""
+    put, (joints, tool, hand) = LIBRARIES[library], story("panda")
+    usual, other = batch("panda", 3), batch("panda", 3, put(np.zeros(1)))
+    asked = tool[-1, :3].copy()
+    asked[1, 3:] = 0.0
+    for rows, at in (([0, 1, 2], 5), ([2, 0], 7), ([1], 7)):
+        wanted = usual.track(tool[at, rows], hand[at, rows], joints[rows], np.array(rows))
+        found = other.track(put(tool[at, rows]), put(hand[at, rows]), put(joints[rows]), np.array(rows))
+        np.testing.assert_allclose(host(found.target.position), wanted.target.position, atol=1e-9)
+        for kinematics in (usual, other):
+            kinematics.restart(np.array([1]), np.array([50.0]))
+    found, failures = other.joints_at(put(asked), put(joints[:3, :7]), put(joints[3:6, :7]))
+    wanted, expected = usual.joints_at(asked, joints[:3, :7], joints[3:6, :7])
+    assert failures.code.tolist() == expected.code.tolist() == [0, Reach.NO_ROTATION, 0]
+    np.testing.assert_allclose(host(found), wanted, atol=1e-6)
+    np.testing.assert_allclose(host(other.tool_pose(put(joints))), usual.tool_pose(joints), atol=1e-12)

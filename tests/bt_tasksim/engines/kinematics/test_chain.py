@@ -7,10 +7,11 @@ import pinocchio as pin
 import pytest
 
 from bt_tasksim.core.poses import Array
-from bt_tasksim.engines.kinematics.chain import Chain, difference, placements, poses_of
-from bt_tasksim.engines.kinematics.linear import solve_symmetric
+from bt_tasksim.engines.kinematics.chain import Chain, difference, placements, poses_of, turned
+from bt_tasksim.engines.kinematics.linear import solve_symmetric, total
 from bt_tasksim.engines.kinematics.models import arm_model, full_model
 from bt_tasksim.robot.description import load_robot
+from tests.array_libraries import agree
 
 SLIDING = """<robot name="crane"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
   <joint name="turn" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 1" rpy="0.1 0.2 0"/>
@@ -82,3 +83,71 @@ def test_small_systems_are_solved(m: int) -> None:
     right = np.einsum("nij,nj->ni", matrix, x)
     found = solve_symmetric(matrix.transpose(1, 2, 0).copy(), right.T.copy())
     np.testing.assert_allclose(found.T, x, atol=1e-6)
+
+
+# ---- libraries, devices and company -----------------------------------------------------------------------
+
+ROWS = 65
+
+
+def some_poses(seed: int) -> Array:
+    """Poses ``(7, ROWS)``; some turned by nothing, and some by half a turn."""
+    out = np.random.default_rng(seed).normal(size=(7, ROWS))
+    out[3:, ::9] = np.array([[1.0, 0, 0, 0]]).T
+    out[3:, 1::9] = np.array([[0.0, 0, 1, 0]]).T
+    out[3:] /= np.sqrt((out[3:] ** 2).sum(axis=0))
+    return out
+
+
+def way(here: Array, there: Array) -> Array:
+    """From one pose to another; its last three numbers may have either sign at half a turn."""
+    found = difference(placements(here), placements(there))
+    return found[:3, ...], abs(found[3:, ...])
+
+
+def through(name: str, q: Array) -> tuple[Array, Array]:
+    chain = Chain.of(model(name), "tool", q)
+    seen = chain.seen(q)
+    return seen, chain.jacobian(seen)
+
+
+def columns_of(array: Array, rows: Array) -> Array:
+    return np.ascontiguousarray(array[..., rows])
+
+
+@pytest.mark.parametrize("name", ["panda", "xarm7_ability", "so100", "crane"])
+def test_every_library_and_device_sees_the_same_chain(rows_alike, name: str) -> None:
+    q = np.random.default_rng(3).uniform(-1.5, 1.5, (model(name).nq, ROWS))
+    agree(lambda q: through(name, q), q, close=1e-12, single_close=1e-4)
+    whole = rows_alike(lambda rows: [np.moveaxis(x, -1, 0) for x in through(name, columns_of(q, rows))], ROWS)
+    np.testing.assert_array_equal(np.moveaxis(whole[0], 0, -1), through(name, q)[0])
+
+
+def test_every_library_and_device_gives_the_same_placements_and_ways(rows_alike) -> None:
+    here, there, points = some_poses(4), some_poses(5), np.random.default_rng(6).normal(size=(4, 3, ROWS))
+    agree(placements, here, close=1e-12)
+    agree(poses_of, placements(here), close=1e-12, single_close=None)
+    agree(turned, placements(here), points, close=1e-12)
+    with np.errstate(invalid="raise", divide="raise"):
+        agree(way, here, there, close=1e-9, single_close=None)
+    single = way(*(x.astype(np.float32) for x in (here, there)))
+    for part, exact in zip(single, way(here, there), strict=True):
+        np.testing.assert_allclose(part, exact, atol=1e-2)
+
+    def each(rows: Array) -> list[Array]:
+        a, b, p = (columns_of(x, rows) for x in (here, there, points))
+        found = (placements(a), turned(placements(a), p), *way(a, b))
+        return [poses_of(placements(a)), *(np.moveaxis(x, -1, 0) for x in found)]
+
+    rows_alike(each, ROWS)
+
+
+@pytest.mark.parametrize("m", [3, 6])
+def test_every_library_and_device_solves_the_same_systems(rows_alike, m: int) -> None:
+    rng = np.random.default_rng(7)
+    root = rng.normal(size=(m, m + 4, ROWS))
+    matrix = np.einsum("ikn,jkn->ijn", root, root) + np.eye(m)[..., None]
+    right = rng.normal(size=(m, ROWS))
+    agree(solve_symmetric, matrix, right, close=1e-9, single_close=1e-2)
+    agree(total, matrix, close=1e-12)
+    rows_alike(lambda rows: solve_symmetric(columns_of(matrix, rows), columns_of(right, rows)).T.copy(), ROWS)

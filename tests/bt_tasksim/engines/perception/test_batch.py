@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
 import pytest
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, host
 from bt_tasksim.core.world import Observation, WorldState
 from bt_tasksim.engines.perception.noise import noise_model
 from bt_tasksim.engines.perception.state import BatchState, StatePostProcess
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.scene import Scene
+from tests.array_libraries import LIBRARIES, single
 
 ROBOT = load_robot("panda")
 SCENES = [
@@ -25,7 +26,7 @@ SCENES = [
     Scene(objects={"superellipsoid": "on table", "diamond": "on table", "cylinder": "on table"}),
     Scene(),
 ]
-WORLDS, STEPS, FINE = 64, 3, noise_model("fine")
+WORLDS, STEPS, FINE = 65, 3, noise_model("fine")
 FIELDS = [field.name for field in dataclasses.fields(Observation)]
 
 
@@ -92,7 +93,8 @@ def check(found: dict[str, Array], expected: dict[str, Array], rows: Sequence[in
 
 
 @pytest.mark.parametrize(
-    "worlds", [[0], [3], [2, 1], [63, 3, 8], np.random.default_rng(1).permutation(WORLDS).tolist()]
+    "worlds",
+    [[0], [3], [2, 1], [63, 3, 8], list(range(64)), np.random.default_rng(1).permutation(WORLDS).tolist()],
 )
 def test_a_world_does_not_feel_its_neighbours(worlds: list[int]) -> None:
     for found, expected in zip(seen(worlds), together(), strict=True):
@@ -143,16 +145,26 @@ def test_worlds_are_asked_apart_and_begin_anew() -> None:
         check({name: getattr(found, name) for name in FIELDS}, together()[step], rows)
 
 
-def test_single_precision_and_torch() -> None:
-    torch = pytest.importorskip("torch")
+@pytest.mark.parametrize("library", [*LIBRARIES, "float32"])
+def test_every_library_and_device_sees_the_same_and_single_precision_stays_so(library: str) -> None:
+    put, tolerance = LIBRARIES.get(library, single), 2e-3 if library == "float32" else 1e-9
     configurations, states = story()
-    for make, tolerance in ((lambda x: x.astype(np.float32), 2e-3), (torch.asarray, 1e-9)):
-        batch = BatchState(ROBOT, WORLDS, FINE)
-        batch.reset(range(WORLDS), configurations)
-        for state, expected in zip(states, together(), strict=True):
-            parts = {f.name: getattr(state, f.name) for f in dataclasses.fields(state)}
-            found = batch.observe(WorldState(**{k: None if v is None else make(v) for k, v in parts.items()}))
-            for name in FIELDS:
-                value = np.asarray(getattr(found, name))
-                assert value.dtype != np.float64 or make is torch.asarray, name
-                np.testing.assert_allclose(value, expected[name], atol=tolerance, rtol=1e-4, err_msg=name)
+    like, batch = put(np.zeros(1)), BatchState(ROBOT, WORLDS, FINE)
+    batch.reset(range(WORLDS), configurations)
+    few = [7, 1, 2]
+    for state, expected in zip(states, together(), strict=True):
+        found = batch.observe(changed(state, put))
+        again = batch.observe(changed(rows_of(state, few), put), np.array(few))
+        for name in FIELDS:
+            for seen, rows in ((found, slice(None)), (again, few)):
+                value = getattr(seen, name)
+                assert type(value) is type(like) and value.device == like.device, name
+                numbers, want = host(value), expected[name][rows]
+                assert numbers.dtype == (want.dtype if want.dtype == bool else host(like).dtype), name
+                if name != "motion" or seen is found:  # the few have been seen at this instant already
+                    np.testing.assert_allclose(numbers, want, atol=tolerance, rtol=1e-4, err_msg=name)
+
+
+def changed(state: WorldState, put: Callable[[Array], Array]) -> WorldState:
+    parts = {f.name: getattr(state, f.name) for f in dataclasses.fields(state)}
+    return WorldState(**{name: None if part is None else put(part) for name, part in parts.items()})

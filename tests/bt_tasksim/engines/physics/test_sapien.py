@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from physics_cases import assert_identical, episode, holding, runner_of, scene
 
+from bt_tasksim.concept.context import one_world
 from bt_tasksim.core.world import Command
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physics.sapien import SapienPhysics
@@ -68,7 +69,7 @@ def test_after_episodes_of_another_scene_and_robot():
     disturbing.begin(1)
     for _ in range(10):
         disturbing.tick()
-        disturbing.context.advance(disturbing.pipeline.step(disturbing.context.command))
+        disturbing.context.advance(one_world(disturbing.pipeline.step(disturbing.context.command)))
     again = runner_of("pick_and_place")
     episode(again, 20)
     assert_identical(alone, episode(again, 21))

@@ -1,0 +1,182 @@
+"""What follows a Train node, watched in many worlds at once; its laws are those of `training.judge`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept.batch_leaves import ConceptInBatch
+from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.seen import Known
+from bt_tasksim.concept.status import STATUSES
+from bt_tasksim.core.batch_leaf import FAILURE, RUNNING, SUCCESS
+from bt_tasksim.core.bundles import taken
+from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Hidden
+from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.training.judge import (
+    FOLLOWER_FAILED,
+    FOLLOWER_NOT_REACHED,
+    GOAL_MISSED,
+    SignalOutcome,
+    judged_done,
+    judged_failed,
+)
+from bt_tasksim.trees.nodes.train import Train, concepts_in, follower_of
+from bt_tasksim.trees.walk import nodes_of
+
+NEVER = -1
+
+
+class BatchJudgement:
+    """Takes note of nodes that end their ticks, until what follows a Train node has ended.
+
+    Args:
+        train: The Train node.
+        tree: The tree.
+        context: The tree's.
+        hidden: The hidden state of worlds ``(k,)``; None where nobody knows it.
+
+    Attributes:
+        train: The Train node, by number.
+        follower: What judges it, by number; None: nothing follows.
+        scope: The sequence in which that follows.
+        tolerance: ``(N,)`` sufficient cost below which a goal counts as reached.
+    """
+
+    def __init__(
+        self, train: Train, tree: BatchTree, context: Context, hidden: Callable[[Array], Hidden | None]
+    ) -> None:
+        self._tree, self._context, self._hidden = tree, context, hidden
+        numbers = {id(node): number for number, node in enumerate(tree.nodes)}
+        found = follower_of(train)
+        self.train = numbers[id(train)]
+        self.follower = None if found is None else numbers[id(found[0])]
+        self.scope = None if found is None else numbers[id(found[1])]
+        judging: Behaviour = train if found is None else found[0]
+        self._leaves = {numbers[id(leaf)]: _Judged(context.worlds) for leaf in concepts_in(judging)}
+        self.tolerance: Array = np.ones(context.worlds)
+        self._cost: Array = np.zeros(context.worlds)
+        self._missed: dict[int, Outcome] = {}
+
+    @property
+    def nodes(self) -> list[int]:
+        """The nodes that are to be watched."""
+        ends = [node for node in (self.follower, self.scope) if node is not None]
+        return sorted({self.train, *ends, *self._leaves})
+
+    def reset(self, rows: Array) -> None:
+        """Begin episodes in worlds ``(k,)``."""
+        for number, judged in self._leaves.items():
+            judged.before[rows] = self._leaf(number).activation.activations[rows]
+            judged.began[rows] = NEVER
+        self._cost[rows] = 0.0
+        for row in rows.tolist():
+            self._missed.pop(row, None)
+
+    def saw(self, node: int, rows: Array, status: Array) -> None:
+        """Take note of a node that has ended its tick in worlds ``(k,)`` with statuses ``(k,)``."""
+        judged = self._leaves.get(node)
+        if judged is None:
+            return
+        now = self._leaf(node).activation.activations[rows]
+        known = (judged.began[rows] != NEVER) | (now != judged.before[rows])
+        fresh = known & (judged.began[rows] != now)
+        if fresh.any():
+            begins = rows[fresh]
+            hidden = self._hidden(begins)
+            judged.began[begins] = now[fresh]
+            for k, row in enumerate(begins.tolist()):
+                judged.hidden[row] = None if hidden is None else taken(hidden, np.array([k]))
+        done = known & (status == SUCCESS)
+        if done.any():
+            self._charge(node, judged, rows[done])
+
+    def ended(self, node: int, rows: Array) -> dict[int, SignalOutcome]:
+        """The outcomes, where there are any, of a node that has just ended its tick in worlds ``(k,)``."""
+        tree = self._tree
+        if node == self.follower:
+            ends = rows[tree.status[rows, node] > RUNNING]
+            return {row: self.by(node, row) for row in ends.tolist()}
+        return self.unreached(rows) if node == self.scope else {}
+
+    def unreached(self, rows: Array) -> dict[int, SignalOutcome]:
+        """The outcomes in worlds ``(k,)`` whose sequence has ended, and not by what follows."""
+        assert self.scope is not None and self.follower is not None
+        out = {}
+        scope, follower = self._tree.nodes[self.scope].name, self._tree.nodes[self.follower].name
+        for row in rows[self._tree.status[rows, self.scope] != RUNNING].tolist():
+            why = self._failed(self.scope, row) or FOLLOWER_NOT_REACHED(ended=scope, follower=follower)
+            out[row] = SignalOutcome(False, self._status(self.follower, row), why)
+        return out
+
+    def by(self, node: int, row: int) -> SignalOutcome:
+        """The outcome in a world, where a node judges that has ended there."""
+        name = self._tree.nodes[node].name
+        status = "" if self.follower is None else self._status(node, row)
+        if self._tree.status[row, node] == FAILURE:
+            return judged_failed(name, status, self._failed(node, row))
+        hidden, cost = self._hidden(np.array([row])), float(self._cost[row])
+        depth = None if hidden is None else float(hidden.penetration[0])
+        missed = None
+        if cost >= self.tolerance[row]:
+            missed = self._missed.get(row, GOAL_MISSED(leaf="", cost=0.0))
+        return judged_done(name, status, cost, missed, depth)
+
+    def _charge(self, node: int, judged: _Judged, rows: Array) -> None:
+        """Take in the sufficient costs of a leaf that has succeeded in worlds ``(k,)``."""
+        hidden = self._hidden(rows)
+        if hidden is None:
+            return
+        model, memory = self._leaf(node).leaf.model, self._leaf(node).activation.memory
+        facts = self._context.seen(rows, np.zeros(len(rows))).world
+        for k, row in enumerate(rows.tolist()):
+            one = np.array([k])
+
+            def one_of(values: Array, one: Array = one) -> Array:
+                return values[one]
+
+            known = Known(taken(hidden, one), facts.map(one_of), judged.hidden.get(row))
+            cost = float(model.sufficient_cost(known, taken(memory, np.array([row])))[0])
+            if cost >= self._cost[row] and cost > 0.0:
+                self._cost[row] = cost
+                self._missed[row] = GOAL_MISSED(leaf=self._tree.nodes[node].name, cost=cost)
+
+    def _failed(self, root: int, row: int) -> Outcome | None:
+        """What the first failed leaf of a subtree says, or the subtree itself."""
+        tree = self._tree
+        below = range(root, root + len(nodes_of(tree.nodes[root])))
+        for number in below:
+            if tree.nodes[number].children or tree.status[row, number] != FAILURE:
+                continue
+            said = tree.reasons.outcome_of(number, row)
+            if said is not None:
+                return FOLLOWER_FAILED(said, node=tree.nodes[number].name)
+        said = tree.reasons.outcome_of(root, row)
+        return None if said is None else FOLLOWER_FAILED(said, node=tree.nodes[root].name)
+
+    def _status(self, node: int, row: int) -> str:
+        return STATUSES[int(self._tree.status[row, node])].name
+
+    def _leaf(self, number: int) -> ConceptInBatch:
+        leaf = self._tree.compiled[number]
+        assert isinstance(leaf, ConceptInBatch)
+        return leaf
+
+
+class _Judged:
+    """A leaf whose goal counts.
+
+    Attributes:
+        before: ``(N,)`` how often it had begun when the episode did.
+        began: ``(N,)`` the activation whose beginning was seen; `NEVER` without one.
+        hidden: The hidden state ``(1, ...)`` then, by world.
+    """
+
+    def __init__(self, worlds: int) -> None:
+        self.before: Array = np.zeros(worlds, np.int64)
+        self.began: Array = np.full(worlds, NEVER, np.int64)
+        self.hidden: dict[int, Hidden | None] = {}

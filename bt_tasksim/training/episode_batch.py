@@ -1,0 +1,534 @@
+"""Activations of what stands under a `Train` node, in many worlds of one process at once.
+
+Each world has an episode of its own, from the draw to the judgement; its laws are those of
+`bt_tasksim.training.episodes`. Worlds that wait for a decision stand still in the middle of a tick, and all
+others tick and step together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept.batch_leaves import ConceptInBatch, leaf_in_batch
+from bt_tasksim.concept.context import Context, Refusal
+from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept.status import STATUSES
+from bt_tasksim.core.batch_leaf import INVALID, RUNNING, SUCCESS
+from bt_tasksim.core.bundles import taken
+from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
+from bt_tasksim.core.outcomes import INTERRUPTED, OUT_OF_REACH, TIME_OVER, Outcome, outcome_of_error
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import Hidden
+from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import LONGEST
+from bt_tasksim.execution.worlds import Worlds, why_alone
+from bt_tasksim.policy.policy import Policy, split_action
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import WorldSource
+from bt_tasksim.training.batch_judge import BatchJudgement
+from bt_tasksim.training.env import REDRAWS, find_train, not_reached, shared_layout, spaces_of
+from bt_tasksim.training.episodes import BEGAN_ANEW, FOLLOWER_LATE, TREE_ENDED, Ending, ending_of
+from bt_tasksim.training.judge import SignalOutcome
+from bt_tasksim.training.reward import Reward
+from bt_tasksim.training.transitions import Transitions
+from bt_tasksim.trees.check import check_tree
+from bt_tasksim.trees.nodes.train import BatchTrain, concepts_in
+
+IDLE, DRAWING, TICKING, WAITING, DECIDED, STEPPING = range(6)
+"""What a world does next: nothing; a world is to be drawn; its tree is to be ticked; it is waited for a
+decision, in the middle of a tick; which has come; a control period is due."""
+BEFORE = -1
+"""Number of the activation before the first decision."""
+
+
+class Happened(NamedTuple):
+    """What is new in a world: a decision is waited for, or its episode is over, or there is none.
+
+    Attributes:
+        row: The world.
+        features: What the leaf sees ``(n,)``; after an end what it saw at its last decision.
+        paid: What the decision before paid, by part; None at an episode's first decision.
+        ending: How the episode ended; None where it goes on.
+        draw: The seed of the world.
+        redrawn: How many draws before it had no activation of the subtree.
+        error: Why there is no episode; None otherwise.
+    """
+
+    row: int
+    features: Array
+    paid: dict[str, float] | None
+    ending: Ending | None
+    draw: int
+    redrawn: int
+    error: BtTasksimError | None = None
+
+
+class Draws(NamedTuple):
+    """Where the worlds of an episode are drawn from.
+
+    Attributes:
+        rng: Gives one seed after the other, until one has an episode.
+        draw: The seed of the only world instead; None: as many as it takes.
+        stream: See `bt_tasksim.scene.configuration.STREAMS`.
+        stage: Number of the scene's stage; None: the scene itself.
+    """
+
+    rng: np.random.Generator
+    draw: int | None = None
+    stream: str = "training"
+    stage: int | None = None
+
+
+class BatchDecision:
+    """A decision in one of the worlds of a batch; what was seen is taken out when it is asked for.
+
+    Args:
+        leaf: The leaf.
+        seen: What was seen in some worlds.
+        memory: What the leaf remembered in them.
+        position: Which of them it is.
+    """
+
+    __slots__ = ("_memory", "_position", "_seen", "leaf")
+
+    def __init__(self, leaf: ConceptNode, seen: Seen, memory: Any, position: int) -> None:
+        self.leaf, self._seen, self._memory, self._position = leaf, seen, memory, position
+
+    @property
+    def seen(self) -> Seen:
+        """What was seen ``(1, ...)``."""
+        return self._seen.at(np.array([self._position]))
+
+    @property
+    def memory(self) -> Any:
+        """What the leaf remembered ``(1, ...)``."""
+        return taken(self._memory, np.array([self._position]))
+
+
+def why_alone_in(tree: Behaviour, scene: WorldSource, options: EngineOptions) -> str:
+    """Why episodes of a tree run one by one, as a sentence; empty where they need not."""
+    alone = why_alone(options)
+    if alone:
+        return alone
+    context = Context(load_robot(scene.robot))
+    try:
+        BatchTree(tree, context.worlds, lambda leaf: leaf_in_batch(leaf, context))
+    except InputError:
+        return "something in the tree has no form for many worlds"
+    return ""
+
+
+class EpisodeBatch:
+    """Episodes of one tree in many worlds.
+
+    What becomes of an episode does not depend on the other worlds, nor on when its decisions come.
+
+    Args:
+        tree: The tree, with one `Train` node at least.
+        scene: The scene.
+        train: Name of the `Train` node; by default the first one.
+        options: Engines, see `bt_tasksim.execution.worlds.why_alone`; by default SAPIEN with the noise model
+            ``original``.
+        reward: What is paid.
+        longest: Seconds of an episode, earlier siblings included, after which it is truncated.
+        policies: Policies of other leaves, by the leaf's name: what was trained before.
+        worlds: How many, N.
+        threads: How many threads step them.
+
+    Raises:
+        InputError: As of `bt_tasksim.training.env.EpisodeEnv`; or the engines, or something in the tree,
+            have no form for many worlds, or these do not fit into memory.
+    """
+
+    def __init__(
+        self,
+        tree: Behaviour,
+        scene: WorldSource,
+        train: str | None = None,
+        options: EngineOptions | None = None,
+        reward: Reward | None = None,
+        longest: float = LONGEST,
+        policies: Mapping[str, Policy] | None = None,
+        worlds: int = 8,
+        threads: int = 1,
+    ) -> None:
+        check_tree(tree)
+        options = options or EngineOptions(noise="original")
+        self.tree, self.scene, self.longest = tree, scene, longest
+        self.reward = reward or Reward()
+        self.train = find_train(tree, train)
+        self.learners = self.train.learners()
+        self.robot = load_robot(scene.robot)
+        self.context = Context(self.robot, worlds)
+        for leaf in concepts_in(tree):
+            leaf.under_training = leaf in self.learners
+        for node in tree.iterate():
+            node.setup(context=self.context)
+        for leaf in concepts_in(tree):
+            if policies and leaf.name in policies and leaf not in self.learners:
+                leaf.use(policies[leaf.name])
+        self.layout = shared_layout(self.train, self.learners, self.robot)
+        self.observation_space, self.action_space = spaces_of(self.layout, self.learners[0].model.actions)
+        self.batch = BatchTree(tree, worlds, lambda leaf: leaf_in_batch(leaf, self.context))
+        self._judgement = BatchJudgement(self.train, self.batch, self.context, self._hidden)
+        for number in self._judgement.nodes:
+            self.batch.watch(number, self._watcher(number))
+        compiled = self.batch.compiled[self._judgement.train]
+        assert isinstance(compiled, BatchTrain)
+        self._train = compiled
+        self.worlds = Worlds(self.robot, options, worlds, threads)
+        self.context.hidden = self.worlds.hidden
+        n = self.observation_space.shape[0]
+        self._phase = np.full(worlds, IDLE)
+        self._activation: Array = np.full(worlds, BEFORE, np.int64)
+        self._following = np.zeros(worlds, bool)
+        self._left = np.zeros(worlds, np.int64)
+        self._features: Array = np.zeros((worlds, n), np.float32)
+        self._draws: list[Draws | None] = [None] * worlds
+        self._drawn = np.zeros(worlds, np.int64)
+        self._redrawn = np.zeros(worlds, np.int64)
+        self._transitions: dict[int, Transitions] = {}
+        self._happened: list[Happened] = []
+        self._over: list[int] = []
+
+    # ---- from outside -----------------------------------------------------------------------------------
+
+    @property
+    def count(self) -> int:
+        """How many worlds there are, N."""
+        return self.context.worlds
+
+    @property
+    def waiting(self) -> Array:
+        """The worlds ``(k,)`` in which a decision is waited for."""
+        return np.flatnonzero(self._phase == WAITING)
+
+    def features(self) -> Array:
+        """What each leaf saw at the last decision of its world ``(N, n)``."""
+        return self._features.copy()
+
+    def begin(self, row: int, draws: Draws) -> None:
+        """Begin an episode in a world, whatever goes on there; `go_on` draws it."""
+        self._drop(np.array([row]))
+        self._draws[row], self._redrawn[row], self._phase[row] = draws, 0, DRAWING
+
+    def leave(self, row: int) -> None:
+        """End the episode of a world where it is."""
+        self._drop(np.array([row]))
+
+    def decide(self, rows: Array, actions: Array) -> None:
+        """Say what is to be done in worlds in which it is waited for.
+
+        Args:
+            rows: Which ``(k,)``.
+            actions: Motions and completion signals ``(k, actions + 1)``.
+
+        Raises:
+            InputError: The actions have the wrong shape or are not finite.
+            RuntimeError: In one of them no decision is waited for.
+        """
+        rows, actions = np.asarray(rows), np.asarray(actions, np.float64)
+        size = self.action_space.shape[0]
+        if actions.shape != (len(rows), size) or not np.isfinite(actions).all():
+            raise InputError(f"an action should be {size} finite numbers, found {actions}")
+        if not (self._phase[rows] == WAITING).all():
+            raise RuntimeError("a decision for a world that does not wait for one: begin an episode first")
+        action = split_action(actions)
+        leaves = self.batch.waits_at[rows]
+        for number in np.unique(leaves).tolist():
+            there = np.flatnonzero(leaves == number)
+            self._leaf(number).decide(rows[there], taken(action, there))
+        for k, row in enumerate(rows.tolist()):
+            self._transitions[row].decided(action.motion[k])
+        self._phase[rows] = DECIDED
+
+    def go_on(self) -> list[Happened]:
+        """Until something has happened in a world at least; nothing where all wait or are idle.
+
+        Raises:
+            BtTasksimError: An engine or a leaf has failed, outside of a judgement.
+        """
+        try:
+            while True:
+                decided = np.flatnonzero(self._phase == DECIDED)
+                if len(decided):
+                    self._phase[decided] = TICKING
+                    self._ticked(decided, self.batch.resume(decided))
+                if self._happened:
+                    found, self._happened = self._happened, []
+                    return found
+                fresh = self._begin(np.flatnonzero(self._phase == DRAWING))
+                stepped = self._step(np.flatnonzero(self._phase == STEPPING))
+                rows = np.union1d(fresh, stepped)
+                if len(rows):
+                    self._phase[rows] = TICKING
+                    self._ticked(rows, self.batch.tick(rows, self.context.times[rows]))
+                elif not self._happened and not (self._phase == DRAWING).any():
+                    return []
+        except BaseException:
+            self._drop(np.arange(self.count))
+            raise
+
+    def close(self) -> None:
+        """Let go of engines; the tree can be run again."""
+        self._drop(np.arange(self.count))
+        for leaf in self.learners:
+            leaf.under_training = False
+        self.worlds.close()
+
+    # ---- worlds -----------------------------------------------------------------------------------------
+
+    def _begin(self, rows: Array) -> Array:
+        """Draw worlds and begin in them; the rows in which that was possible."""
+        if not len(rows):
+            return rows
+        drawn, models, begun = [], [], []
+        tips = [tip.name for tip in self.robot.tips]
+        for row in rows.tolist():
+            draws = self._draws[row]
+            assert draws is not None
+            self._drawn[row] = int(draws.rng.integers(2**31)) if draws.draw is None else draws.draw
+            try:
+                drawn.append(self.scene.sample(int(self._drawn[row]), draws.stream, draws.stage))
+            except BtTasksimError as error:
+                self._none(row, error)
+                continue
+            begun.append(row)
+            models.append(drawn[-1].world_model(tips, self.robot.opening))
+            self._left[row] = round(self.longest * drawn[-1].control_frequency)
+            self._judgement.tolerance[row] = drawn[-1].tolerance
+        begun_rows = np.array(begun, int)
+        if not begun:
+            return begun_rows
+        self.batch.reset(begun_rows)
+        self.context.begin(models, begun_rows)
+        failed = self.worlds.reset(begun_rows, drawn)
+        for row, why in failed.items():
+            self._none(row, why)
+        fresh = np.array([row for row in begun if row not in failed], int)
+        self._activation[fresh], self._following[fresh] = BEFORE, False
+        self._judgement.reset(fresh)
+        if len(fresh):
+            self.context.advance(self.worlds.observe(fresh), fresh)
+        return fresh
+
+    def _none(self, row: int, error: BtTasksimError) -> None:
+        """There is no episode in a world."""
+        self._phase[row] = IDLE
+        draw, redrawn = int(self._drawn[row]), int(self._redrawn[row])
+        self._happened.append(Happened(row, self._features[row], None, None, draw, redrawn, error))
+
+    def _step(self, rows: Array) -> Array:
+        """One control period; the worlds that have come through it."""
+        if not len(rows):
+            return rows
+        self._left[rows] -= 1
+        written = self.context.written
+        tool, hand = (None if part is None else part[rows] for part in (written.tool, written.hand))
+        writers = {row: self.context.tool_writer(row) for row in rows.tolist()}
+        unreached = self.worlds.step(tool, hand, rows)
+        failed = self.worlds.errors(rows)
+        for row, error in failed.items():
+            self._spoiled(row, error)
+        if failed:
+            self._leave()
+            rows = rows[self._phase[rows] == STEPPING]
+            if not len(rows):
+                return rows
+        self.context.advance(self.worlds.observe(rows), rows)
+        for miss in unreached:
+            if not isinstance(miss.error, UnreachableError):
+                raise miss.error
+            outcome = OUT_OF_REACH(what=miss.error, distance=miss.error.distance, angle=miss.error.angle)
+            self.context.refused[miss.row] = Refusal(writers[miss.row], outcome)
+        return rows
+
+    def _spoiled(self, row: int, error: BtTasksimError) -> None:
+        """An engine has failed in a world: where it is being judged, the judgement is spoiled."""
+        if not self._following[row] or isinstance(error, (InputError, LeafError)):
+            raise error
+        self._end(row, SignalOutcome(False, "INVALID", outcome_of_error(error), discarded=True))
+
+    def _hidden(self, rows: Array) -> Hidden | None:
+        return self.worlds.physics.hidden(rows)
+
+    # ---- within a tick ----------------------------------------------------------------------------------
+
+    def _watcher(self, node: int) -> Callable[[Array, Array], Array | None]:
+        def watch(rows: Array, status: Array) -> Array | None:
+            return self._visited(node, rows, status)
+
+        return watch
+
+    def _visited(self, node: int, rows: Array, status: Array) -> Array | None:
+        """A watched node has ended its tick; where the tick goes on."""
+        judgement, over = self._judgement, len(self._over)
+        following = self._following[rows]
+        judgement.saw(node, rows, status)
+        if following.any():
+            for row, judged in judgement.ended(node, rows[following]).items():
+                self._end(row, judged)
+        if node == judgement.train:
+            ended = rows[(status != RUNNING) & ~following]
+            early = self._activation[ended] == BEFORE
+            if early.any():  # nothing was decided
+                judgement.reset(ended[early])
+            for row in ended[~early].tolist():
+                if self.batch.status[row, node] != SUCCESS:
+                    self._end(row)
+                elif judgement.follower is None:
+                    self._end(row, judgement.by(node, row))
+                else:
+                    self._following[row] = True
+        if len(self._over) == over:
+            return None
+        going: Array = ~np.isin(rows, self._over[over:])
+        return going
+
+    def _ticked(self, rows: Array, status: Array) -> None:
+        """Ticks have ended, or stand still before a leaf that is to learn."""
+        batch, judgement = self.batch, self._judgement
+        if self._over:
+            on = ~np.isin(rows, self._over)
+            rows, status = rows[on], status[on]
+        at = batch.waits_at[rows]
+        self._pending(rows[at >= 0])
+        rows, status = rows[at < 0], status[at < 0]
+        self._phase[rows] = STEPPING
+        following, before = self._following[rows], self._activation[rows] == BEFORE
+        ended, late = status != RUNNING, self._left[rows] <= 0
+        stopped = batch.status[rows, judgement.train] != RUNNING
+        if following.any():
+            for row, judged in judgement.unreached(rows[following]).items():
+                self._end(row, judged)
+            following &= self._phase[rows] == STEPPING
+            for row in rows[following & ended].tolist():
+                self._end(row, SignalOutcome(False, "INVALID", TREE_ENDED()))
+            for row in rows[following & ~ended & late].tolist():
+                self._end(row, SignalOutcome(False, "RUNNING", FOLLOWER_LATE(), discarded=True))
+        acting = ~following & ~before & (self._phase[rows] == STEPPING)
+        for row in rows[acting & stopped].tolist():
+            self._end(row, cut=INTERRUPTED())
+        for row in rows[acting & ~stopped & ended].tolist():
+            self._end(row)
+        for row in rows[acting & ~stopped & ~ended & late].tolist():
+            self._end(row, cut=TIME_OVER(limit=self.longest))
+        for row in rows[before & (ended | late)].tolist():
+            self._draw_again(row)
+        self._leave()
+
+    def _pending(self, rows: Array) -> None:
+        """A leaf that is to learn is about to act in worlds ``(k,)``."""
+        if not len(rows):
+            return
+        judgement, judged = self._judgement, self._following[rows]
+        for row in rows[judged].tolist():
+            self._end(row, SignalOutcome(False, "INVALID", BEGAN_ANEW(train=self.train.name)))
+        rows = rows[~judged]
+        first = rows[self._activation[rows] == BEFORE]
+        if len(first):
+            self._activation[first] = self._train.activations[first]
+            if judgement.follower is not None:
+                judgement.reset(first)  # what it did in earlier rounds
+        same = self._train.activations[rows] == self._activation[rows]
+        for row in rows[~same].tolist():
+            self._end(row, cut=INTERRUPTED())
+        rows = rows[same]
+        self._phase[rows] = WAITING
+        for number, there in self.batch.arrays.groups(self.batch.waits_at[rows], rows):
+            self._waits(self._leaf(number), there)
+
+    def _waits(self, leaf: ConceptInBatch, rows: Array) -> None:
+        """Worlds ``(k,)`` wait before a leaf for a decision: what it sees, and what the one before paid."""
+        judged = leaf.activation.going_on(rows)
+        model, seen, memory = leaf.leaf.model, judged.seen, judged.memory
+        features = np.asarray(model.features(seen, memory), np.float32)
+        if features.shape != (len(rows), *self.observation_space.shape):
+            raise InputError(
+                f"'{leaf.leaf.name}': features() gives {features.shape[1:]}, layout() says "
+                f"{self.observation_space.shape}"
+            )
+        self._features[rows] = features
+        costs = np.asarray(model.necessary_cost(seen, memory), float).tolist()
+        for k, row in enumerate(rows.tolist()):
+            decision = BatchDecision(leaf.leaf, seen, memory, k)
+            transitions, paid = self._transitions.get(row), None
+            if transitions is None:
+                self._transitions[row] = Transitions(decision, self.reward.gamma, costs[k])
+            else:
+                paid = self.reward.pay(transitions.to(decision, costs[k]))
+            self._happened.append(
+                Happened(row, features[k], paid, None, int(self._drawn[row]), int(self._redrawn[row]))
+            )
+
+    # ---- ends -------------------------------------------------------------------------------------------
+
+    def _end(self, row: int, judged: SignalOutcome | None = None, cut: Outcome | None = None) -> None:
+        """The episode of a world is over; at the end of the tick it is left."""
+        transitions = self._transitions.pop(row)
+        last = transitions.decision.leaf
+        number = next(n for n, node in enumerate(self.batch.nodes) if node is last)
+        reasons = self.batch.reasons
+        failed = reasons.speaker(self._judgement.train, row)
+        ending = ending_of(
+            cut,
+            judged,
+            self._leaf(number).outcome(row),
+            None if failed is None else reasons.outcome_of(failed, row),
+            self.reward.sufficient,
+            STATUSES[int(self._train.place.status[row])].name,
+            float(self.context.times[row]),
+        )
+        paid = self.reward.pay(transitions.to_end(ending.end, ending.kept))
+        draw, redrawn = int(self._drawn[row]), int(self._redrawn[row])
+        self._happened.append(Happened(row, self._features[row].copy(), paid, ending, draw, redrawn))
+        self._phase[row] = IDLE
+        self._over.append(row)
+
+    def _draw_again(self, row: int) -> None:
+        """The subtree was never active in the world of a draw."""
+        draws = self._draws[row]
+        assert draws is not None
+        self._redrawn[row] += 1
+        self._phase[row] = DRAWING
+        self._over.append(row)
+        if self._redrawn[row] < REDRAWS and draws.draw is None:
+            return
+        speaker = self.batch.reasons.speaker(0, row)
+        said = None if speaker is None else self.batch.reasons.said_by(speaker, row)
+        status = STATUSES[int(self.batch.status[row, 0])].name
+        why = "" if said is None else said.sentence
+        redrawn, draw = int(self._redrawn[row]), int(self._drawn[row])
+        self._none(row, not_reached(self.train.name, redrawn, draw, status, why))
+
+    def _leave(self) -> None:
+        """End all nodes in worlds whose episode is over."""
+        if self._over:
+            self._clear(np.array(sorted(self._over)))
+            self._over.clear()
+
+    def _drop(self, rows: Array) -> None:
+        """End the episodes of worlds ``(k,)`` where they are."""
+        self._phase[rows] = IDLE
+        for row in rows.tolist():
+            self._transitions.pop(row, None)
+        self._over = [row for row in self._over if row not in rows]
+        self._happened = [event for event in self._happened if event.row not in rows]
+        self._clear(rows)
+
+    def _clear(self, rows: Array) -> None:
+        active = rows[(self.batch.status[rows] != INVALID).any(axis=1) | (self.batch.waits_at[rows] >= 0)]
+        self.batch.reset(active)
+        if self.worlds.observation is not None:
+            self.context.advance(self.context.observation, rows)  # what they have commanded is void
+
+    def _leaf(self, number: int) -> ConceptInBatch:
+        leaf = self.batch.compiled[number]
+        assert isinstance(leaf, ConceptInBatch)
+        return leaf

@@ -1,0 +1,340 @@
+"""Episodes in many worlds at once: each is what an environment of its own would have had, bit for bit."""
+
+import gymnasium
+import numpy as np
+import pytest
+import toys
+from py_trees.behaviours import Failure
+from py_trees.common import Status
+from test_rollouts import UP as NETWORK
+from toys import DONE, SCENE, STILL, UP, Below, Check, Even, Move, Raise, Turn, Unprogrammed, honest
+
+from bt_tasksim.concept_nodes import Wait
+from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
+from bt_tasksim.core.registry import register
+from bt_tasksim.training.collectors import DrawTask, RolloutTask
+from bt_tasksim.training.env import REDRAWS
+from bt_tasksim.training.episode_batch import EpisodeBatch
+from bt_tasksim.training.reward import Reward
+from bt_tasksim.training.reward_parts import RewardPart
+from bt_tasksim.training.rollouts import alone, in_batch
+from bt_tasksim.training.vector_env import EpisodeVectorEnv
+from bt_tasksim.trees import (
+    fallback,
+    force_failure,
+    force_success,
+    invert,
+    parallel,
+    reactive_fallback,
+    reactive_sequence,
+    repeat,
+    retry,
+    sequence,
+    subtree,
+    timeout,
+)
+from bt_tasksim.trees.nodes.train import Train
+
+HERE = 0.35
+
+
+class Late(Raise):
+    """Decides after a while only."""
+
+    def decides(self, seen, memory):
+        return memory >= 4
+
+
+def simple(height=0.45, **settings):
+    return sequence("s", Train(Raise(height=height, **settings)), Check(height=height))
+
+
+def several():
+    first, second = Raise(height=0.37, name="first"), Raise(height=0.45, name="second")
+    inner = sequence("i", Move(0.33), first, fallback("f", Below(0.1), Move(0.41)), second, Wait(0.1))
+    return sequence("s", Move(0.3), Train(inner), Check())
+
+
+def high_then_low():
+    return sequence("s", Train(Raise()), Check(blind=True), Move(0.5), Check(name="second"))
+
+
+TREES = {
+    "simple": simple,
+    "alone": lambda: Train(Raise()),
+    "passed over": lambda: sequence("s", Even(), simple()),
+    "a long way before": lambda: sequence("s", Wait(0.3), Even(), Move(0.3), simple()),
+    "several leaves": several,
+    "two in parallel": lambda: Train(parallel("p", Raise(name="a"), Wait(0.3), success=2)),
+    "in a parallel": lambda: parallel("a", Wait(0.1), sequence("b", Train(Raise())), success=2),
+    "tried again": lambda: retry(3, sequence("s", Train(Raise(limit=0.5)), Check())),
+    "repeated": lambda: repeat(2, sequence("s", Train(fallback("e", Below(0.4), Raise())), Check())),
+    "interrupted": lambda: reactive_sequence("r", Below(0.4), simple()),
+    "interrupted by a fallback": lambda: reactive_fallback("r", invert(Below(0.4)), simple()),
+    "out of time": lambda: timeout(0.3, simple()),
+    "the subtree's time": lambda: sequence("s", Train(timeout(0.3, Raise())), Check()),
+    "a failing subtree": lambda: sequence("r", Train(sequence("i", Raise(), Below(0.1))), Check()),
+    "forced": lambda: sequence("r", force_success(Train(Raise())), Check()),
+    "forced to fail": lambda: sequence("r", invert(force_failure(Train(Raise()))), Check()),
+    "late": lambda: sequence("s", Train(Late()), Check()),
+    "blind follower": lambda: sequence("s", Train(Raise()), Check(blind=True)),
+    "two checks": high_then_low,
+    "a follower that begins anew": lambda: retry(
+        2, sequence("s", Train(Raise()), force_failure(Check(blind=True)), Check())
+    ),
+    "guarded": lambda: reactive_sequence(
+        "g", Below(0.4), sequence("s", Train(Raise(height=HERE)), Move(0.45), Check())
+    ),
+    "late follower": lambda: sequence("s", Train(Raise(height=HERE)), Check(height=HERE, ticks=1.0)),
+    "composite follower": lambda: sequence(
+        "s", Train(Raise()), sequence("then", Below(), Check(), Wait(0.1), Check(name="second"))
+    ),
+    "recovering": lambda: sequence(
+        "s", Train(Raise()), fallback("r", Check(height=0.9, name="vain"), Check())
+    ),
+    "subtree": lambda: subtree("t", sequence("u", Below(2.0), Train(Raise())), ) ,
+}  # fmt: skip
+
+
+def task(number, decisions=40, std=0.3, stage=None):
+    return RolloutTask(NETWORK, np.full(2, std, np.float32), (7, number), decisions, stage)
+
+
+def as_bytes(found):
+    return {k: v.tobytes() if isinstance(v, np.ndarray) else v for k, v in vars(found).items()}
+
+
+def batched(batch, tasks):
+    return [as_bytes(found) for _, found in sorted(in_batch(batch, tasks), key=lambda pair: pair[0])]
+
+
+@pytest.fixture
+def batch_of(toy_engines):
+    return lambda tree, scene=SCENE, **settings: EpisodeBatch(tree, scene, **settings)
+
+
+@pytest.fixture
+def vector_of(toy_engines):
+    return lambda tree, scene=SCENE, **settings: EpisodeVectorEnv(tree, scene, **settings)
+
+
+# ---- rollouts ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("longest", [30.0, 0.6])
+@pytest.mark.parametrize("tree", TREES.values(), ids=list(TREES))
+def test_rollouts_are_those_of_an_environment_of_their_own(env_of, batch_of, tree, longest):
+    tasks = [task(k) for k in range(4)]
+    expected = []
+    try:
+        expected = [as_bytes(alone(env_of(tree(), longest=longest), t)) for t in tasks]
+    except InputError as error:
+        with pytest.raises(InputError) as caught:
+            batched(batch_of(tree(), worlds=3, longest=longest), tasks)
+        assert str(caught.value).startswith(str(error).split("draws")[0])
+        return
+    for worlds in (1, 3, 5):
+        assert batched(batch_of(tree(), worlds=worlds, longest=longest), tasks) == expected
+    again = batch_of(tree(), worlds=2, longest=longest)
+    assert batched(again, tasks[::-1])[::-1] == expected
+    assert batched(again, tasks) == expected, "and the same worlds once more"
+
+
+@pytest.mark.parametrize("tree", ["simple", "passed over", "several leaves", "blind follower"])
+def test_held_apart_draws_too(env_of, batch_of, tree):
+    tasks = [DrawTask(NETWORK, k) for k in range(8)]
+    env = env_of(TREES[tree]())
+    expected = [alone(env, t) for t in tasks]
+    found = sorted(in_batch(batch_of(TREES[tree](), worlds=3), tasks))
+    assert [result for _, result in found] == expected
+
+
+def test_an_episode_is_pulled_up_by_no_other(batch_of):
+    """Worlds tick and step together, whatever each waits for."""
+    batch = batch_of(simple(), worlds=4)
+    batched(batch, [task(k) for k in range(4)])
+    (worlds,) = toys.Worlds.made
+    assert sum(worlds.sizes) / len(worlds.sizes) > 3.5
+
+
+@pytest.mark.parametrize(
+    "error", [MachineError("the engine stopped"), UnreachableError("100 mm too far", 0.1, 0.0)]
+)
+def test_an_error_while_it_is_judged_discards_this_world_alone(env_of, vector_of, error):
+    env = env_of(simple(HERE))
+    env.reset(seed=1)
+    env.runner.pipeline.error = error
+    expected = env.step(np.array(DONE))
+    vector = vector_of(simple(HERE), num_envs=3)
+    vector.reset(seed=0)
+    vector.batch.worlds.each[1].error = error
+    vector.send(np.arange(3), np.array([STILL, DONE, STILL]))
+    found = {}
+    while len(found) < 3:
+        rows, ready = vector.recv()
+        vector.batch.worlds.each[1].error = None
+        for k, row in enumerate(rows.tolist()):
+            found[row] = ready.rewards[k], ready.terminated[k], ready.truncated[k], ready.infos[k]
+    assert found[1][3]["final_info"] == expected[4] and expected[4]["discarded"] and vector.discarded == 1
+    assert found[1][:3] == expected[1:4]
+    assert not any(found[row][1] or found[row][2] for row in (0, 2))
+
+
+def test_an_error_before_is_an_error(vector_of):
+    vector = vector_of(simple(), num_envs=2)
+    vector.reset(seed=0)
+    vector.batch.worlds.each[1].error = MachineError("the engine stopped")
+    with pytest.raises(MachineError, match=r"^the engine stopped$"):
+        vector.step(np.array([UP, UP]))
+    vector.batch.worlds.each[1].error = None
+    with pytest.raises(RuntimeError, match="does not wait for one"):
+        vector.step(np.array([UP, UP]))
+    vector.reset(seed=0)
+    vector.step(np.array([UP, UP]))
+
+
+class Broken(Check):
+    """Raises."""
+
+    def done(self, seen, memory):
+        raise ZeroDivisionError("no such thing")
+
+
+def test_a_leaf_that_raises_is_named_and_nothing_runs_on(vector_of):
+    vector = vector_of(sequence("s", Train(Raise(height=HERE)), Broken(HERE, name="bad")), num_envs=2)
+    vector.reset(seed=0)
+    with pytest.raises(LeafError, match=r"leaf 'bad' raised ZeroDivisionError in test_vector_env.py:\d+: no"):
+        vector.step(np.array([UP, DONE]))
+    assert not vector.batch.batch.status.any() and not len(vector.batch.waiting)
+
+
+# ---- the vector environment ----------------------------------------------------------------------------
+
+
+def test_it_is_a_vector_of_environments(env_of, vector_of):
+    """As gymnasium's own, which has an environment for each."""
+    mode = gymnasium.vector.AutoresetMode.SAME_STEP
+    own = gymnasium.vector.SyncVectorEnv(
+        [lambda: env_of(sequence("s", Even(), simple()), longest=0.8)] * 3, autoreset_mode=mode
+    )
+    vector = vector_of(sequence("s", Even(), simple()), num_envs=3, longest=0.8)
+    assert vector.metadata["autoreset_mode"] == mode
+    assert vector.observation_space == own.observation_space and vector.action_space == own.action_space
+    pairs = [(own.reset(seed=5), vector.reset(seed=5))]
+    rng, ends = np.random.default_rng(0), 0
+    for _ in range(60):
+        actions = rng.uniform([-0.2, -1.0], [1.0, 0.6], (3, 2)).astype(np.float32)
+        pairs.append((own.step(actions), vector.step(actions)))
+        ends += int(pairs[-1][1][2].sum() + pairs[-1][1][3].sum())
+    assert ends > 10
+    for expected, found in pairs:
+        for one, other in zip(expected[:-1], found[:-1], strict=True):
+            assert np.array_equal(one, other)
+        same(expected[-1], found[-1])
+
+
+def same(expected, found):
+    """Infos are alike; a number that is in nobody's is of no meaning."""
+    assert set(found) == set(expected)
+    for key, value in expected.items():
+        if isinstance(value, dict):
+            same(value, found[key])
+        elif not key.startswith("_"):
+            given = expected["_" + key] if "_" + key in expected else slice(None)
+            assert [str(v) for v in value[given]] == [str(v) for v in found[key][given]], key
+
+
+def test_worlds_that_are_ready_need_not_wait_for_others(env_of, vector_of):
+    """Each world is given its actions as soon as it asks: it comes to what it comes to by itself."""
+
+    def tree():
+        return sequence("s", Even(), Move(0.3), Train(Raise()), Check())
+
+    env = env_of(tree())
+    vector = vector_of(tree(), num_envs=3)
+    vector.begin(np.arange(3), 0)
+    episodes, rewards, counts = [[], [], []], [[], [], []], set()
+    features = {}
+    turn = 0
+    while min(map(len, episodes)) < 4:
+        rows, ready = vector.recv()
+        counts.add(len(rows))
+        for k, row in enumerate(rows.tolist()):
+            features[row] = ready.features[k]
+            if "draw" not in ready.infos[k] or "final_info" in ready.infos[k]:
+                rewards[row].append(ready.rewards[k])
+            if ready.terminated[k]:
+                episodes[row].append(rewards[row])
+                rewards[row] = []
+        turn += 1
+        held = turn % 3 if len(features) > 1 else -1  # one of them is late now and then
+        sent = [row for row in sorted(features) if row != held]
+        vector.send(np.array(sent), np.array([honest(features.pop(row)) for row in sent]))
+    assert len(counts) > 1
+    for seed in (0, 1, 2):
+        expected = []
+        for k in range(4):
+            seen, _ = env.reset(seed=None if k else seed)
+            expected.append([])
+            over = False
+            while not over:
+                seen, reward, over, _, _ = env.step(np.array(honest(seen)))
+                expected[k].append(reward)
+        assert expected == episodes[seed][:4]
+
+
+def test_what_is_asked_wrongly_is_one_sentence(vector_of):
+    vector = vector_of(simple(), num_envs=2)
+    with pytest.raises(RuntimeError, match="begin an episode first"):
+        vector.step(np.zeros((2, 2)))
+    vector.reset(seed=0)
+    for action in (np.zeros(2), np.zeros((2, 3)), np.full((2, 2), np.nan)):
+        with pytest.raises(InputError, match="an action should be 2 finite numbers, found"):
+            vector.step(action)
+    with pytest.raises(InputError, match="there are 2 worlds, and 3 seeds"):
+        vector.reset(seed=[1, 2, 3])
+    rows, ready = vector.recv()
+    assert len(rows) == 0 and ready.features.shape == (0, 3), "all wait already"
+    vector.step(np.array([UP, UP]))
+    never = vector_of(sequence("s", Below(0.1), Train(Raise(), "mine")), num_envs=2)
+    with pytest.raises(InputError, match=f"'mine' was not reached in {REDRAWS} draws; the last one"):
+        never.reset(seed=0)
+    with pytest.raises(InputError, match="see or do different things"):
+        vector_of(Train(sequence("s", Raise(name="a"), Turn(name="b"))))
+    with pytest.raises(InputError, match="has no form for many worlds"):
+        vector_of(sequence("s", Failure("no"), Train(Raise())))
+    with pytest.raises(InputError, match="leaf 'first' has no policy yet"):
+        vector_of(sequence("s", Unprogrammed(name="first"), Train(Raise()))).reset(seed=0)
+
+
+def test_a_mask_begins_some_worlds_anew(vector_of):
+    vector = vector_of(simple(), num_envs=3)
+    first, _ = vector.reset(seed=0)
+    vector.step(np.array([UP, UP, UP]))
+    again, _ = vector.reset(seed=0, options={"reset_mask": np.array([True, False, True])})
+    assert np.array_equal(again[[0, 2]], first[[0, 2]]) and not np.array_equal(again[1], first[1])
+
+
+def test_a_reward_part_of_ones_own_sees_each_decision(env_of, vector_of):
+    @register("reward part", "high")
+    class High(RewardPart):
+        def pay(self, transition):
+            assert transition.decision.memory.shape == (1,)
+            return float(transition.decision.seen.tool[0, 2])
+
+    reward = Reward(terms={"high": 0.1})
+    env, vector = env_of(simple(), reward=reward), vector_of(simple(), num_envs=2, reward=reward)
+    env.reset(seed=1)
+    vector.reset(seed=0)
+    for _ in range(3):
+        expected = env.step(np.array(UP))[1]
+        assert vector.step(np.array([STILL, UP]))[1][1] == expected != 0.0
+
+
+def test_after_it_the_tree_can_be_run(vector_of, toy):
+    tree = simple()
+    vector = vector_of(tree, num_envs=2)
+    vector.reset(seed=0)
+    vector.close()
+    assert [world.closed for world in vector.batch.worlds.each] == [1, 1]
+    assert toy(tree).tick(50) == Status.SUCCESS
