@@ -113,7 +113,7 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
             from bt_tasksim.engines.physics.warp_batch import device as devices
             from bt_tasksim.engines.physics.warp_batch import group, meshes, report, structure
 
-            self._device = devices.start(device)
+            self.device = devices.start(device)
             self._warp = devices.mujoco_warp_library()
         except ImportError as error:
             raise MachineError(
@@ -123,8 +123,8 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
         super().__init__(robot, worlds, threads)
         self._mujoco, self._structure, self._report = mujoco, structure, report
         self._group_class = group.WarpGroup
-        self._hulls = meshes.HullStore(self._device)
-        self._groups: dict[bytes, WarpGroup] = {}
+        self._hulls = meshes.HullStore(self.device)
+        self.groups: dict[bytes, WarpGroup] = {}
         self._gains = np.array([self._stiffness, self._damping])
         kinds = self._warp.OverflowType
         self._overflow = sum(int(kinds[name]) for name in OVERFLOW)
@@ -190,12 +190,12 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
             InputError: MuJoCo Warp does not take them.
         """
         first = worlds[0]
-        group = self._groups.get(first.prepared.key)
+        group = self.groups.get(first.prepared.key)
         if group is None:
             bodies = self._report.BodyNumbers.of(self.robot, first.prepared.world, first.n_fixtures)
-            group = self._group_class(self._warp, self._device, first.prepared, bodies, self._hulls)
+            group = self._group_class(self._warp, self.device, first.prepared, bodies, self._hulls)
         slots = group.enter([world.prepared for world in worlds])
-        self._groups[first.prepared.key] = group
+        self.groups[first.prepared.key] = group
         reports = group.look(np.array(slots))
         for world, slot, report in zip(worlds, slots, reports, strict=True):
             world.group, world.slot, world.report = group, slot, report

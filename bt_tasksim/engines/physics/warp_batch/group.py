@@ -49,6 +49,11 @@ class WarpGroup:
         self.com = np.array(first.world.model.body_ipos[first.world.object_body])
 
     @property
+    def room(self) -> int:
+        """How many worlds there is room for."""
+        return 0 if self._main is None else self._main.count
+
+    @property
     def columns(self) -> Columns:
         """Where things are in a report."""
         assert self._main is not None, "worlds have entered"
@@ -123,14 +128,15 @@ class WarpGroup:
         before, n = self._main, 0 if self._main is None else self._main.count
         count = n + lacking if before is None else math.ceil(GROWTH * (n + lacking))
         self._hulls.flush()
-        self._main = self._new(count)
+        self._main = self.apart(count)
         if before is not None:
             before.copy_to(np.arange(n), self._main, np.arange(n))
         if self._side is None or self._side.count < min(count, ASIDE):
-            self._side = self._new(min(count, ASIDE))
+            self._side = self.apart(min(count, ASIDE))
         self._free += range(count - 1, n - 1, -1)
 
-    def _new(self, count: int) -> WarpWorlds:
+    def apart(self, count: int) -> WarpWorlds:
+        """Worlds of this structure apart from those of the group, all as the first one."""
         made = WarpWorlds(self._library, self._device, self._first, self.bodies, self._hulls, count)
         made.load(np.arange(count), [self._first] * count, np.tile(self._meshes, (count, 1)))
         return made
