@@ -19,8 +19,8 @@ from bt_tasksim.engines.physics.warp_batch.report import BodyNumbers, Columns
 from bt_tasksim.engines.physics.warp_batch.structure import Prepared
 from bt_tasksim.engines.physics.warp_batch.worlds import WarpWorlds
 
-ASIDE = 32
-"""Worlds that there is room for at the side."""
+ASIDE = (1, 4, 32)
+"""Worlds that there is room for at the side: as few as do."""
 GROWTH = 1.25
 
 
@@ -45,7 +45,7 @@ class WarpGroup:
         self._rooms: dict[int, Array] = {}
         self._free: list[int] = []
         self._main: WarpWorlds | None = None
-        self._side: WarpWorlds | None = None
+        self._sides: dict[int, WarpWorlds] = {}
         self.com = np.array(first.world.model.body_ipos[first.world.object_body])
 
     @property
@@ -95,9 +95,8 @@ class WarpGroup:
             What is read then, ``(k, columns)``.
         """
         assert self._main is not None
-        assert self._side is not None
         reports, usual = np.zeros((len(slots), self.columns.width), np.int32), slots[~fine]
-        if 2 * len(usual) > self._main.count or len(usual) > self._side.count:
+        if 2 * len(usual) > self._main.count or len(usual) > ASIDE[-1]:
             reports[~fine] = self._main.period(usual, fine=False)[usual]
         else:  # the most of them stand still
             reports[~fine] = self._aside(usual, lambda side, rows: side.period(rows, fine=False))
@@ -110,18 +109,24 @@ class WarpGroup:
         self._main.write(slots, name, values)
 
     def _aside(self, slots: Array, what: Callable[[WarpWorlds, Array], Array]) -> Array:
-        main, side = self._main, self._side
+        main = self._main
         assert main is not None
-        assert side is not None
         reports = np.zeros((len(slots), self.columns.width), np.int32)
-        for first in range(0, len(slots), side.count):
-            some = slots[first : first + side.count]
-            there = np.arange(len(some))
+        for first in range(0, len(slots), ASIDE[-1]):
+            some = slots[first : first + ASIDE[-1]]
+            side, there = self._side(len(some)), np.arange(len(some))
             main.copy_to(some, side, there)
             report = what(side, there)
             side.state.copy_to(there, main.state, some)
             reports[first : first + len(some)] = report[there]
         return reports
+
+    def _side(self, worlds: int) -> WarpWorlds:
+        count = next(count for count in ASIDE if count >= worlds)
+        if count not in self._sides:
+            self._hulls.flush()
+            self._sides[count] = self.apart(count)
+        return self._sides[count]
 
     def _grow(self, lacking: int) -> None:
         """Make room for some more worlds."""
@@ -131,8 +136,6 @@ class WarpGroup:
         self._main = self.apart(count)
         if before is not None:
             before.copy_to(np.arange(n), self._main, np.arange(n))
-        if self._side is None or self._side.count < min(count, ASIDE):
-            self._side = self.apart(min(count, ASIDE))
         self._free += range(count - 1, n - 1, -1)
 
     def apart(self, count: int) -> WarpWorlds:
