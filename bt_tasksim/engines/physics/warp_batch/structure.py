@@ -16,8 +16,9 @@ from bt_tasksim.engines.physics.warp_batch.geoms import GeomTable
 from bt_tasksim.engines.physics.warp_batch.meshes import Hull
 from bt_tasksim.engines.physics.warp_batch.words import host_words
 
-OUT_OF_IT = ("mesh_", "nmesh", "tex_", "ntex", "mat_", "vis_")
-"""Fields of a model that are no part of its structure: hulls have their own store, looks do not matter."""
+OUT_OF_IT = ("mesh_", "nmesh", "tex_", "ntex", "mat_", "vis_", "dof_length")
+"""Fields of a model that are no part of its structure: hulls have their own store, looks do not matter, and
+lengths of degrees of freedom are for bodies that may fall asleep, which none here may."""
 
 
 @dataclass(frozen=True)

@@ -198,7 +198,13 @@ def test_partners_of_contact_are_mujocos_with_three_objects():
 # ---- each world as if it were alone ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("shown", [(HELD,), (FALLING, PUSHED)])
+def test_worlds_of_one_structure_are_stepped_together_whatever_their_sizes():
+    held, _, resting, falling = warp().batch.simulated
+    assert held.prepared.fields["geom_size"].tolist() != resting.prepared.fields["geom_size"].tolist()
+    assert held.group is resting.group and held.group is not falling.group
+
+
+@pytest.mark.parametrize("shown", [(HELD,), (RESTING, PUSHED, HELD), (FALLING, PUSHED)])
 def test_a_world_is_the_same_bits_in_any_company(shown):
     periods = 6
     found = run("mujoco_warp", shown, periods, threads=2)
