@@ -36,6 +36,7 @@ PARSED = {
     r"ros:|\btwin\b|my_topics|benchmarks\.(faults|loop)": "needs a robot or ROS; tests of the twin run it",
     r"remote:|serve-engine": "needs a server or is one; tests of remote engines run it",
     r"camera|--frames": "draws pictures; tests of perception and rendering run it",
+    r"--device cuda": "needs a GPU; tests and the CPU device run the same code",
     r"--real-time": "takes as long as it says",
     r"\b[A-Z]{2,}(_[A-Z]+)*\b": "has a placeholder",
     r"my_robot\.yaml|so100\.yaml|--plugin|wipe\.xml": "needs a file that its reader writes",

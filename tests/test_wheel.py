@@ -26,6 +26,8 @@ HEAVY = (
     "sapien",
     "mani_skill",
     "mujoco",
+    "mujoco_warp",
+    "warp",
     "stable_baselines3",
     "gymnasium",
     "zmq",

@@ -12,8 +12,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.batch import episodes, executor, kinematics, physics, same_bits, same_ticks
-from bt_tasksim.core.errors import InputError
+from benchmarks.batch import device, episodes, executor, kinematics, physics, same_bits, same_ticks
+from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.files import write_text
 
 SECTIONS = {
@@ -21,6 +21,7 @@ SECTIONS = {
     "kinematics": kinematics,
     "physics": physics,
     "episodes": episodes,
+    "device": device,
     "same-ticks": same_ticks,
     "same-bits": same_bits,
 }
@@ -31,6 +32,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.batch", description=__doc__.splitlines()[0])
     parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
     parser.add_argument("--quick", action="store_true", help="less of everything")
+    parser.add_argument(
+        "--device",
+        default="cpu",
+        metavar="D",
+        help="what torch (section executor) and MuJoCo Warp (section device) run on: cpu, cuda, cuda:N",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
     for section in SECTIONS.values():
         section.options(parser)
@@ -44,6 +51,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             found[name] = SECTIONS[name].measure(options)
     except InputError as error:
         parser.error(str(error))
+    except MachineError as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 1
     if options.json is not None:
         write_text(options.json, json.dumps(found, indent=2) + "\n")
         print(f"wrote {options.json}")

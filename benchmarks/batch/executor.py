@@ -36,7 +36,6 @@ BAR_MS = 1.0
 
 def options(parser: argparse.ArgumentParser) -> None:
     """What the section takes."""
-    parser.add_argument("--device", default="cpu", help="torch's device in the section executor (cpu)")
 
 
 class Idle(Behaviour):

@@ -19,6 +19,8 @@ PACKAGES = (
     "sapien",
     "mani-skill",
     "mujoco",
+    "mujoco-warp",
+    "warp-lang",
     "opencv-python-headless",
 )
 """Packages whose versions a log names, where they are installed."""

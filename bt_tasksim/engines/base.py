@@ -49,6 +49,7 @@ class EngineSetup:
         timeout: Seconds that a step of an engine in another process may take.
         connect_timeout: Seconds within which it must be there.
         ros: File with a robot's topics and names; empty for the bundled one.
+        device: What physics that can choose runs on, see `Engine.check_device`.
     """
 
     name: str
@@ -59,6 +60,7 @@ class EngineSetup:
     timeout: float = 2.0
     connect_timeout: float = 5.0
     ros: str = ""
+    device: str = "cpu"
 
 
 def engine_class(role: str, name: str) -> type[Engine]:
@@ -127,6 +129,19 @@ class Engine(ABC):
         """
         if ":" in name:
             raise InputError(f"the {cls.role} engine '{name.partition(':')[0]}' takes no address: '{name}'")
+
+    @classmethod
+    def check_device(cls, name: str) -> None:
+        """Refuse a device that an engine of this kind cannot run on; by default all but ``cpu``.
+
+        Args:
+            name: ``cpu``, ``cuda`` or ``cuda:N``. Whether the GPU is there, `create` says.
+
+        Raises:
+            InputError: There is no such device, or this engine cannot use it.
+        """
+        if name != "cpu":
+            raise InputError(f"the {cls.role} engine {cls.__name__} runs on the CPU alone, not on '{name}'")
 
     @classmethod
     def in_logs(cls, name: str) -> bool:

@@ -50,6 +50,7 @@ class EngineOptions:
         timeout: Seconds that a step of an engine in another process may take.
         connect_timeout: Seconds within which it must be there.
         ros: File with a robot's topics and names; by default the bundled one.
+        device: What physics that can choose runs on: ``cpu``, ``cuda`` or ``cuda:N``.
     """
 
     engines: str = "sapien"
@@ -64,10 +65,12 @@ class EngineOptions:
     timeout: float = 2.0
     connect_timeout: float = 5.0
     ros: str = ""
+    device: str = "cpu"
 
     def __post_init__(self) -> None:
         for role in ROLES:
             engine_class(role, self.name_of(role))
+        engine_class("physics", self.engines).check_device(self.device)
         noise_model(self.noise)
         for limit in (self.timeout, self.connect_timeout):
             if not 0.0 < limit < 3600.0:
@@ -123,6 +126,7 @@ class EngineOptions:
             timeout=self.timeout,
             connect_timeout=self.connect_timeout,
             ros=self.ros,
+            device=self.device,
         )
 
 

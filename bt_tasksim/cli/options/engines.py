@@ -48,8 +48,8 @@ class EngineFlags:
         str,
         typer.Option(
             metavar="E",
-            help="Physics: sapien, mujoco, maniskill:ENV (which brings its world), remote:HOST:PORT or a "
-            "plugin's; or a robot: ros:HOST:PORT.",
+            help="Physics: sapien, mujoco, mujoco_warp, maniskill:ENV (which brings its world), "
+            "remote:HOST:PORT or a plugin's; or a robot: ros:HOST:PORT.",
         ),
     ] = "sapien"
     perception: Annotated[str, typer.Option(metavar="P", help="state, camera, or remote:HOST:PORT.")] = (
@@ -70,6 +70,9 @@ class EngineFlags:
     connect_timeout: Annotated[
         float, typer.Option(metavar="S", help="Time limit of connecting, seconds.")
     ] = 5.0
+    device: Annotated[
+        str, typer.Option(metavar="D", help="What mujoco_warp runs on: cpu, cuda or cuda:N.")
+    ] = "cpu"
     noise: Annotated[
         str, typer.Option(metavar="N", help="Error of the pose estimates: fine, none, original, hard.")
     ] = "fine"
@@ -103,4 +106,5 @@ class EngineFlags:
             ros=self.ros,
             timeout=self.timeout,
             connect_timeout=self.connect_timeout,
+            device=self.device,
         )

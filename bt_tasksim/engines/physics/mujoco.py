@@ -1,21 +1,21 @@
 """Physics by MuJoCo, one fresh model and state an episode.
 
 A world is built in `mujoco_model` and `mujoco_robot` and goes on in `mujoco_stepping`; contacts are chosen in
-`mujoco_contacts`, and what is felt is read in `mujoco_sensing`. Here stand the laws of states, for all worlds
-of a batch at once.
+`mujoco_contacts`, and what is felt is read in `mujoco_sensing`; the laws of states, for all worlds of a batch
+at once, stand in `mujoco_state`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from bt_tasksim.core import poses
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Hidden, WorldState
 from bt_tasksim.engines.base import EngineSetup
-from bt_tasksim.engines.physics.mujoco_sensing import object_velocities, wrist_wrenches
+from bt_tasksim.engines.physics.mujoco_sensing import wrist_wrenches
+from bt_tasksim.engines.physics.mujoco_state import StateArrays, states
 from bt_tasksim.engines.physics.mujoco_stepping import MujocoWorld
 from bt_tasksim.engines.physics.threaded import Layout, SimulatedPhysics, ThreadedBatch
 from bt_tasksim.robot.description import RobotDescription
@@ -50,7 +50,6 @@ class MujocoBatch(ThreadedBatch[MujocoWorld]):
             ) from error
         super().__init__(robot, worlds, threads)
         self._mujoco = mujoco
-        self._tip_points = np.array([tip.point for tip in robot.tips])
 
     def _build(self, row: int, configuration: ActorConfiguration, start: Array) -> MujocoWorld:
         return MujocoWorld(self._mujoco, self.robot, configuration, start)
@@ -63,40 +62,25 @@ class MujocoBatch(ThreadedBatch[MujocoWorld]):
             [np.array([r.frame_position for r in readings]), np.array([r.frame_rotation for r in readings])],
             axis=-1,
         )
-        tool = poses.multiply(frames[:, 0], self.robot.tool_pose)
-        time = np.array([r.time for r in readings])
-        rotation = np.concatenate([r.object_rotation for r in readings])
         position = np.concatenate([r.object_position for r in readings])
-        objects = layout.padded(np.concatenate([position, rotation], axis=-1), 7)
-        moving = object_velocities(
-            np.concatenate([r.object_motion for r in readings]),
-            rotation,
-            np.concatenate([r.object_com for r in readings]),
-        )
-        velocities = layout.padded(moving, 6)
-        state = WorldState(
-            time=time,
-            joint_position=q,
-            joint_velocity=v,
-            joint_effort=self._effort(rows, q, v),
-            tip_force=np.array([r.tip_force for r in readings]).reshape(len(rows), -1, 3),
+        rotation = np.concatenate([r.object_rotation for r in readings])
+        read = StateArrays(
+            time=np.array([r.time for r in readings]),
+            position=q,
+            velocity=v,
+            effort=self._effort(rows, q, v),
+            frames=frames,
+            objects=np.concatenate([position, rotation], axis=-1),
+            motion=np.concatenate([r.object_motion for r in readings]),
+            com=np.concatenate([r.object_com for r in readings]),
             wrench=self._wrench([r.wrist for r in readings]),
-            tool_pose=tool,
-            tips=poses.transform(frames[:, 1:], self._tip_points),
-            objects=objects,
-            velocities=velocities,
-        )
-        hidden = Hidden(
-            time=time,
-            objects=objects,
-            velocities=velocities,
-            hand_force=layout.padded([force for r in readings for force in r.hand_force]),
-            hand_distance=layout.padded([far for r in readings for far in r.near.hand_distance]),
+            tip_force=np.array([r.tip_force for r in readings]).reshape(len(rows), -1, 3),
+            hand_force=np.array([force for r in readings for force in r.hand_force]),
+            hand_distance=np.array([far for r in readings for far in r.near.hand_distance]),
             support=layout.support([r.near.support for r in readings]),
             penetration=np.array([r.penetration for r in readings]),
-            tool_pose=tool,
         )
-        return state, hidden
+        return states(self.robot, layout, read)
 
     def _wrench(self, felt: list[list[list[float]]]) -> Array:
         """External wrenches ``(k, 6)``: of each world the mean of the steps in which it was felt."""

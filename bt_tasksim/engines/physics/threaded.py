@@ -184,6 +184,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
                 self.errors[row] = error
 
         self._share(build, list(zip(rows.tolist(), configurations, strict=True)))
+        self._begin(rows)
         fresh = [world for row in rows.tolist() if (world := self.simulated[row]) is not None]
         self._widen(
             max((world.n_objects for world in fresh), default=0),
@@ -209,14 +210,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         for (_, world), to, speed in zip(worlds, position.tolist(), velocity.tolist(), strict=True):
             world.drive_to(to, speed)
 
-        def advance(job: tuple[int, W]) -> None:
-            row, world = job
-            try:
-                world.advance()
-            except BtTasksimError as error:
-                self.errors[row] = error
-
-        self._share(advance, worlds)
+        self._advance(worlds)
         self._gather(rows)
 
     def state(self, rows: Array) -> WorldState:
@@ -234,6 +228,21 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         if self._pool is not None:
             self._pool.shutdown()
         self.simulated = [None] * self.worlds
+
+    def _begin(self, rows: Array) -> None:
+        """What is to be done with worlds that were just built; by default nothing."""
+
+    def _advance(self, worlds: Sequence[tuple[int, W]]) -> None:
+        """Let worlds go on by one control period; by default each by itself."""
+
+        def advance(job: tuple[int, W]) -> None:
+            row, world = job
+            try:
+                world.advance()
+            except BtTasksimError as error:
+                self.errors[row] = error
+
+        self._share(advance, worlds)
 
     def _share(self, work: Callable[[T], None], jobs: Sequence[T]) -> None:
         """Do all jobs, each by the thread that is free for it."""
@@ -303,9 +312,9 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             rows, worlds = rows[finite], [world for world, fine in zip(worlds, finite, strict=True) if fine]
             state, hidden = taken(state, finite), taken(hidden, finite)
         if self._state is None or self._hidden is None:
-            self._state, self._hidden = _room(state, self.worlds), _room(hidden, self.worlds)
-        _put(self._state, rows, state)
-        _put(self._hidden, rows, hidden)
+            self._state, self._hidden = rows_for(state, self.worlds), rows_for(hidden, self.worlds)
+        put(self._state, rows, state)
+        put(self._hidden, rows, hidden)
         self._note_motion(worlds, state, hidden)
 
     @staticmethod
@@ -385,8 +394,8 @@ def _unbatched(bundle: B) -> B:
     return type(bundle)(**{name: value[0] for name, value in _arrays(bundle)})
 
 
-def _room(bundle: B, n: int) -> B:
-    """Arrays for ``n`` rows like those of a bundle."""
+def rows_for(bundle: B, n: int) -> B:
+    """Arrays for ``n`` rows like those of a bundle, zero."""
     return type(bundle)(**{name: _rows_like(value, n) for name, value in _arrays(bundle)})
 
 
@@ -394,7 +403,8 @@ def _rows_like(value: Array, n: int) -> Array:
     return np.zeros((n, *value.shape[1:]), value.dtype)
 
 
-def _put(bundle: B, rows: Array, values: B) -> None:
+def put(bundle: B, rows: Array, values: B) -> None:
+    """Write rows of a bundle of arrays."""
     for name, value in _arrays(values):
         getattr(bundle, name)[rows] = value
 

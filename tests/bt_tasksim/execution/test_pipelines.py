@@ -49,7 +49,7 @@ def test_results_say_which_perception_it_was(options, label):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"engines": "mujocco"}, r"unknown physics engine 'mujocco'; did you mean 'mujoco'\?"),
+        ({"engines": "mujocco"}, r"unknown physics engine 'mujocco'; did you mean 'mujoco'"),
         ({"engines": "sapiens"}, r"unknown physics engine 'sapiens'; did you mean 'sapien'\?"),
         ({"perception": "camra"}, r"unknown postprocess engine 'camra'; did you mean 'camera'\?"),
         ({"noise": "nome"}, r"unknown noise model 'nome'; did you mean 'none'\?"),
