@@ -202,10 +202,12 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
 
     # ---- running ----------------------------------------------------------------------------------------
 
-    def _advance(self, worlds: Sequence[tuple[int, WarpWorld]]) -> None:
-        """See `ThreadedBatch`."""
-        row_of = {id(world): row for row, world in worlds}
-        for some in _by_structure([world for _, world in worlds]).values():
+    def _go_on(self, worlds: Sequence[tuple[int, WarpWorld, list[float], list[float]]]) -> None:
+        """See `ThreadedBatch`; all worlds of one structure at once."""
+        row_of = {id(world): row for row, world, _, _ in worlds}
+        for _, world, position, velocity in worlds:
+            world.drive_to(position, velocity)
+        for some in _by_structure([world for _, world, _, _ in worlds]).values():
             group, slots = some[0].group, np.array([world.slot for world in some])
             group.write(slots, "ctrl", np.array([world.control for world in some]))
             reports = group.period(slots, np.array([world.falling for world in some]))

@@ -190,6 +190,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             max((world.n_objects for world in fresh), default=0),
             max((world.n_fixtures for world in fresh), default=0),
         )
+        self._look(rows)
         self._gather(rows)
 
     def step(self, target: JointTarget, rows: Array) -> None:
@@ -205,12 +206,13 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         rows, position, velocity = rows[going], position[going], velocity[going]
         self._position[rows], self._velocity[rows] = position, velocity
 
-        # What the interpreter does for all worlds in turn costs less than what it does between their steps.
-        worlds = [(row, world) for row in rows.tolist() if (world := self.simulated[row]) is not None]
-        for (_, world), to, speed in zip(worlds, position.tolist(), velocity.tolist(), strict=True):
-            world.drive_to(to, speed)
-
-        self._advance(worlds)
+        self._go_on(
+            [
+                (row, world, to, speed)
+                for row, to, speed in zip(rows.tolist(), position.tolist(), velocity.tolist(), strict=True)
+                if (world := self.simulated[row]) is not None
+            ]
+        )
         self._gather(rows)
 
     def state(self, rows: Array) -> WorldState:
@@ -232,17 +234,33 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
     def _begin(self, rows: Array) -> None:
         """What is to be done with worlds that were just built; by default nothing."""
 
-    def _advance(self, worlds: Sequence[tuple[int, W]]) -> None:
-        """Let worlds go on by one control period; by default each by itself."""
+    def _go_on(self, worlds: Sequence[tuple[int, W, list[float], list[float]]]) -> None:
+        """Let worlds go on by one control period, to positions and at velocities of their joints, and read.
 
-        def advance(job: tuple[int, W]) -> None:
-            row, world = job
+        By default one after the other: what one world needs is in the processor's cache then.
+        """
+
+        def go_on(job: tuple[int, W, list[float], list[float]]) -> None:
+            row, world, position, velocity = job
             try:
+                world.drive_to(position, velocity)
                 world.advance()
+                world.read()
             except BtTasksimError as error:
                 self.errors[row] = error
 
-        self._share(advance, worlds)
+        self._share(go_on, worlds)
+
+    def _look(self, rows: Array) -> None:
+        """Read worlds that have begun."""
+        for row in rows.tolist():
+            world = self.simulated[row]
+            if world is None or self.errors[row] is not None:
+                continue
+            try:
+                world.read()
+            except BtTasksimError as error:
+                self.errors[row] = error
 
     def _share(self, work: Callable[[T], None], jobs: Sequence[T]) -> None:
         """Do all jobs, each by the thread that is free for it."""
@@ -286,21 +304,12 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         )
 
     def _gather(self, rows: Array) -> None:
-        """Read those worlds of these rows that have not failed into the arrays of all."""
-        worlds: list[W] = []
-        for row in rows.tolist():
-            world = self.simulated[row]
-            if world is None or self.errors[row] is not None:
-                continue
-            try:
-                world.read()
-            except BtTasksimError as error:
-                self.errors[row] = error
-            else:
-                worlds.append(world)
+        """Take the readings of those worlds of these rows that have not failed into the arrays of all."""
+        found = [(row, self.simulated[row]) for row in rows.tolist() if self.errors[row] is None]
+        worlds = [world for _, world in found if world is not None]
         if not worlds:
             return
-        rows = np.array([row for row in rows.tolist() if self.errors[row] is None], int)
+        rows = np.array([row for row, world in found if world is not None], int)
         layout = Layout(np.array([world.n_objects for world in worlds]), *self._most)
         with np.errstate(invalid="ignore", over="ignore"):  # of worlds that blew up
             state, hidden = self._read(rows, worlds, layout)
