@@ -1,13 +1,16 @@
 """Evaluation on a Ray cluster: the same outcomes, whatever the actors, and whoever is killed."""
 
+import dataclasses
 import importlib.util
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
+import warnings
 from pathlib import Path
 
 import psutil
@@ -26,13 +29,14 @@ from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("ray") is None, reason="Ray is not installed: pip install 'bt-tasksim[cluster]'"
 )
-JOB = Job("pick_and_throw", options=EngineOptions(engines="sapien", noise="hard"))
-SEEDS = range(40, 48)
+JOB = Job("pick_and_throw", options=EngineOptions(engines="sapien", noise="hard"), batch=1)
+"""One episode after the other, so that somebody is in the middle of his share whenever he is killed."""
+SEEDS = range(40, 72)
 
 
 @pytest.fixture(scope="module")
 def whole():
-    return evaluate(JOB, SEEDS)
+    return evaluate(dataclasses.replace(JOB, batch=None), SEEDS)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +60,7 @@ def test_one_and_three_actors_give_the_same_bits_also_after_one_was_killed(clust
         job, alone = JOB, whole
     else:
         pytest.importorskip("mujoco")
-        job = Job(JOB.tree, options=EngineOptions(engines=engines, noise="hard"))
+        job = dataclasses.replace(JOB, options=EngineOptions(engines=engines, noise="hard"))
         alone = evaluate(job, SEEDS)
     killed, ended = [], []
 
@@ -82,17 +86,23 @@ def test_one_and_three_actors_give_the_same_bits_also_after_one_was_killed(clust
 
 
 def test_a_node_that_is_killed_is_made_up_for(cluster, whole):
-    cluster.start()
-    ended = []
+    """An actor of that node may begin later than others end, so it is tried again."""
+    for _ in range(5):
+        cluster.start()
+        ended = []
 
-    def kill_node(outcome):
-        ended.append(outcome.seed)
-        if len(ended) == 4:
-            cluster.nodes.pop().kill()
+        def kill_node(outcome, ended=ended):
+            ended.append(outcome.seed)
+            if len(ended) == 6:
+                cluster.nodes.pop().kill()
 
-    with pytest.warns(BtTasksimWarning, match="an actor on .* ended"):
-        found = evaluate(JOB, SEEDS, 4, progress=kill_node, cluster=cluster.address)
-    assert timeless(found.outcomes) == timeless(whole.outcomes) and sorted(ended) == list(SEEDS)
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", BtTasksimWarning)
+            found = evaluate(JOB, SEEDS, 4, progress=kill_node, cluster=cluster.address)
+        assert timeless(found.outcomes) == timeless(whole.outcomes) and sorted(ended) == list(SEEDS)
+        if any(re.search("an actor on .* ended", str(warning.message)) for warning in said):
+            return
+    raise AssertionError("no actor of a killed node ever had a share")
 
 
 @pytest.mark.parametrize("there", ["another source", "an older version"])
@@ -142,8 +152,9 @@ def test_a_wrong_address_is_refused_by_the_command(capsys):
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)]
 )
 def test_a_command_that_is_ended_loses_nothing_and_leaves_nothing(tmp_path, whole, number, code):
-    words = ["evaluate", "pick_and_throw", "--noise", "hard", "--seed", "40", "--episodes", "8", "--json"]
-    command = [sys.executable, "-m", "bt_tasksim.cli", *words, "e.json", "--cluster", "local"]
+    words = ["evaluate", "pick_and_throw", "--noise", "hard", "--seed", "40", "--episodes", "32", "--json"]
+    slow = ["--cluster", "local", "--workers", "1", "--batch", "1"]  # one episode after the other
+    command = [sys.executable, "-m", "bt_tasksim.cli", *words, "e.json", *slow]
     first = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     journal, until = tmp_path / "e.json.episodes", time.monotonic() + 300.0
     with first:
@@ -159,7 +170,7 @@ def test_a_command_that_is_ended_loses_nothing_and_leaves_nothing(tmp_path, whol
     _, left = psutil.wait_procs(begun, timeout=30.0)
     assert [p for p in left if p.status() != psutil.STATUS_ZOMBIE] == []
     path = str(tmp_path / "e.json")
-    assert 2 <= len(read_kept(path, identity()).outcomes) < 8
+    assert 2 <= len(read_kept(path, identity()).outcomes) < 32
     if number != signal.SIGKILL:
         return
     assert main([*words, path, "--resume"]) == 0

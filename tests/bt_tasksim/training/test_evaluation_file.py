@@ -217,7 +217,7 @@ def test_only_the_same_evaluation_goes_on(tmp_path, policy):
 
 def test_a_killed_command_goes_on(tmp_path, whole):
     words = ["evaluate", "pick_and_throw", "--noise", "none", "--episodes", "6", "--json", "e.json"]
-    command = [sys.executable, "-m", "bt_tasksim.cli", *words]
+    command = [sys.executable, "-m", "bt_tasksim.cli", *words, "--batch", "1"]  # one after the other
     first = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL)
     journal, until = tmp_path / "e.json.episodes", time.monotonic() + 60.0
     while not (journal.exists() and journal.read_bytes().count(b"\n") >= 3):
