@@ -1,40 +1,38 @@
 """Activations of what stands under a `Train` node, in many worlds of one process at once.
 
-Each world has an episode of its own, from the draw to the judgement; its laws are those of
-`bt_tasksim.training.episodes`. Worlds that wait for a decision stand still in the middle of a tick, and all
-others tick and step together.
+Each world has an episode of its own, from the draw to the judgement. Worlds that wait for a decision stand
+still in the middle of a tick, and all others tick and step together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.batch_leaves import ConceptInBatch, leaf_in_batch
 from bt_tasksim.concept.context import Context, Refusal
-from bt_tasksim.concept.leaf import ConceptNode
-from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING, SUCCESS
 from bt_tasksim.core.bundles import taken
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
 from bt_tasksim.core.outcomes import INTERRUPTED, OUT_OF_REACH, TIME_OVER, Outcome, outcome_of_error
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import Hidden
 from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.execution.pipeline_worlds import worlds_for
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import LONGEST
-from bt_tasksim.execution.worlds import Worlds, why_alone
-from bt_tasksim.policy.policy import Policy, split_action
+from bt_tasksim.execution.world_by_world import BelowUnknown
+from bt_tasksim.execution.worlds import why_alone
+from bt_tasksim.policy.policy import Action, Policy, split_action
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import WorldSource
-from bt_tasksim.training.batch_judge import BatchJudgement
-from bt_tasksim.training.env import REDRAWS, find_train, not_reached, shared_layout, spaces_of
-from bt_tasksim.training.episodes import BEGAN_ANEW, FOLLOWER_LATE, TREE_ENDED, Ending, ending_of
-from bt_tasksim.training.judge import SignalOutcome
+from bt_tasksim.training.decision import Decision
+from bt_tasksim.training.endings import BEGAN_ANEW, FOLLOWER_LATE, TREE_ENDED, Ending, ending_of
+from bt_tasksim.training.judge import Judgement, SignalOutcome
+from bt_tasksim.training.learning_leaves import find_train, shared_layout, spaces_of
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.transitions import Transitions
 from bt_tasksim.trees.check import check_tree
@@ -45,6 +43,8 @@ IDLE, DRAWING, TICKING, WAITING, DECIDED, STEPPING = range(6)
 decision, in the middle of a tick; which has come; a control period is due."""
 BEFORE = -1
 """Number of the activation before the first decision."""
+REDRAWS = 50
+"""Draws in a row in which the subtree may stay inactive."""
 
 
 class Happened(NamedTuple):
@@ -85,38 +85,12 @@ class Draws(NamedTuple):
     stage: int | None = None
 
 
-class BatchDecision:
-    """A decision in one of the worlds of a batch; what was seen is taken out when it is asked for.
-
-    Args:
-        leaf: The leaf.
-        seen: What was seen in some worlds.
-        memory: What the leaf remembered in them.
-        position: Which of them it is.
-    """
-
-    __slots__ = ("_memory", "_position", "_seen", "leaf")
-
-    def __init__(self, leaf: ConceptNode, seen: Seen, memory: Any, position: int) -> None:
-        self.leaf, self._seen, self._memory, self._position = leaf, seen, memory, position
-
-    @property
-    def seen(self) -> Seen:
-        """What was seen ``(1, ...)``."""
-        return self._seen.at(np.array([self._position]))
-
-    @property
-    def memory(self) -> Any:
-        """What the leaf remembered ``(1, ...)``."""
-        return taken(self._memory, np.array([self._position]))
-
-
 def why_alone_in(tree: Behaviour, scene: WorldSource, options: EngineOptions) -> str:
     """Why episodes of a tree run one by one, as a sentence; empty where they need not."""
     alone = why_alone(options)
     if alone:
         return alone
-    context = Context(load_robot(scene.robot))
+    context = Context(load_robot(scene.robot), worlds=2)
     try:
         BatchTree(tree, context.worlds, lambda leaf: leaf_in_batch(leaf, context))
     except InputError:
@@ -133,8 +107,8 @@ class EpisodeBatch:
         tree: The tree, with one `Train` node at least.
         scene: The scene.
         train: Name of the `Train` node; by default the first one.
-        options: Engines, see `bt_tasksim.execution.worlds.why_alone`; by default SAPIEN with the noise model
-            ``original``.
+        options: Engines, in several worlds those that `bt_tasksim.execution.worlds.why_alone` has nothing
+            against; by default SAPIEN with the noise model ``original``.
         reward: What is paid.
         longest: Seconds of an episode, earlier siblings included, after which it is truncated.
         policies: Policies of other leaves, by the leaf's name: what was trained before.
@@ -142,8 +116,10 @@ class EpisodeBatch:
         threads: How many threads step them.
 
     Raises:
-        InputError: As of `bt_tasksim.training.env.EpisodeEnv`; or the engines, or something in the tree,
-            have no form for many worlds, or these do not fit into memory.
+        InputError: There is no `Train` node, nothing under it can learn, or the leaves that learn differ in
+            what they see or do; what is to learn stands below a behaviour that is not known; or there are to
+            be several worlds, and the engines, or something in the tree, have no form for that, or memory has
+            no room for them.
     """
 
     def __init__(
@@ -160,7 +136,7 @@ class EpisodeBatch:
     ) -> None:
         check_tree(tree)
         options = options or EngineOptions(noise="original")
-        self.tree, self.scene, self.longest = tree, scene, longest
+        self.tree, self.longest = tree, longest
         self.reward = reward or Reward()
         self.train = find_train(tree, train)
         self.learners = self.train.learners()
@@ -176,14 +152,16 @@ class EpisodeBatch:
         self.layout = shared_layout(self.train, self.learners, self.robot)
         self.observation_space, self.action_space = spaces_of(self.layout, self.learners[0].model.actions)
         self.batch = BatchTree(tree, worlds, lambda leaf: leaf_in_batch(leaf, self.context))
-        self._judgement = BatchJudgement(self.train, self.batch, self.context, self._hidden)
+        self._check_known()
+        self.worlds = worlds_for(self.robot, options, worlds, threads)
+        self.scene = self.worlds.source(scene)
+        self.context.hidden = self.worlds.hidden
+        self._judgement = Judgement(self.train, self.batch, self.context, self.worlds.hidden)
         for number in self._judgement.nodes:
             self.batch.watch(number, self._watcher(number))
         compiled = self.batch.compiled[self._judgement.train]
         assert isinstance(compiled, BatchTrain)
         self._train = compiled
-        self.worlds = Worlds(self.robot, options, worlds, threads)
-        self.context.hidden = self.worlds.hidden
         n = self.observation_space.shape[0]
         self._phase = np.full(worlds, IDLE)
         self._activation: Array = np.full(worlds, BEFORE, np.int64)
@@ -208,6 +186,10 @@ class EpisodeBatch:
     def waiting(self) -> Array:
         """The worlds ``(k,)`` in which a decision is waited for."""
         return np.flatnonzero(self._phase == WAITING)
+
+    def decision(self, row: int) -> Decision | None:
+        """What the leaf that is to act in a world sees and remembers; None where nothing is waited for."""
+        return self._transitions[row].decision if self._phase[row] == WAITING else None
 
     def features(self) -> Array:
         """What each leaf saw at the last decision of its world ``(N, n)``."""
@@ -237,9 +219,16 @@ class EpisodeBatch:
         size = self.action_space.shape[0]
         if actions.shape != (len(rows), size) or not np.isfinite(actions).all():
             raise InputError(f"an action should be {size} finite numbers, found {actions}")
+        self.act(rows, split_action(actions))
+
+    def act(self, rows: Array, action: Action) -> None:
+        """`decide` with what a policy decides ``(k, ...)``: a programmed one may exceed an action's bounds.
+
+        Raises:
+            RuntimeError: In one of the worlds no decision is waited for.
+        """
         if not (self._phase[rows] == WAITING).all():
             raise RuntimeError("a decision for a world that does not wait for one: begin an episode first")
-        action = split_action(actions)
         leaves = self.batch.waits_at[rows]
         for number in np.unique(leaves).tolist():
             there = np.flatnonzero(leaves == number)
@@ -355,9 +344,6 @@ class EpisodeBatch:
             raise error
         self._end(row, SignalOutcome(False, "INVALID", outcome_of_error(error), discarded=True))
 
-    def _hidden(self, rows: Array) -> Hidden | None:
-        return self.worlds.physics.hidden(rows)
-
     # ---- within a tick ----------------------------------------------------------------------------------
 
     def _watcher(self, node: int) -> Callable[[Array, Array], Array | None]:
@@ -457,7 +443,7 @@ class EpisodeBatch:
         self._features[rows] = features
         costs = np.asarray(model.necessary_cost(seen, memory), float).tolist()
         for k, row in enumerate(rows.tolist()):
-            decision = BatchDecision(leaf.leaf, seen, memory, k)
+            decision = Decision(leaf.leaf, seen, memory, k)
             transitions, paid = self._transitions.get(row), None
             if transitions is None:
                 self._transitions[row] = Transitions(decision, self.reward.gamma, costs[k])
@@ -528,7 +514,34 @@ class EpisodeBatch:
         if self.worlds.observation is not None:
             self.context.advance(self.context.observation, rows)  # what they have commanded is void
 
+    def _check_known(self) -> None:
+        """Refuse what is to learn where py_trees ticks it, which waits for nobody."""
+        numbers = {id(node): number for number, node in enumerate(self.batch.nodes)}
+        for node in (self.train, *self.learners):
+            found = self.batch.compiled[numbers[id(node)]]
+            if isinstance(found, BelowUnknown):
+                above = found.above.node(0, 0)
+                raise InputError(
+                    f"'{node.name}' cannot be trained below '{above.name}': {type(above).__name__} is no known "
+                    f"kind of node; describe it with a NodeKind, see docs/parts/tree_node.md"
+                )
+
     def _leaf(self, number: int) -> ConceptInBatch:
         leaf = self.batch.compiled[number]
         assert isinstance(leaf, ConceptInBatch)
         return leaf
+
+
+def not_reached(train: str, redrawn: int, draw: int, status: str, why: str) -> InputError:
+    """Says that a Train node was never active.
+
+    Args:
+        train: Its name.
+        redrawn: In how many draws.
+        draw: The last one.
+        status: Status of the tree at the end of that.
+        why: What the tree says.
+    """
+    return InputError(
+        f"'{train}' was not reached in {redrawn} draws; the last one (seed {draw}) ended with {status}: {why}"
+    )

@@ -21,16 +21,20 @@ from toys import (
     Raise,
     Turn,
     Unprogrammed,
+    activations,
     honest,
     play,
 )  # fmt: skip
 
 from bt_tasksim.concept_nodes import Wait
+from bt_tasksim.core.batch_leaf import RUNNING
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
 from bt_tasksim.core.outcomes import PRECONDITION_UNMET
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import LearnedPolicy
-from bt_tasksim.training.env import REDRAWS, EpisodeEnv, find_train
+from bt_tasksim.training.env import EpisodeEnv
+from bt_tasksim.training.episode_batch import REDRAWS
+from bt_tasksim.training.learning_leaves import find_train
 from bt_tasksim.training.reward import PARTS, Reward
 from bt_tasksim.trees import (
     fallback,
@@ -61,8 +65,9 @@ def paid(info):
     return {part: value for part, value in info["reward"].items() if value and part != "shaping"}
 
 
-def running(tree):
-    return [node.name for node in tree.iterate() if node.status == Status.RUNNING]
+def running(env):
+    tree = env.batch.batch
+    return [node.name for node, status in zip(tree.nodes, tree.status[0], strict=True) if status == RUNNING]
 
 
 # ---- when the leaf acts --------------------------------------------------------------------------------
@@ -102,10 +107,10 @@ def test_the_leaf_acts_once_a_period_and_only_when_told(env_of, nest, before):
     leaf = Raise()
     tree = sequence("root", *(make() for make in before), nest(Train(leaf)), Check())
     env = env_of(tree)
-    world = env.runner.pipeline
+    world = env.batch.worlds.pipeline
     features, _ = env.reset(seed=3)
     for _ in range(3):
-        assert leaf.log == ["begin"] and leaf.activations == 1, "it has begun, and did nothing yet"
+        assert leaf.log == ["begin"] and activations(env, leaf) == 1, "it has begun, and did nothing yet"
         steps, expected = len(world.steps), []
         while True:
             action = honest(features)
@@ -118,7 +123,7 @@ def test_the_leaf_acts_once_a_period_and_only_when_told(env_of, nest, before):
         assert leaf.log == ["begin", *expected] and len(expected) >= 5
         assert info["is_success"] and info["follower"] == "SUCCESS", info["why"]
         leaf.log.clear()
-        leaf.activation.activations[:] = 0
+        activations(env, leaf)[:] = 0
         features, _ = env.reset()
     assert env.redrawn == 0
 
@@ -173,7 +178,7 @@ def test_ticks_without_a_decision_go_by(env_of):
     leaf = Late()
     env = env_of(Train(leaf))
     env.reset(seed=0)
-    assert leaf.log == ["begin"] + ["command 0"] * 4 and env.runner.context.now == pytest.approx(0.2)
+    assert leaf.log == ["begin"] + ["command 0"] * 4 and env.batch.context.now == pytest.approx(0.2)
 
 
 # ---- what it is paid -----------------------------------------------------------------------------------
@@ -186,7 +191,7 @@ def test_the_motion_counts_for_nothing_when_it_is_done(env_of):
     env.step(np.array(UP))
     _, reward, terminated, _, info = env.step(np.array([1.0, 1.0]))
     assert terminated and leaf.log == ["begin", "command 1"]
-    assert env.runner.pipeline.now.tool_pose[2] == pytest.approx(HERE + STEP)
+    assert env.batch.worlds.pipeline.now.tool_pose[2] == pytest.approx(HERE + STEP)
     gained = STEP / 0.1
     assert info["reward"]["shaping"] == pytest.approx(-Reward().shaping * gained), "failed: nothing is kept"
     assert reward == pytest.approx(-1.0 - Reward().shaping * gained)
@@ -232,7 +237,7 @@ def test_how_it_ends_and_what_is_said(env_of, tree, decide, parts, why):
     assert paid(info) == parts and info["why"].startswith(why)
     assert info["is_success"] is ("success" in parts)
     assert info["status"] == {"interrupted": "INVALID"}.get(why, "SUCCESS" if "check" in why else "FAILURE")
-    assert not info["discarded"] and info["seconds"] == env.runner.context.now
+    assert not info["discarded"] and info["seconds"] == env.batch.context.now
     assert features.shape == (3,), "an end has an observation too"
     with pytest.raises(RuntimeError, match="call reset"):
         env.step(np.array(STILL))
@@ -248,7 +253,7 @@ def test_the_next_attempt_is_another_episode(env_of):
     leaf = Raise(limit=0.4)
     env = env_of(retry(3, Train(leaf)))
     _, terminated, _, info = play(env, lambda f: UP)
-    assert terminated and paid(info) == {"violated": -1.0} and leaf.activations == 1
+    assert terminated and paid(info) == {"violated": -1.0} and activations(env, leaf) == 1
 
 
 def test_an_attempt_that_could_not_begin_is_passed_over(env_of):
@@ -325,7 +330,7 @@ def shared_env():
 
         import toys
 
-        with mock.patch("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: toys.World()):
+        with mock.patch("bt_tasksim.training.episode_batch.worlds_for", toys.toy_worlds):
             _SHARED.append(EpisodeEnv(simple(), SCENE))
     return _SHARED[0]
 
@@ -359,7 +364,7 @@ def test_a_limit_from_outside_truncates(env_of):
     rewards, terminated, truncated, info = play(env, lambda f: STILL)
     assert truncated and not terminated and info["reason"] == "time_over"
     assert paid(info) == {} and not info["discarded"] and env.discarded == 0
-    assert len(rewards) == 5 and env.runner.context.now == pytest.approx(0.2)
+    assert len(rewards) == 5 and env.batch.context.now == pytest.approx(0.2)
 
 
 def test_a_limit_while_it_is_judged_discards(env_of):
@@ -379,18 +384,18 @@ def test_a_limit_while_it_is_judged_discards(env_of):
 def test_an_error_while_it_is_judged_discards(env_of, error, reason):
     env = env_of(simple(HERE))
     env.reset(seed=0)
-    env.runner.pipeline.error = error
+    env.batch.worlds.pipeline.error = error
     _, _, terminated, truncated, info = env.step(np.array(DONE))
     assert truncated and not terminated and info["discarded"] and env.discarded == 1
     assert paid(info) == {} and not info["is_success"] and info["reason"] == reason
-    env.runner.pipeline.error = None
+    env.batch.worlds.pipeline.error = None
     assert play(env, honest)[3]["is_success"] and env.discarded == 1
 
 
 def test_out_of_reach_of_the_learner_is_its_failure(env_of):
     env = env_of(simple())
     env.reset(seed=0)
-    env.runner.pipeline.error = UnreachableError("100 mm too far", 0.1, 0.0)
+    env.batch.worlds.pipeline.error = UnreachableError("100 mm too far", 0.1, 0.0)
     _, _, terminated, _, info = env.step(np.array(UP))
     assert terminated and paid(info) == {"failure": -1.0} and info["reason"] == "out_of_reach"
 
@@ -407,7 +412,7 @@ def test_a_leaf_that_raises_is_named_and_nothing_runs_on(env_of):
     env.reset(seed=0)
     with pytest.raises(LeafError, match=r"leaf 'bad' raised ZeroDivisionError in test_env.py:\d+: no"):
         env.step(np.array(DONE))
-    assert running(env.tree) == []
+    assert running(env) == []
     with pytest.raises(RuntimeError, match="call reset"):
         env.step(np.array(DONE))
     env.reset(seed=0)
@@ -487,7 +492,7 @@ def test_a_reset_in_the_middle_leaves_nothing_running(env_of, steps):
         env.step(np.array(UP))
     leaf.log.clear()
     env.reset(seed=4)
-    assert running(tree) == [] and leaf.log == ["begin"], "it is in its first tick, and nothing else is"
+    assert running(env) == [] and leaf.log == ["begin"], "it is in its first tick, and nothing else is"
     assert play(env, honest, seed=4) == whole
 
 
@@ -537,7 +542,7 @@ def test_after_it_the_tree_can_be_run(env_of, toy):
     env.reset(seed=0)
     env.step(np.array(UP))
     env.close()
-    assert env.runner.pipeline.closed == 1
+    assert env.batch.worlds.pipeline.closed == 1
     stage = toy(tree)
     assert stage.tick(50) == Status.SUCCESS
 
