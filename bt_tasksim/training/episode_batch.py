@@ -16,7 +16,6 @@ from bt_tasksim.concept.batch_leaves import ConceptInBatch, leaf_in_batch
 from bt_tasksim.concept.context import Context, Refusal
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING, SUCCESS
-from bt_tasksim.core.bundles import taken
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
 from bt_tasksim.core.outcomes import INTERRUPTED, OUT_OF_REACH, TIME_OVER, Outcome, outcome_of_error
 from bt_tasksim.core.poses import Array
@@ -230,9 +229,9 @@ class EpisodeBatch:
         if not (self._phase[rows] == WAITING).all():
             raise RuntimeError("a decision for a world that does not wait for one: begin an episode first")
         leaves = self.batch.waits_at[rows]
-        for number in np.unique(leaves).tolist():
+        for number in set(leaves.tolist()):
             there = np.flatnonzero(leaves == number)
-            self._leaf(number).decide(rows[there], taken(action, there))
+            self._leaf(number).decide(rows[there], Action(action.motion[there], action.terminate[there]))
         for k, row in enumerate(rows.tolist()):
             self._transitions[row].decided(action.motion[k])
         self._phase[rows] = DECIDED
@@ -254,7 +253,7 @@ class EpisodeBatch:
                     return found
                 fresh = self._begin(np.flatnonzero(self._phase == DRAWING))
                 stepped = self._step(np.flatnonzero(self._phase == STEPPING))
-                rows = np.union1d(fresh, stepped)
+                rows = np.union1d(fresh, stepped) if len(fresh) else stepped
                 if len(rows):
                     self._phase[rows] = TICKING
                     self._ticked(rows, self.batch.tick(rows, self.context.times[rows]))
@@ -320,8 +319,8 @@ class EpisodeBatch:
         self._left[rows] -= 1
         written = self.context.written
         tool, hand = (None if part is None else part[rows] for part in (written.tool, written.hand))
-        writers = {row: self.context.tool_writer(row) for row in rows.tolist()}
         unreached = self.worlds.step(tool, hand, rows)
+        writers = {miss.row: self.context.tool_writer(miss.row) for miss in unreached}
         failed = self.worlds.errors(rows)
         for row, error in failed.items():
             self._spoiled(row, error)
@@ -379,17 +378,25 @@ class EpisodeBatch:
 
     def _ticked(self, rows: Array, status: Array) -> None:
         """Ticks have ended, or stand still before a leaf that is to learn."""
-        batch, judgement = self.batch, self._judgement
         if self._over:
             on = ~np.isin(rows, self._over)
             rows, status = rows[on], status[on]
-        at = batch.waits_at[rows]
+        at = self.batch.waits_at[rows]
         self._pending(rows[at >= 0])
         rows, status = rows[at < 0], status[at < 0]
+        if len(rows):
+            self._gone_on(rows, status)
+        self._leave()
+
+    def _gone_on(self, rows: Array, status: Array) -> None:
+        """Ticks have ended, and no leaf that is to learn was about to act at their end."""
+        batch, judgement = self.batch, self._judgement
         self._phase[rows] = STEPPING
         following, before = self._following[rows], self._activation[rows] == BEFORE
         ended, late = status != RUNNING, self._left[rows] <= 0
         stopped = batch.status[rows, judgement.train] != RUNNING
+        if not (following | ended | late | (stopped & ~before)).any():
+            return
         if following.any():
             for row, judged in judgement.unreached(rows[following]).items():
                 self._end(row, judged)
@@ -407,7 +414,6 @@ class EpisodeBatch:
             self._end(row, cut=TIME_OVER(limit=self.longest))
         for row in rows[before & (ended | late)].tolist():
             self._draw_again(row)
-        self._leave()
 
     def _pending(self, rows: Array) -> None:
         """A leaf that is to learn is about to act in worlds ``(k,)``."""
@@ -432,7 +438,7 @@ class EpisodeBatch:
 
     def _waits(self, leaf: ConceptInBatch, rows: Array) -> None:
         """Worlds ``(k,)`` wait before a leaf for a decision: what it sees, and what the one before paid."""
-        judged = leaf.activation.going_on(rows)
+        judged = leaf.waiting(rows)
         model, seen, memory = leaf.leaf.model, judged.seen, judged.memory
         features = np.asarray(model.features(seen, memory), np.float32)
         if features.shape != (len(rows), *self.observation_space.shape):
@@ -522,8 +528,8 @@ class EpisodeBatch:
             if isinstance(found, BelowUnknown):
                 above = found.above.node(0, 0)
                 raise InputError(
-                    f"'{node.name}' cannot be trained below '{above.name}': {type(above).__name__} is no known "
-                    f"kind of node; describe it with a NodeKind, see docs/parts/tree_node.md"
+                    f"'{node.name}' cannot be trained below '{above.name}': {type(above).__name__} has no "
+                    f"form that waits for decisions; give it one, see `compiled` in docs/parts/tree_node.md"
                 )
 
     def _leaf(self, number: int) -> ConceptInBatch:

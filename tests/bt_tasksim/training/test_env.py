@@ -6,7 +6,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
+from py_trees.composites import Sequence
 from toys import (
     DONE,
     DOWN,
@@ -445,6 +447,65 @@ def test_what_cannot_be_an_episode_is_refused(env_of):
         env_of(sequence("s", Train(Raise(), "a"), Train(Raise(), "b")), train="c")
     with pytest.raises(InputError, match="render_mode should be"):
         env_of(Train(Raise()), render_mode="human")
+
+
+class Ticks(Behaviour):
+    """A user's own behaviour, which no batch knows: runs for two ticks."""
+
+    def __init__(self, end=Status.SUCCESS):
+        super().__init__("ticks")
+        self.end, self.count = end, 0
+
+    def initialise(self):
+        self.count = 0
+
+    def update(self):
+        self.count += 1
+        self.feedback_message = "ticked enough" if self.count > 2 else ""
+        return self.end if self.count > 2 else Status.RUNNING
+
+
+class Own(Sequence):
+    """A user's own composite."""
+
+    def __init__(self, *children):
+        super().__init__("own", memory=True, children=list(children))
+
+
+def test_behaviours_of_ones_own_run_before_between_and_in_what_follows(env_of):
+    follower = Own(Below(), Check(), Ticks(), Check(name="second"))
+    env = env_of(sequence("s", Ticks(), Train(sequence("i", Raise(), Ticks())), Ticks(), follower))
+    for seed in (0, 1):
+        rewards, _, _, info = play(env, honest, seed)
+        assert info["is_success"] and info["why"] == "own succeeded" and len(rewards) == 6
+        # Two ticks each of what is unknown, five of the leaf, two of each check.
+        assert info["seconds"] == pytest.approx(0.05 * (2 + 5 + 2 + 2 + 2 + 2 + 2))
+    info = play(env, lambda features: DONE)[3]
+    assert info["follower"] == "FAILURE" and info["why"].startswith("check 0.45: limit violated")
+
+
+def test_one_of_ones_own_that_fails_says_why(env_of):
+    failing = sequence("s", Train(Raise()), Own(Check(), Ticks(Status.FAILURE)))
+    info = play(env_of(failing), honest)[3]
+    assert paid(info) == {"failure": -1.0} and info["why"] == "ticks: ticked enough"
+
+
+def test_goals_below_a_composite_of_ones_own_are_judged(env_of):
+    for tree in (
+        lambda: sequence("s", Train(Raise()), Own(Check(blind=True))),
+        lambda: Train(sequence("i", Raise(), Own(Check(blind=True)))),
+    ):
+        env = env_of(tree())
+        assert play(env, honest)[3]["is_success"]
+        env.batch.worlds.pipeline.truth = -0.05
+        info = play(env, honest)[3]
+        assert info["reason"] == "goal_missed" and not info["is_success"]
+
+
+@pytest.mark.parametrize("make", [lambda: Own(Train(Raise())), lambda: Train(Own(Raise()))])
+def test_what_learns_below_a_composite_of_ones_own_is_refused(env_of, make):
+    with pytest.raises(InputError, match=r"cannot be trained below 'own': Own has no form that waits"):
+        env_of(make())
 
 
 def test_features_that_do_not_fit_their_layout_are_refused(env_of):
