@@ -39,11 +39,12 @@ class ConceptInBatch(BatchLeaf):
         if not len(judged.rows):
             return judged.statuses
         if not leaf.under_training:
-            return activation.act(judged, leaf.policy_in_use.act(leaf.model, judged.seen, judged.memory))
+            action = leaf.policy_in_use.act(leaf.model, judged.seen, judged.memory)
+            return activation.act(judged, leaf.amended(action, judged.memory))
         due = host(leaf.model.decides(judged.seen, judged.memory))
         if not due.all():
             free = judged.at(np.flatnonzero(~due))
-            activation.act(free, no_action(free, leaf.model.actions))
+            activation.act(free, leaf.amended(no_action(free, leaf.model.actions), free.memory))
         judged.statuses[judged.going[due]] = PENDING
         self._due = judged.at(np.flatnonzero(due))
         return judged.statuses
@@ -63,7 +64,8 @@ class ConceptInBatch(BatchLeaf):
     def resume(self, rows: Array) -> Array:
         """See `BatchLeaf.resume`."""
         judged = self.waiting(rows)
-        return self.activation.act(judged, Action(self._motion[rows], self._terminate[rows]))
+        action = Action(self._motion[rows], self._terminate[rows])
+        return self.activation.act(judged, self.leaf.amended(action, judged.memory))
 
     def stop(self, rows: Array) -> None:
         """See `BatchLeaf.stop`."""

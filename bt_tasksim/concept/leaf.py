@@ -16,7 +16,7 @@ from bt_tasksim.concept.reporting import Reporting
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import INTERRUPTED
-from bt_tasksim.policy.policy import PROGRAMMED, Policy, PolicySlot, concept_name, named_policy
+from bt_tasksim.policy.policy import PROGRAMMED, Action, Policy, PolicySlot, concept_name, named_policy
 from bt_tasksim.robot.description import RobotDescription
 
 ONE = np.array([0])
@@ -171,7 +171,16 @@ class ConceptNode(ModelLeaf):
         if not len(judged.rows):
             return self._said(judged.statuses)
         action = self.policy_in_use.act(self.model, judged.seen, judged.memory)
-        return self._said(self.activation.act(judged, action))
+        return self._said(self.activation.act(judged, self.amended(action, judged.memory)))
+
+    def amended(self, action: Action, memory: Any) -> Action:
+        """What is made of a decision ``(k, ...)``, whoever decided, in as many worlds; by default it itself.
+
+        Args:
+            action: The decision.
+            memory: What is remembered there ``(k, ...)``.
+        """
+        return action
 
     def _said(self, statuses: Any) -> Status:
         """Report what has ended it."""
