@@ -15,6 +15,15 @@ NEAR, FAR = 0.02, 20.0
 """Metres between which a camera sees."""
 TO_OPTICAL = np.array([0.5, 0.5, -0.5, 0.5])
 """SAPIEN's camera looks along x, with y to the left and z up."""
+FORMATS = {
+    "default": dict.fromkeys(("Color", "ColorRaw", "PositionSegmentation"), "r32g32b32a32sfloat"),
+    "minimal": {
+        "Color": "r8g8b8a8unorm",
+        "ColorRaw": "r8g8b8a8unorm",
+        "PositionSegmentation": "r16g16b16a16sint",
+    },
+}
+"""How pictures are stored, by shaders; SAPIEN keeps it for the whole process, and ManiSkill changes it."""
 
 
 class SceneCamera:
@@ -39,6 +48,8 @@ class SceneCamera:
 
         self.model, self._scene, self._minimal = model, scene, shader == "minimal"
         sapien.render.set_camera_shader_dir(shader)  # for all cameras that are made from now on
+        for texture, form in FORMATS[shader].items():
+            sapien.render.set_picture_format(texture, form)
         self.component = sapien.render.RenderCameraComponent(model.width, model.height)
         self.component.set_perspective_parameters(
             NEAR, FAR,

@@ -17,6 +17,7 @@ from bt_tasksim.core.resources import asset
 from bt_tasksim.core.world import WorldState
 from bt_tasksim.engines.base import RenderingEngine
 from bt_tasksim.engines.cameras import CAMERAS, CameraSpec, project
+from bt_tasksim.engines.rendering.sapien_camera import FORMATS
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.shapes import KINDS
@@ -187,6 +188,27 @@ def test_pictures_are_light_and_have_the_size_asked_for(engine):
         assert image.colour.shape == (camera.height, camera.width, 3) and image.colour.dtype == np.uint8
         assert image.depth is None
         assert 110 < np.mean(image.colour) < 230
+
+
+def test_what_other_libraries_draw_with_changes_no_picture(engine):
+    """SAPIEN keeps shaders and formats for the whole process, and ManiSkill sets its own."""
+    import sapien
+
+    from bt_tasksim.engines.rendering.sapien import SapienRendering
+
+    world = Scene(objects={"cup": "on table"}).sample(0)
+
+    def picture():  # of a camera of its own
+        engine = SapienRendering({"small": SMALL})
+        engine.reset(world)
+        return engine.render(state_of(world), "small", depth=True)
+
+    before = picture()
+    sapien.render.set_camera_shader_dir("minimal")
+    for texture, form in FORMATS["minimal"].items():
+        sapien.render.set_picture_format(texture, form)
+    after = picture()
+    assert np.array_equal(before.colour, after.colour) and np.array_equal(before.depth, after.depth)
 
 
 def test_a_mesh_of_ones_own_is_drawn(engine):
