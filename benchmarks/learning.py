@@ -125,13 +125,13 @@ class Ours:
 def _serve(pipe: Any) -> None:
     """Decide n_envs, and run them again and count their control periods, until nobody asks any more."""
     env = EpisodeEnv(grasp_then_pick.build(), grasp_then_pick.scene(), stage=2)
-    network, periods, step = untrained(env.scene.robot), [0], env.runner.step
+    network, periods, step = untrained(env.scene.robot), [0], env.batch.worlds.step
 
-    def counted(command: Any) -> None:
+    def counted(tool: Any, hand: Any, rows: Any) -> Any:
         periods[0] += 1
-        step(command)
+        return step(tool, hand, rows)
 
-    env.runner.step = counted  # type: ignore[method-assign]
+    env.batch.worlds.step = counted  # type: ignore[method-assign]
     n_envs: list[list[tuple[int, list[Any]]]] = []
     while True:
         try:

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from bt_tasksim.training.config import TrainConfig
     from bt_tasksim.training.env import EpisodeEnv
     from bt_tasksim.training.ppo import train
+    from bt_tasksim.training.vector_env import EpisodeVectorEnv
     from bt_tasksim.trees.nodes.train import Train
 
 _names.install()
@@ -97,6 +98,7 @@ _HOMES = {
     "bt_tasksim.trees.nodes.train": ("Train",),
     "bt_tasksim.training.env": ("EpisodeEnv",),
     "bt_tasksim.training.ppo": ("train",),
+    "bt_tasksim.training.vector_env": ("EpisodeVectorEnv",),
 }
 _MODULES = {
     "poses": "bt_tasksim.core.poses",
@@ -114,6 +116,7 @@ __all__ = [
     "Direction",
     "EngineOptions",
     "EpisodeEnv",
+    "EpisodeVectorEnv",
     "Flag",
     "Form",
     "Goal",

@@ -15,12 +15,10 @@ from typing import Any
 
 import numpy as np
 from py_trees.behaviour import Behaviour
-from py_trees.common import Status
 
 from benchmarks.experiments import judged, pictures
 from benchmarks.experiments.common import Request, share
 from benchmarks.experiments.training import POLICIES, finished, history, learn
-from bt_tasksim.concept.activation import Judged
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.parameters import Seconds
 from bt_tasksim.concept.seen import Seen
@@ -50,9 +48,9 @@ WINDOW = 600
 class FixedTimeLeaf(ConceptNode):
     """A leaf that says itself when its grasp is done."""
 
-    def _act(self, judged: Judged, action: Action) -> Status:
-        hold = self.model.values["hold"]
-        return super()._act(judged, Action(action.motion, judged.memory.closing > hold))
+    def amended(self, action: Action, memory: GraspMemory) -> Action:
+        """See `ConceptNode.amended`."""
+        return Action(action.motion, memory.closing > self.model.values["hold"])
 
 
 class FixedTimeGrasp(Grasp):

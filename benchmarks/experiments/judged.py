@@ -114,7 +114,7 @@ def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
         _, _, terminated, truncated, info = env.act(Action(motion, np.array([nearer >= 1.0])))
         decisions += 1
         if terminated or truncated:
-            hidden = env.runner.context.hidden()
+            hidden = env.batch.worlds.hidden()
             force = 0.0 if hidden is None else float(hidden.hand_force[0, 0])
             done = info["status"] == "SUCCESS"
             return Draw(seed, bool(info["is_success"]), done, countable(info), info["why"], decisions, force)

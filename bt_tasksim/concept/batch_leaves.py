@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept.activation import Activation, no_action
+from bt_tasksim.concept.activation import Activation, Judged, no_action
 from bt_tasksim.concept.condition import ConditionNode
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.core.batch_leaf import FAILURE, PENDING, SUCCESS, BatchLeaf
+from bt_tasksim.core.batch_leaf import FAILURE, PENDING, RUNNING, SUCCESS, BatchLeaf
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array, host
 from bt_tasksim.policy.policy import Action
@@ -30,6 +30,7 @@ class ConceptInBatch(BatchLeaf):
         self.activation = Activation(leaf, leaf.model, context)
         self._motion: Array = np.zeros((context.worlds, leaf.model.actions))
         self._terminate: Array = np.zeros(context.worlds)
+        self._due: Judged | None = None
 
     def tick(self, rows: Array, fresh: Array) -> Array:
         """See `BatchLeaf.tick`."""
@@ -38,13 +39,23 @@ class ConceptInBatch(BatchLeaf):
         if not len(judged.rows):
             return judged.statuses
         if not leaf.under_training:
-            return activation.act(judged, leaf.policy_in_use.act(leaf.model, judged.seen, judged.memory))
+            action = leaf.policy_in_use.act(leaf.model, judged.seen, judged.memory)
+            return activation.act(judged, leaf.amended(action, judged.memory))
         due = host(leaf.model.decides(judged.seen, judged.memory))
         if not due.all():
             free = judged.at(np.flatnonzero(~due))
-            activation.act(free, no_action(free, leaf.model.actions))
+            activation.act(free, leaf.amended(no_action(free, leaf.model.actions), free.memory))
         judged.statuses[judged.going[due]] = PENDING
+        self._due = judged.at(np.flatnonzero(due))
         return judged.statuses
+
+    def waiting(self, rows: Array) -> Judged:
+        """What is seen and remembered in worlds ``rows (k,)`` whose ticks are PENDING before this leaf."""
+        due = self._due
+        if due is None or not np.array_equal(due.rows, rows):
+            due = self.activation.going_on(rows)  # they have come to wait in several ticks
+        k = len(rows)
+        return due._replace(statuses=np.full(k, RUNNING, np.int8), going=np.arange(k))
 
     def decide(self, rows: Array, action: Action) -> None:
         """Say what is to be done in worlds ``rows (k,)`` whose ticks are PENDING before this leaf."""
@@ -52,8 +63,9 @@ class ConceptInBatch(BatchLeaf):
 
     def resume(self, rows: Array) -> Array:
         """See `BatchLeaf.resume`."""
-        judged = self.activation.going_on(rows)
-        return self.activation.act(judged, Action(self._motion[rows], self._terminate[rows]))
+        judged = self.waiting(rows)
+        action = Action(self._motion[rows], self._terminate[rows])
+        return self.activation.act(judged, self.leaf.amended(action, judged.memory))
 
     def stop(self, rows: Array) -> None:
         """See `BatchLeaf.stop`."""

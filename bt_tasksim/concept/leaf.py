@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.activation import Activation, Judged, no_action
+from bt_tasksim.concept.activation import Activation
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.functions import ConceptFunctions
 from bt_tasksim.concept.reporting import Reporting
-from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import INTERRUPTED
@@ -23,20 +21,6 @@ from bt_tasksim.robot.description import RobotDescription
 
 ONE = np.array([0])
 """Numbers of the worlds of a tree of py_trees: there is one."""
-
-
-class Decision(NamedTuple):
-    """What the tick of a leaf under training yields right before it acts: whoever trains it decides.
-
-    Attributes:
-        leaf: The leaf; its `ConceptNode.decide` takes the action before the tick goes on.
-        seen: What is seen ``(1, ...)``.
-        memory: The leaf's memory ``(1, ...)``.
-    """
-
-    leaf: ConceptNode
-    seen: Seen
-    memory: Any
 
 
 class ContextLeaf(Reporting):
@@ -117,10 +101,9 @@ class ConceptNode(ModelLeaf):
         self.lacks_policy = False
         """It has no policy: it is not programmed, and nothing was learned yet."""
         self.under_training = False
-        """The leaf's ticks are suspended before it acts, see `Decision`."""
+        """Whoever trains it decides: it is ticked in a `BatchTree`, which waits there for decisions."""
         self._activation: Activation | None = None
         self._policy: Policy | None = None
-        self._decided: Action | None = None
 
     @property
     def model(self) -> ConceptFunctions:
@@ -182,51 +165,22 @@ class ConceptNode(ModelLeaf):
         """Let another policy decide, from now on and until the tree is set up again."""
         self._policy, self.lacks_policy = policy, False
 
-    def decide(self, action: Action) -> None:
-        """Take the action ``(1, ...)`` that the suspended tick waits for, see `Decision`."""
-        self._decided = action
-
-    def initialise(self) -> None:
-        """py_trees calls this when the leaf becomes active."""
-        self._decided = None
-
-    def tick(self) -> Iterator[Behaviour]:
-        """One tick; under training it is suspended right before the leaf acts, by yielding a `Decision`."""
-        if not self.under_training:
-            yield from super().tick()
-            return
-        if self.status != Status.RUNNING:
-            self.initialise()
-        judged = self._judge()
-        if len(judged.rows):
-            if bool(self.model.decides(judged.seen, judged.memory)[0]):
-                yield Decision(self, judged.seen, judged.memory)  # type: ignore[misc]  # on purpose
-                if self._decided is None:
-                    raise RuntimeError(f"leaf '{self.name}' is under training and was given no action")
-                action, self._decided = self._decided, None
-            else:
-                action = no_action(judged, self.model.actions)
-            found = self._act(judged, action)
-        else:
-            found = self._said(judged.statuses)
-        if found != Status.RUNNING:
-            self.stop(found)
-        self.status = found
-        yield self
-
     def update(self) -> Status:
         """One tick: judge, then act."""
-        judged = self._judge()
+        judged = self.activation.judge(ONE, np.array([self.status != Status.RUNNING]))
         if not len(judged.rows):
             return self._said(judged.statuses)
-        return self._act(judged, self.policy_in_use.act(self.model, judged.seen, judged.memory))
+        action = self.policy_in_use.act(self.model, judged.seen, judged.memory)
+        return self._said(self.activation.act(judged, self.amended(action, judged.memory)))
 
-    def _judge(self) -> Judged:
-        return self.activation.judge(ONE, np.array([self.status != Status.RUNNING]))
+    def amended(self, action: Action, memory: Any) -> Action:
+        """What is made of a decision ``(k, ...)``, whoever decided, in as many worlds; by default it itself.
 
-    def _act(self, judged: Judged, action: Action) -> Status:
-        """Carry a decision out."""
-        return self._said(self.activation.act(judged, action))
+        Args:
+            action: The decision.
+            memory: What is remembered there ``(k, ...)``.
+        """
+        return action
 
     def _said(self, statuses: Any) -> Status:
         """Report what has ended it."""

@@ -22,7 +22,7 @@ from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.batch_reasons import BatchReasons
 from bt_tasksim.execution.leaf_errors import leaf_error
-from bt_tasksim.execution.world_by_world import Copies, WorldByWorld
+from bt_tasksim.execution.world_by_world import BelowUnknown, Copies, Watcher, WorldByWorld
 from bt_tasksim.trees.check import check_tree
 from bt_tasksim.trees.nodes.base import NodeKind
 from bt_tasksim.trees.nodes.batch import Arrays, BatchNode, NodePlace
@@ -45,20 +45,21 @@ class BatchTree:
         leaves: What a leaf is in a batch; None where it does not know the leaf.
         build: Makes one more tree of the same shape. What neither ``leaves`` nor the kinds of nodes know
             (see `NodeKind.compiled`) is ticked by py_trees, world by world, in a copy for each world; a
-            warning says so, once for each class.
+            warning says so, once for each class. Without it a single world has the tree's own nodes there,
+            which whoever ticks it has set up.
         contexts: The context of a world, which such nodes are set up with.
         xp: The library of all arrays, such as ``numpy`` or ``torch``.
         device: One of the library's devices; None: its default.
 
     Attributes:
         nodes: The nodes of the tree, by number.
-        compiled: By number: the node in a batch, or the leaf. Nodes below one that is ticked world by world
-            have none.
+        compiled: By number: the node in a batch, or the leaf; for nodes below one that is ticked world by
+            world, what tells of them.
         waits_at: ``(N,)`` the leaf before which a world's tick stands still, by number, or -1.
 
     Raises:
         InputError: The tree is refused (see `check_tree`), there are no worlds, or something in the tree is
-            not known and there is no ``build``, or what that makes is another tree.
+            not known in several worlds and there is no ``build``, or what that makes is another tree.
     """
 
     def __init__(
@@ -91,7 +92,7 @@ class BatchTree:
         self._enter, self._leave = [0] * len(self.nodes), [0] * len(self.nodes)
         self._resume: dict[int, int] = {}
         self._listeners: dict[int, tuple[int, Callable[[Array], None]]] = {}
-        self._watchers: dict[int, Callable[[Array, Array], Array | None]] = {}
+        self._watchers: dict[int, Watcher] = {}
         self._at: tuple[int, Array] | None = None
         children, self._ends = _shape(tree)
         self.compiled: dict[int, BatchNode | BatchLeaf] = {}
@@ -160,7 +161,7 @@ class BatchTree:
                 self._waiting -= len(there)
         self.stop_node(0, rows)
 
-    def watch(self, node: int, callback: Callable[[Array, Array], Array | None]) -> None:
+    def watch(self, node: int, callback: Watcher) -> None:
         """Be told whenever a node ends its tick in some worlds.
 
         Of several watched nodes, those that a world's tick visits first are told first.
@@ -169,15 +170,13 @@ class BatchTree:
             node: The node, by number.
             callback: Takes worlds ``(k,)`` and the statuses ``(k,)`` that the node has there now. Gives
                 booleans ``(k,)``, or None for all: where the tick goes on. Elsewhere it is broken off where
-                it stands, and `reset` comes next.
-
-        Raises:
-            InputError: It stands below a node that is ticked world by world.
+                it stands, and `reset` comes next. Below a node that is ticked world by world it goes on in
+                any case.
         """
-        if node not in self.compiled:
-            raise InputError(
-                f"'{self.nodes[node].name}' cannot be watched: a node above it has no form for many worlds"
-            )
+        found = self.compiled[node]
+        if isinstance(found, BelowUnknown):
+            found.above.watchers[found.position] = callback
+            return
         self._watchers[node] = callback
 
     def speaker(self, row: int) -> Behaviour | None:
@@ -342,6 +341,8 @@ class BatchTree:
             if leaf is None:
                 block = self._status[node : self._ends[node]]
                 leaf = WorldByWorld(copies.of(node, self.nodes[node]), block, self.arrays)
+                for below in range(node + 1, self._ends[node]):
+                    self.compiled[below] = BelowUnknown(leaf, below - node)
             self.compiled[node] = leaf
             self._listeners[node] = FAILURE if isinstance(leaf, WorldByWorld) else RUNNING, leaf.stop
             self._handlers.append(partial(self._tick_leaf, node, leaf))

@@ -23,7 +23,7 @@ from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import LONGEST, NOT_JUDGED, SETTLE, Runner
-from bt_tasksim.execution.worlds import Worlds, hidden_of
+from bt_tasksim.execution.worlds import BatchWorlds, hidden_of
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.scene import WorldSource
@@ -83,7 +83,7 @@ class BatchRunner:
         self._build = build
         self.robot = load_robot(scene.robot)
         self.tree = build()
-        self.worlds = Worlds(self.robot, self.options, worlds, threads)
+        self.worlds = BatchWorlds(self.robot, self.options, worlds, threads)
         self.context = Context(self.robot, worlds)
         self.context.hidden = self.worlds.hidden
         for node in self.tree.iterate():
@@ -239,7 +239,7 @@ class BatchRunner:
         rows = np.flatnonzero(self._phase == SETTLING)
         if not len(rows):
             return rows
-        velocities = self.worlds.physics.hidden(rows).velocities
+        velocities = self.worlds.hidden(rows).velocities
         fast = (np.linalg.norm(velocities[..., :3], axis=-1) >= AT_REST[0] / 2) | (
             np.linalg.norm(velocities[..., 3:], axis=-1) >= AT_REST[1] / 2
         )
@@ -250,7 +250,7 @@ class BatchRunner:
         """The results of worlds that have come to rest."""
         if not len(rows):
             return
-        hidden = self.worlds.physics.hidden(rows)
+        hidden = self.worlds.hidden(rows)
         for k, row in enumerate(rows.tolist()):
             episode = self._episodes[row]
             assert episode is not None

@@ -7,15 +7,12 @@ from collections.abc import Generator
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.leaf import Decision
 from bt_tasksim.core.culprit import users_place
 from bt_tasksim.core.errors import BtTasksimError, LeafError
 
 
-def ticking(tree: Behaviour) -> Generator[Behaviour | Decision, None, None]:
+def ticking(tree: Behaviour) -> Generator[Behaviour, None, None]:
     """One tick of a tree, node by node as it visits them.
-
-    A leaf under training yields a `Decision` before it acts. Closing a tick half-way ends no node.
 
     Raises:
         LeafError: A leaf raised; every node has ended.
@@ -23,8 +20,6 @@ def ticking(tree: Behaviour) -> Generator[Behaviour | Decision, None, None]:
     """
     try:
         yield from tree.tick()
-    except GeneratorExit:
-        raise
     except BaseException as error:
         culprit = _raising_leaf(error, tree)
         end_all(tree, culprit)

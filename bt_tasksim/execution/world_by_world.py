@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Generator
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
+import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.concept.context import Context
-from bt_tasksim.concept.leaf import Decision
 from bt_tasksim.concept.reporting import outcome_of, speaker
-from bt_tasksim.core.batch_leaf import FAILURE, INVALID, PENDING, RUNNING, SUCCESS, BatchLeaf
+from bt_tasksim.core.batch_leaf import FAILURE, INVALID, RUNNING, SUCCESS, BatchLeaf
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
-from bt_tasksim.execution.leaf_errors import end_all
+from bt_tasksim.execution.leaf_errors import ticking
 from bt_tasksim.trees.nodes.batch import Arrays
 from bt_tasksim.trees.walk import nodes_of
 
@@ -30,11 +30,8 @@ CODES = {
 }
 
 
-class Suspended(NamedTuple):
-    """A tick that stands still before a leaf under training."""
-
-    ticks: Generator[Behaviour | Decision, None, None]
-    decision: Decision
+Watcher = Callable[[Array, Array], Array | None]
+"""Is told worlds ``(k,)`` and a node's statuses ``(k,)`` there, see `BatchTree.watch`."""
 
 
 class WorldByWorld(BatchLeaf):
@@ -46,30 +43,23 @@ class WorldByWorld(BatchLeaf):
         arrays: The arrays of the batch.
 
     Attributes:
-        suspended: By world, where its tick stands still before a leaf under training.
+        watchers: Who is told of a node below when it ends its tick, by its position in the order of
+            `trees.walk`, from the behaviour on.
     """
 
     def __init__(self, copies: list[Behaviour], status: Array, arrays: Arrays) -> None:
         self.copies, self.arrays = copies, arrays
         self._status = status
         self._nodes = [nodes_of(copy) for copy in copies]
-        self.suspended: dict[int, Suspended] = {}
+        self.watchers: dict[int, Watcher] = {}
 
     def tick(self, rows: Array, fresh: Array) -> Array:
         """See `BatchLeaf.tick`."""
-        return self._codes([self._go_on(row, _ticks(self.copies[row])) for row in rows.tolist()])
-
-    def resume(self, rows: Array) -> Array:
-        """See `BatchLeaf.resume`."""
-        return self._codes([self._go_on(row, self.suspended.pop(row).ticks) for row in rows.tolist()])
+        return self._codes([self._tick(row) for row in rows.tolist()])
 
     def stop(self, rows: Array) -> None:
         """See `BatchLeaf.stop`; called too where it has ended, as py_trees does."""
         for row in rows.tolist():
-            half = self.suspended.pop(row, None)
-            if half is not None:
-                half.ticks.close()
-                end_all(self.copies[row], half.decision.leaf)
             self.copies[row].stop(Status.INVALID)
 
     def outcome(self, row: int) -> Outcome | None:
@@ -77,12 +67,18 @@ class WorldByWorld(BatchLeaf):
         found = speaker(self.copies[row])
         return None if found is None else outcome_of(found)
 
-    def _go_on(self, row: int, ticks: Generator[Behaviour | Decision, None, None]) -> int:
-        for said in ticks:
-            if isinstance(said, Decision):
-                self.suspended[row] = Suspended(ticks, said)
-                return PENDING
-        codes = [CODES[node.status] for node in self._nodes[row]]
+    def node(self, row: int, position: int) -> Behaviour:
+        """A node of a world's copy, by its position in the order of `trees.walk`, the behaviour's being 0."""
+        return self._nodes[row][position]
+
+    def _tick(self, row: int) -> int:
+        """One tick in a world; the behaviour's status."""
+        nodes = self._nodes[row]
+        watched = {id(nodes[k]): told for k, told in self.watchers.items()}
+        for node in ticking(self.copies[row]):
+            if id(node) in watched:
+                watched[id(node)](np.array([row]), self._codes([CODES[node.status]]))
+        codes = [CODES[node.status] for node in nodes]
         if len(codes) > 1:
             self._status[:, row] = self._codes(codes)
         return codes[0]
@@ -91,13 +87,33 @@ class WorldByWorld(BatchLeaf):
         return self.arrays.xp.asarray(codes, dtype=self.arrays.xp.int8, device=self.arrays.device)
 
 
+class BelowUnknown(BatchLeaf):
+    """A node below one that is ticked world by world: others can ask what it says; py_trees ticks it.
+
+    Args:
+        above: What is ticked world by world.
+        position: Its position below that, in the order of `trees.walk`.
+
+    Attributes:
+        above: See there.
+        position: See there.
+    """
+
+    def __init__(self, above: WorldByWorld, position: int) -> None:
+        self.above, self.position = above, position
+
+    def tick(self, rows: Array, fresh: Array) -> Array:
+        """See `BatchLeaf.tick`: never called."""
+        raise NotImplementedError("the node is ticked by what stands above it")
+
+    def outcome(self, row: int) -> Outcome | None:
+        """See `BatchLeaf.outcome`."""
+        return outcome_of(self.above.node(row, self.position))
+
+
 def _shape(node: Behaviour) -> tuple[str, str, int]:
     kind = type(node)
     return kind.__module__, kind.__qualname__, len(node.children)
-
-
-def _ticks(copy: Behaviour) -> Generator[Behaviour | Decision, None, None]:
-    yield from copy.tick()
 
 
 class Copies:
@@ -106,7 +122,7 @@ class Copies:
     Args:
         tree: What the copies should be like.
         worlds: How many.
-        build: Makes one; None: there are none.
+        build: Makes one; None: there are none, and a single world has the tree itself, set up by its owner.
         contexts: The context of a world; None: nodes are set up without one.
     """
 
@@ -133,10 +149,12 @@ class Copies:
             InputError: No copies can be made, or they are other trees.
         """
         kind = type(node)
+        if self._build is None and self._worlds == 1:
+            return [node]
         if self._build is None:
             raise InputError(
                 f"'{node.name}' cannot be ticked in a batch: {kind.__name__} has no form for many worlds; "
-                f"give build=..., which makes the tree, so that each world gets one of its own"
+                f"run it in one world, or give BatchTree build=..., which makes a tree for each world"
             )
         if kind not in self._said:
             self._said.add(kind)

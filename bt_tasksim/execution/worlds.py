@@ -1,7 +1,12 @@
-"""The pipeline of a batch: kinematics, physics and post-process of many simulated worlds at once."""
+"""Worlds that begin, go on and fail one by one, and the pipeline of a batch of them.
+
+A batch has kinematics, physics and post-process of many simulated worlds at once. What has only worlds of one
+is in `bt_tasksim.execution.pipeline_worlds`.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -19,6 +24,7 @@ from bt_tasksim.engines.perception.state import BatchState
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.scene import WorldSource
 
 WORLD_MEMORY = 3_000_000
 """Bytes that a world takes, of which 1.6 to 2.4 million were measured with one object."""
@@ -68,8 +74,73 @@ class Unreached:
     error: BtTasksimError
 
 
-class Worlds:
-    """Worlds of one robot, which begin, go on and fail one by one; see `PhysicsBatch`.
+class Worlds(ABC):
+    """Worlds of one robot, which begin, go on and fail one by one.
+
+    Attributes:
+        count: How many, N.
+        observation: What was last seen of all of them ``(N, ...)``; None before the first look.
+    """
+
+    count: int
+    observation: Observation | None = None
+
+    def source(self, scene: WorldSource) -> WorldSource:
+        """Where the worlds of episodes in a scene come from; by default the scene draws them itself.
+
+        Raises:
+            InputError: There are no such worlds of this scene.
+        """
+        return scene
+
+    @abstractmethod
+    def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> dict[int, BtTasksimError]:
+        """Fresh worlds at these rows ``(k,)``; `observe` comes next.
+
+        Returns:
+            Why some of them could not begin, by row.
+        """
+
+    @abstractmethod
+    def errors(self, rows: Array) -> dict[int, BtTasksimError]:
+        """Why worlds have failed, by row."""
+
+    @abstractmethod
+    def observe(self, rows: Array) -> Observation:
+        """What is seen now ``(N, ...)``: of worlds ``rows (k,)`` anew, of the others as it was."""
+
+    @abstractmethod
+    def step(self, tool: Array | None, hand: Array | None, rows: Array) -> list[Unreached]:
+        """One control period in worlds ``rows (k,)``.
+
+        Args:
+            tool: Tool targets ``(k, 7)``; rows of NaN, or None, keep their last ones.
+            hand: Hand targets ``(k, 1 + n_synergies)``, likewise; synergies that are lacking are 0.
+            rows: Which worlds.
+
+        Returns:
+            The worlds whose targets are out of reach: there the last ones were followed.
+        """
+
+    @abstractmethod
+    def hidden(self, rows: Array | None = None) -> Hidden | None:
+        """What only a simulator knows of worlds ``rows (k,)``, by default of all; None: nobody knows it."""
+
+    def picture(self, camera: str) -> Array:
+        """A picture ``(height, width, 3)`` of the first world, uint8.
+
+        Raises:
+            RuntimeError: Nothing is drawn here, the default.
+        """
+        raise RuntimeError("nothing can be drawn: these worlds have no rendering engine")
+
+    @abstractmethod
+    def close(self) -> None:
+        """Let go of worlds, engines and threads."""
+
+
+class BatchWorlds(Worlds):
+    """Worlds in one batch of physics, see `PhysicsBatch`.
 
     Args:
         robot: The robot.
@@ -96,15 +167,9 @@ class Worlds:
         self._perception = BatchState(robot, count, noise_model(options.noise))
         self._tool: Array = np.full((count, 7), np.nan)
         self._hand: Array = np.full((count, 1 + len(robot.synergies)), np.nan)
-        self.observation: Observation | None = None
-        """What was last seen of all worlds ``(N, ...)``."""
 
     def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> dict[int, BtTasksimError]:
-        """Fresh worlds at these rows ``(k,)``; `observe` comes next.
-
-        Returns:
-            Why some of them could not begin, by row.
-        """
+        """See `Worlds.reset`."""
         failed: dict[int, BtTasksimError] = {}
         placed = []
         for row, configuration in zip(rows.tolist(), configurations, strict=True):
@@ -122,12 +187,12 @@ class Worlds:
         return failed | self.errors(rows)
 
     def errors(self, rows: Array) -> dict[int, BtTasksimError]:
-        """Why worlds have failed, by row."""
+        """See `Worlds.errors`."""
         found = ((row, self.physics.errors[row]) for row in rows.tolist())
         return {row: error for row, error in found if error is not None}
 
     def observe(self, rows: Array) -> Observation:
-        """What is seen now: of worlds ``rows (k,)`` anew, of the others as it was."""
+        """See `Worlds.observe`."""
         seen = self._perception.observe(self.physics.state(rows), rows if len(rows) < self.count else None)
         before = self.observation
         if before is not None and len(rows) < self.count:
@@ -136,16 +201,7 @@ class Worlds:
         return seen
 
     def step(self, tool: Array | None, hand: Array | None, rows: Array) -> list[Unreached]:
-        """One control period in worlds ``rows (k,)``.
-
-        Args:
-            tool: Tool targets ``(k, 7)``; rows of NaN, or None, keep their last ones.
-            hand: Hand targets ``(k, 1 + n_synergies)``, likewise; synergies that are lacking are 0.
-            rows: Which worlds.
-
-        Returns:
-            The worlds whose targets are out of reach: there the last ones were followed.
-        """
+        """See `Worlds.step`."""
         asked_tool, asked_hand = self._tool[rows], self._hand[rows]
         if tool is not None:
             asked_tool = np.where(np.isnan(tool), asked_tool, tool)
@@ -171,12 +227,12 @@ class Worlds:
         self.physics.step(target, rows)
         return unreached
 
-    def hidden(self) -> Hidden:
-        """What only a simulator knows of all worlds ``(N, ...)``."""
-        return self.physics.hidden(np.arange(self.count))
+    def hidden(self, rows: Array | None = None) -> Hidden:
+        """See `Worlds.hidden`."""
+        return self.physics.hidden(np.arange(self.count) if rows is None else rows)
 
     def close(self) -> None:
-        """Let go of worlds and threads."""
+        """See `Worlds.close`."""
         self.physics.close()
 
 

@@ -1,40 +1,37 @@
 """Activations of what stands under a `Train` node, in many worlds of one process at once.
 
-Each world has an episode of its own, from the draw to the judgement; its laws are those of
-`bt_tasksim.training.episodes`. Worlds that wait for a decision stand still in the middle of a tick, and all
-others tick and step together.
+Each world has an episode of its own, from the draw to the judgement. Worlds that wait for a decision stand
+still in the middle of a tick, and all others tick and step together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.batch_leaves import ConceptInBatch, leaf_in_batch
 from bt_tasksim.concept.context import Context, Refusal
-from bt_tasksim.concept.leaf import ConceptNode
-from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING, SUCCESS
-from bt_tasksim.core.bundles import taken
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
 from bt_tasksim.core.outcomes import INTERRUPTED, OUT_OF_REACH, TIME_OVER, Outcome, outcome_of_error
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import Hidden
 from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.execution.pipeline_worlds import worlds_for
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import LONGEST
-from bt_tasksim.execution.worlds import Worlds, why_alone
-from bt_tasksim.policy.policy import Policy, split_action
+from bt_tasksim.execution.world_by_world import BelowUnknown
+from bt_tasksim.execution.worlds import why_alone
+from bt_tasksim.policy.policy import Action, Policy, split_action
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import WorldSource
-from bt_tasksim.training.batch_judge import BatchJudgement
-from bt_tasksim.training.env import REDRAWS, find_train, not_reached, shared_layout, spaces_of
-from bt_tasksim.training.episodes import BEGAN_ANEW, FOLLOWER_LATE, TREE_ENDED, Ending, ending_of
-from bt_tasksim.training.judge import SignalOutcome
+from bt_tasksim.training.decision import Decision
+from bt_tasksim.training.endings import BEGAN_ANEW, FOLLOWER_LATE, TREE_ENDED, Ending, ending_of
+from bt_tasksim.training.judge import Judgement, SignalOutcome
+from bt_tasksim.training.learning_leaves import find_train, shared_layout, spaces_of
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.transitions import Transitions
 from bt_tasksim.trees.check import check_tree
@@ -45,6 +42,8 @@ IDLE, DRAWING, TICKING, WAITING, DECIDED, STEPPING = range(6)
 decision, in the middle of a tick; which has come; a control period is due."""
 BEFORE = -1
 """Number of the activation before the first decision."""
+REDRAWS = 50
+"""Draws in a row in which the subtree may stay inactive."""
 
 
 class Happened(NamedTuple):
@@ -85,38 +84,12 @@ class Draws(NamedTuple):
     stage: int | None = None
 
 
-class BatchDecision:
-    """A decision in one of the worlds of a batch; what was seen is taken out when it is asked for.
-
-    Args:
-        leaf: The leaf.
-        seen: What was seen in some worlds.
-        memory: What the leaf remembered in them.
-        position: Which of them it is.
-    """
-
-    __slots__ = ("_memory", "_position", "_seen", "leaf")
-
-    def __init__(self, leaf: ConceptNode, seen: Seen, memory: Any, position: int) -> None:
-        self.leaf, self._seen, self._memory, self._position = leaf, seen, memory, position
-
-    @property
-    def seen(self) -> Seen:
-        """What was seen ``(1, ...)``."""
-        return self._seen.at(np.array([self._position]))
-
-    @property
-    def memory(self) -> Any:
-        """What the leaf remembered ``(1, ...)``."""
-        return taken(self._memory, np.array([self._position]))
-
-
 def why_alone_in(tree: Behaviour, scene: WorldSource, options: EngineOptions) -> str:
     """Why episodes of a tree run one by one, as a sentence; empty where they need not."""
     alone = why_alone(options)
     if alone:
         return alone
-    context = Context(load_robot(scene.robot))
+    context = Context(load_robot(scene.robot), worlds=2)
     try:
         BatchTree(tree, context.worlds, lambda leaf: leaf_in_batch(leaf, context))
     except InputError:
@@ -133,8 +106,8 @@ class EpisodeBatch:
         tree: The tree, with one `Train` node at least.
         scene: The scene.
         train: Name of the `Train` node; by default the first one.
-        options: Engines, see `bt_tasksim.execution.worlds.why_alone`; by default SAPIEN with the noise model
-            ``original``.
+        options: Engines, in several worlds those that `bt_tasksim.execution.worlds.why_alone` has nothing
+            against; by default SAPIEN with the noise model ``original``.
         reward: What is paid.
         longest: Seconds of an episode, earlier siblings included, after which it is truncated.
         policies: Policies of other leaves, by the leaf's name: what was trained before.
@@ -142,8 +115,10 @@ class EpisodeBatch:
         threads: How many threads step them.
 
     Raises:
-        InputError: As of `bt_tasksim.training.env.EpisodeEnv`; or the engines, or something in the tree,
-            have no form for many worlds, or these do not fit into memory.
+        InputError: There is no `Train` node, nothing under it can learn, or the leaves that learn differ in
+            what they see or do; what is to learn stands below a behaviour that is not known; or there are to
+            be several worlds, and the engines, or something in the tree, have no form for that, or memory has
+            no room for them.
     """
 
     def __init__(
@@ -160,7 +135,7 @@ class EpisodeBatch:
     ) -> None:
         check_tree(tree)
         options = options or EngineOptions(noise="original")
-        self.tree, self.scene, self.longest = tree, scene, longest
+        self.tree, self.longest = tree, longest
         self.reward = reward or Reward()
         self.train = find_train(tree, train)
         self.learners = self.train.learners()
@@ -176,14 +151,16 @@ class EpisodeBatch:
         self.layout = shared_layout(self.train, self.learners, self.robot)
         self.observation_space, self.action_space = spaces_of(self.layout, self.learners[0].model.actions)
         self.batch = BatchTree(tree, worlds, lambda leaf: leaf_in_batch(leaf, self.context))
-        self._judgement = BatchJudgement(self.train, self.batch, self.context, self._hidden)
+        self._check_known()
+        self.worlds = worlds_for(self.robot, options, worlds, threads)
+        self.scene = self.worlds.source(scene)
+        self.context.hidden = self.worlds.hidden
+        self._judgement = Judgement(self.train, self.batch, self.context, self.worlds.hidden)
         for number in self._judgement.nodes:
             self.batch.watch(number, self._watcher(number))
         compiled = self.batch.compiled[self._judgement.train]
         assert isinstance(compiled, BatchTrain)
         self._train = compiled
-        self.worlds = Worlds(self.robot, options, worlds, threads)
-        self.context.hidden = self.worlds.hidden
         n = self.observation_space.shape[0]
         self._phase = np.full(worlds, IDLE)
         self._activation: Array = np.full(worlds, BEFORE, np.int64)
@@ -208,6 +185,10 @@ class EpisodeBatch:
     def waiting(self) -> Array:
         """The worlds ``(k,)`` in which a decision is waited for."""
         return np.flatnonzero(self._phase == WAITING)
+
+    def decision(self, row: int) -> Decision | None:
+        """What the leaf that is to act in a world sees and remembers; None where nothing is waited for."""
+        return self._transitions[row].decision if self._phase[row] == WAITING else None
 
     def features(self) -> Array:
         """What each leaf saw at the last decision of its world ``(N, n)``."""
@@ -237,13 +218,20 @@ class EpisodeBatch:
         size = self.action_space.shape[0]
         if actions.shape != (len(rows), size) or not np.isfinite(actions).all():
             raise InputError(f"an action should be {size} finite numbers, found {actions}")
+        self.act(rows, split_action(actions))
+
+    def act(self, rows: Array, action: Action) -> None:
+        """`decide` with what a policy decides ``(k, ...)``: a programmed one may exceed an action's bounds.
+
+        Raises:
+            RuntimeError: In one of the worlds no decision is waited for.
+        """
         if not (self._phase[rows] == WAITING).all():
             raise RuntimeError("a decision for a world that does not wait for one: begin an episode first")
-        action = split_action(actions)
         leaves = self.batch.waits_at[rows]
-        for number in np.unique(leaves).tolist():
+        for number in set(leaves.tolist()):
             there = np.flatnonzero(leaves == number)
-            self._leaf(number).decide(rows[there], taken(action, there))
+            self._leaf(number).decide(rows[there], Action(action.motion[there], action.terminate[there]))
         for k, row in enumerate(rows.tolist()):
             self._transitions[row].decided(action.motion[k])
         self._phase[rows] = DECIDED
@@ -265,7 +253,7 @@ class EpisodeBatch:
                     return found
                 fresh = self._begin(np.flatnonzero(self._phase == DRAWING))
                 stepped = self._step(np.flatnonzero(self._phase == STEPPING))
-                rows = np.union1d(fresh, stepped)
+                rows = np.union1d(fresh, stepped) if len(fresh) else stepped
                 if len(rows):
                     self._phase[rows] = TICKING
                     self._ticked(rows, self.batch.tick(rows, self.context.times[rows]))
@@ -331,8 +319,8 @@ class EpisodeBatch:
         self._left[rows] -= 1
         written = self.context.written
         tool, hand = (None if part is None else part[rows] for part in (written.tool, written.hand))
-        writers = {row: self.context.tool_writer(row) for row in rows.tolist()}
         unreached = self.worlds.step(tool, hand, rows)
+        writers = {miss.row: self.context.tool_writer(miss.row) for miss in unreached}
         failed = self.worlds.errors(rows)
         for row, error in failed.items():
             self._spoiled(row, error)
@@ -354,9 +342,6 @@ class EpisodeBatch:
         if not self._following[row] or isinstance(error, (InputError, LeafError)):
             raise error
         self._end(row, SignalOutcome(False, "INVALID", outcome_of_error(error), discarded=True))
-
-    def _hidden(self, rows: Array) -> Hidden | None:
-        return self.worlds.physics.hidden(rows)
 
     # ---- within a tick ----------------------------------------------------------------------------------
 
@@ -393,17 +378,25 @@ class EpisodeBatch:
 
     def _ticked(self, rows: Array, status: Array) -> None:
         """Ticks have ended, or stand still before a leaf that is to learn."""
-        batch, judgement = self.batch, self._judgement
         if self._over:
             on = ~np.isin(rows, self._over)
             rows, status = rows[on], status[on]
-        at = batch.waits_at[rows]
+        at = self.batch.waits_at[rows]
         self._pending(rows[at >= 0])
         rows, status = rows[at < 0], status[at < 0]
+        if len(rows):
+            self._gone_on(rows, status)
+        self._leave()
+
+    def _gone_on(self, rows: Array, status: Array) -> None:
+        """Ticks have ended, and no leaf that is to learn was about to act at their end."""
+        batch, judgement = self.batch, self._judgement
         self._phase[rows] = STEPPING
         following, before = self._following[rows], self._activation[rows] == BEFORE
         ended, late = status != RUNNING, self._left[rows] <= 0
         stopped = batch.status[rows, judgement.train] != RUNNING
+        if not (following | ended | late | (stopped & ~before)).any():
+            return
         if following.any():
             for row, judged in judgement.unreached(rows[following]).items():
                 self._end(row, judged)
@@ -421,7 +414,6 @@ class EpisodeBatch:
             self._end(row, cut=TIME_OVER(limit=self.longest))
         for row in rows[before & (ended | late)].tolist():
             self._draw_again(row)
-        self._leave()
 
     def _pending(self, rows: Array) -> None:
         """A leaf that is to learn is about to act in worlds ``(k,)``."""
@@ -446,7 +438,7 @@ class EpisodeBatch:
 
     def _waits(self, leaf: ConceptInBatch, rows: Array) -> None:
         """Worlds ``(k,)`` wait before a leaf for a decision: what it sees, and what the one before paid."""
-        judged = leaf.activation.going_on(rows)
+        judged = leaf.waiting(rows)
         model, seen, memory = leaf.leaf.model, judged.seen, judged.memory
         features = np.asarray(model.features(seen, memory), np.float32)
         if features.shape != (len(rows), *self.observation_space.shape):
@@ -457,7 +449,7 @@ class EpisodeBatch:
         self._features[rows] = features
         costs = np.asarray(model.necessary_cost(seen, memory), float).tolist()
         for k, row in enumerate(rows.tolist()):
-            decision = BatchDecision(leaf.leaf, seen, memory, k)
+            decision = Decision(leaf.leaf, seen, memory, k)
             transitions, paid = self._transitions.get(row), None
             if transitions is None:
                 self._transitions[row] = Transitions(decision, self.reward.gamma, costs[k])
@@ -528,7 +520,34 @@ class EpisodeBatch:
         if self.worlds.observation is not None:
             self.context.advance(self.context.observation, rows)  # what they have commanded is void
 
+    def _check_known(self) -> None:
+        """Refuse what is to learn where py_trees ticks it, which waits for nobody."""
+        numbers = {id(node): number for number, node in enumerate(self.batch.nodes)}
+        for node in (self.train, *self.learners):
+            found = self.batch.compiled[numbers[id(node)]]
+            if isinstance(found, BelowUnknown):
+                above = found.above.node(0, 0)
+                raise InputError(
+                    f"'{node.name}' cannot be trained below '{above.name}': {type(above).__name__} has no "
+                    f"form that waits for decisions; give it one, see `compiled` in docs/parts/tree_node.md"
+                )
+
     def _leaf(self, number: int) -> ConceptInBatch:
         leaf = self.batch.compiled[number]
         assert isinstance(leaf, ConceptInBatch)
         return leaf
+
+
+def not_reached(train: str, redrawn: int, draw: int, status: str, why: str) -> InputError:
+    """Says that a Train node was never active.
+
+    Args:
+        train: Its name.
+        redrawn: In how many draws.
+        draw: The last one.
+        status: Status of the tree at the end of that.
+        why: What the tree says.
+    """
+    return InputError(
+        f"'{train}' was not reached in {redrawn} draws; the last one (seed {draw}) ended with {status}: {why}"
+    )

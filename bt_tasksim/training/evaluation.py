@@ -7,6 +7,7 @@ or on the order of the episodes.
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -39,6 +40,8 @@ SHARE = 16
 """Episodes that a member of a fleet takes at a time; a lost one loses the one that it was at."""
 BATCH = 64
 """Worlds that run at once, unless somebody says otherwise."""
+MANY = 200
+"""Episodes from which a process for each core is sooner done, though it takes some seconds to begin."""
 SHARES = 8
 """Episodes for each world of a batch that a member takes at a time: at a share's end its worlds run empty."""
 
@@ -87,6 +90,16 @@ def usual_batch(options: EngineOptions, processes: int = 1) -> int:
         processes: How many such processes there are on this machine.
     """
     return 1 if why_alone(options) else max(1, min(BATCH, most_worlds() // processes))
+
+
+def usual_workers(options: EngineOptions, episodes: int) -> int:
+    """How many processes run an evaluation where nobody says it: more than one where that pays.
+
+    Args:
+        options: The engines.
+        episodes: How many episodes there are.
+    """
+    return 1 if episodes < MANY or why_alone(options) else os.cpu_count() or 1
 
 
 class EvaluationInterrupted(KeyboardInterrupt):  # as KeyboardInterrupt, which it is

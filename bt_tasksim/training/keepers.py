@@ -1,4 +1,4 @@
-"""What each process of a training keeps: a batch of worlds, or one where there is no form for many.
+"""What each process of a training keeps: a batch of worlds, of one where there is no form for many.
 
 A process that is forked has the tree. An actor of a cluster builds its own, and sees that it is the same.
 """
@@ -16,15 +16,12 @@ from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.policy.policy import Policy
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import WorldSource
-from bt_tasksim.training.env import EpisodeEnv, find_train
 from bt_tasksim.training.episode_batch import EpisodeBatch
+from bt_tasksim.training.learning_leaves import find_train
 from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.subject import code_files, evaluation_subject
 from bt_tasksim.trees.nodes.train import concepts_in
-
-Keeper = EpisodeBatch | EpisodeEnv
-"""What each process keeps."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +33,7 @@ class Keeping:
         options: Engines.
         reward: What is paid.
         policies: Policies of other leaves, by the leaf's name: what was trained before.
-        worlds: How many worlds it has; 0: one, in which episodes run one by one.
+        worlds: How many worlds it has.
     """
 
     train: str
@@ -45,11 +42,9 @@ class Keeping:
     policies: Mapping[str, Policy]
     worlds: int
 
-    def keeper(self, tree: Behaviour, scene: WorldSource) -> Keeper:
+    def keeper(self, tree: Behaviour, scene: WorldSource) -> EpisodeBatch:
         """It, made."""
         about = tree, scene, self.train, self.options, self.reward
-        if self.worlds == 0:
-            return EpisodeEnv(*about, policies=self.policies)
         return EpisodeBatch(*about, policies=self.policies, worlds=self.worlds)
 
     def subject(self, tree: Behaviour, scene: WorldSource, source: NamedTree) -> dict[str, str]:
@@ -90,7 +85,7 @@ class KeeperElsewhere:
                 leaf.use(keeping.policies[leaf.name])
         return cls(keeping, source, keeping.subject(tree, scene, source))
 
-    def __call__(self) -> Keeper:
+    def __call__(self) -> EpisodeBatch:
         """Make it.
 
         Raises:

@@ -37,9 +37,9 @@ from bt_tasksim.training.checkpoint import (
 )
 from bt_tasksim.training.collectors import DrawResult, DrawTask, EnvironmentRollout, RolloutTask
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.env import shared_layout
-from bt_tasksim.training.episode_batch import why_alone_in
-from bt_tasksim.training.keepers import Keeper, KeeperElsewhere, Keeping
+from bt_tasksim.training.episode_batch import EpisodeBatch, why_alone_in
+from bt_tasksim.training.keepers import KeeperElsewhere, Keeping
+from bt_tasksim.training.learning_leaves import shared_layout
 from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.training.on_cluster import actor_memory
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
@@ -130,10 +130,10 @@ class NodeTraining:
         task, reward = self.task, self.config.reward
         members = min(task.workers, self.config.n_envs)
         alone = why_alone_in(task.tree, task.scene, task.options)
-        worlds = 0 if alone else -(-self.config.n_envs // members)
+        worlds = 1 if alone else -(-self.config.n_envs // members)
         keeping = Keeping(self.node.name, task.options, reward, self.trained, worlds)
 
-        def make() -> Keeper:
+        def make() -> EpisodeBatch:
             return keeping.keeper(task.tree, task.scene)
 
         if alone:
@@ -142,7 +142,7 @@ class NodeTraining:
         if task.cluster is not None and task.source is not None:
             elsewhere = KeeperElsewhere.of(keeping, task.source, task.tree, task.scene)
             pictures = task.options.rendering or task.options.perception != "state"
-            memory = actor_memory(max(1, worlds), pictures)
+            memory = actor_memory(worlds, pictures)
             with Cluster(elsewhere, task.cluster, members, memory) as actors:
                 return self._learn(actors, resume, report)
         if members > 1:  # before torch starts threads of its own
@@ -155,7 +155,7 @@ class NodeTraining:
             kept.close()
 
     def _learn(
-        self, pool: Fleet[Keeper], resume: bool, report: Callable[[Progress], None] | None
+        self, pool: Fleet[EpisodeBatch], resume: bool, report: Callable[[Progress], None] | None
     ) -> LearnedPolicy:
         import gymnasium
         import torch
@@ -216,7 +216,7 @@ class NodeTraining:
     # ---- one rollout ------------------------------------------------------------------------------------
 
     def _collect(
-        self, pool: Fleet[Keeper], learner: Learner, decisions: int, warm: bool = False
+        self, pool: Fleet[EpisodeBatch], learner: Learner, decisions: int, warm: bool = False
     ) -> list[EnvironmentRollout]:
         arrays, std = learner.network.arrays(), learner.std
         stage = self.stage if self.task.scene.stages else None
@@ -226,11 +226,11 @@ class NodeTraining:
         ]
         return results(pool, tasks, self._members)
 
-    def _warm_up(self, pool: Fleet[Keeper], learner: Learner) -> None:
+    def _warm_up(self, pool: Fleet[EpisodeBatch], learner: Learner) -> None:
         rollouts = self._collect(pool, learner, WARM_UP, warm=True)
         learner.statistics.update(np.concatenate([rollout.features for rollout in rollouts]))
 
-    def _evaluate(self, pool: Fleet[Keeper], learner: Learner) -> dict[str, Any]:
+    def _evaluate(self, pool: Fleet[EpisodeBatch], learner: Learner) -> dict[str, Any]:
         """Successes on held-apart draws, the same ones each time; keeps the best policy so far."""
         arrays = learner.decisive.arrays()
         tasks = [DrawTask(arrays, draw) for draw in range(self.config.evaluation_draws)]

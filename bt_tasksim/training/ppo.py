@@ -21,7 +21,7 @@ from bt_tasksim.policy.policy import LearnedPolicy, Policy
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.env import find_train, shared_layout
+from bt_tasksim.training.learning_leaves import find_train, shared_layout
 from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.training.node_training import NodeTraining, TrainingTask
 from bt_tasksim.training.on_cluster import check_cluster

@@ -4,31 +4,14 @@ from __future__ import annotations
 
 import abc
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Literal
 
-from bt_tasksim.concept.leaf import ConceptNode
-from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
+from bt_tasksim.training.decision import Decision
 
 End = Literal["", "success", "failure", "violated", "timeout", "cut"]
 """How an episode ended; empty where it goes on. Cut: from outside, or it was not to be judged."""
-
-
-class Decided(Protocol):
-    """A decision of a leaf in one world, such as `bt_tasksim.concept.leaf.Decision`."""
-
-    @property
-    def leaf(self) -> ConceptNode:
-        """The leaf."""
-
-    @property
-    def seen(self) -> Seen:
-        """What was seen ``(1, ...)``."""
-
-    @property
-    def memory(self) -> Any:
-        """What the leaf remembered ``(1, ...)``."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +28,7 @@ class Transition:
         end: How the episode ended with it.
     """
 
-    decision: Decided
+    decision: Decision
     motion: Array
     last_motion: Array | None
     before: float

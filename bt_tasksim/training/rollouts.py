@@ -12,12 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.fleet import Fleet
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
 from bt_tasksim.training.collectors import Collector, DrawTask, RolloutTask
-from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.episode_batch import Draws, EpisodeBatch
 
 AnyTask = RolloutTask | DrawTask
@@ -35,29 +33,6 @@ class TaskShare:
 
     def __str__(self) -> str:
         return f"a share of {len(self.tasks)} environments or draws"
-
-
-def alone(env: EpisodeEnv, task: AnyTask) -> Any:
-    """The result of a task, in an environment of its own."""
-    collector: Collector[Any] = task.collector()
-    stream, stage = env.stream, env.stage
-    try:
-        while (wanted := collector.begin()) is not None:
-            env.stream, env.stage = wanted.stream, wanted.stage
-            options = None if wanted.draw is None else {"draw": wanted.draw}
-            features, info = env.reset(seed=wanted.seed, options=options)
-            collector.began(int(info["redrawn"]))
-            over = False
-            while not over:
-                action = collector.action(features, collector.network(features))
-                features, reward, terminated, truncated, info = env.step(action)
-                ended = terminated or truncated
-                over = collector.paid(features, reward, info if ended else None, truncated) or ended
-    except InputError as error:
-        collector.failed(error)
-    finally:
-        env.stream, env.stage = stream, stage
-    return collector.result()
 
 
 def in_batch(batch: EpisodeBatch, tasks: Sequence[AnyTask], /) -> Iterator[tuple[int, Any]]:
@@ -122,20 +97,14 @@ def in_batch(batch: EpisodeBatch, tasks: Sequence[AnyTask], /) -> Iterator[tuple
             batch.leave(row)
 
 
-def side_by_side(
-    keeper: EpisodeBatch | EpisodeEnv, shares: Sequence[TaskShare], /
-) -> Iterator[tuple[int, list[Any]]]:
-    """Work for a fleet whose members keep a batch of worlds, or an environment: do shares of tasks."""
+def side_by_side(batch: EpisodeBatch, shares: Sequence[TaskShare], /) -> Iterator[tuple[int, list[Any]]]:
+    """Work for a fleet whose members keep a batch of worlds: do shares of tasks."""
     for index, share in enumerate(shares):
-        tasks = share.tasks
-        if isinstance(keeper, EpisodeBatch):
-            done = dict(in_batch(keeper, tasks))
-        else:
-            done = {k: alone(keeper, task) for k, task in enumerate(tasks)}
-        yield index, [done[k] for k in range(len(tasks))]
+        done = dict(in_batch(batch, share.tasks))
+        yield index, [done[k] for k in range(len(share.tasks))]
 
 
-def results(fleet: Fleet[EpisodeBatch | EpisodeEnv], tasks: Sequence[AnyTask], members: int) -> list[Any]:
+def results(fleet: Fleet[EpisodeBatch], tasks: Sequence[AnyTask], members: int) -> list[Any]:
     """The results of tasks, in their order.
 
     Args:

@@ -172,7 +172,7 @@ def _ppo() -> tuple[Any, Any]:
         import stable_baselines3  # noqa: F401
 
         from bt_tasksim.training import ppo
-        from bt_tasksim.training.env import find_train
+        from bt_tasksim.training.learning_leaves import find_train
     except ImportError as error:
         raise MachineError(
             f"training cannot start: {error}; install what it needs: pip install 'bt-tasksim[train]'"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bt_tasksim.core.poses import Array
-from bt_tasksim.training.reward_parts import Decided, End, Transition
+from bt_tasksim.training.decision import Decision
+from bt_tasksim.training.reward_parts import End, Transition
 
 
 class Transitions:
@@ -15,14 +16,14 @@ class Transitions:
     Args:
         first: The episode's first decision.
         gamma: The learner's discount.
-        cost: Its necessary cost; None: the leaf's model is asked.
+        cost: Its necessary cost.
     """
 
-    def __init__(self, first: Decided, gamma: float, cost: float | None = None) -> None:
+    def __init__(self, first: Decision, gamma: float, cost: float) -> None:
         self.decision = first
         """The last decision that was waited for."""
         self._gamma = gamma
-        self._first_cost = _cost(first) if cost is None else cost
+        self._first_cost = cost
         self._potential = 0.0
         self._motion: Array | None = None
         self._last_motion: Array | None = None
@@ -31,15 +32,14 @@ class Transitions:
         """Take note of what was decided: a motion ``(actions,)``."""
         self._motion = motion
 
-    def to(self, found: Decided, cost: float | None = None) -> Transition:
+    def to(self, found: Decision, cost: float) -> Transition:
         """From the decision before to this one.
 
         Args:
             found: This one.
-            cost: Its necessary cost; None: the leaf's model is asked.
+            cost: Its necessary cost.
         """
         before, same_leaf = self.decision, found.leaf is self.decision.leaf
-        cost = _cost(found) if cost is None else cost
         after = self._first_cost - cost
         if not same_leaf:
             self._first_cost, self._potential, after = cost, 0.0, 0.0
@@ -58,10 +58,6 @@ class Transitions:
         """
         return self._made(self.decision, self._potential if kept else 0.0, end)
 
-    def _made(self, decision: Decided, after: float, end: End = "") -> Transition:
+    def _made(self, decision: Decision, after: float, end: End = "") -> Transition:
         assert self._motion is not None, "decided() comes before"
         return Transition(decision, self._motion, self._last_motion, self._potential, after, self._gamma, end)
-
-
-def _cost(decision: Decided) -> float:
-    return float(decision.leaf.model.necessary_cost(decision.seen, decision.memory)[0])

@@ -14,10 +14,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from benchmarks.experiments import ablations, follower, judged, learning, pages, robot, sequences, shapes
 from benchmarks.experiments.__main__ import main
 from benchmarks.experiments.common import EXPERIMENTS, Request, share
-from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept_nodes import Pick
 from bt_tasksim.policy.policy import Action
+from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.trees.nodes.train import follower_of, train_nodes
+from bt_tasksim.trees.scenarios import grasp_then_pick
 
 COUNTS = {
     "draws": 10, "successes": 9, "interval": [0.6, 0.98], "done": 9, "done_right": 9,
@@ -112,16 +113,24 @@ def test_counts_of_draws():
     assert share({"draws": 0, "successes": 0, "interval": [0, 1]}).startswith("0 of 0")
 
 
-def test_the_fixed_time_replaces_the_completion_signal(monkeypatch):
+def test_the_fixed_time_replaces_the_completion_signal():
     leaf = ablations.FixedTimeGrasp("target", hold=0.5)
-    said = []
-    monkeypatch.setattr(
-        ConceptNode, "_act", lambda self, judged, action: said.append(action.terminate.tolist())
-    )
-    for closing, signal in ((-1.0, True), (0.4, True), (0.6, False)):
-        judged_now = SimpleNamespace(memory=SimpleNamespace(closing=np.array([closing])))
-        leaf._act(judged_now, Action(np.zeros((1, 6)), np.array([signal])))
-    assert said == [[False], [False], [True]]
+    memory = SimpleNamespace(closing=np.array([-1.0, 0.4, 0.6]))
+    found = leaf.amended(Action(np.zeros((3, 6)), np.array([True, True, False])), memory)
+    assert found.terminate.tolist() == [False, False, True] and found.motion.shape == (3, 6)
+
+
+def test_the_fixed_time_ends_a_grasp_in_training_too():
+    """Whatever the learner says: neither its first signal ends it, nor does its silence go on for ever."""
+    env = EpisodeEnv(ablations.tree("fixed time", 0.3), grasp_then_pick.scene(), stage=0)
+    env.reset(seed=1)
+    for _ in range(3):
+        assert not any(env.step(np.append(np.zeros(6), 1.0))[2:4]), "it has not closed yet"
+    decisions, info = 3, {}
+    while "status" not in info:
+        info, decisions = env.step(np.zeros(7))[4], decisions + 1
+    env.close()
+    assert info["status"] == "SUCCESS" and 10 < decisions < 100
 
 
 def test_variants_differ_in_one_thing():

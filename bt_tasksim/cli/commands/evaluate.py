@@ -37,7 +37,7 @@ def evaluate(
             parser=arguments.workers,
             metavar="W",
             help="Worker processes, or the most actors of a cluster.",
-            show_default="1; of a cluster what it has room for",
+            show_default="1, from 200 episodes on one for each core; of a cluster what it has room for",
         ),
     ] = None,
     batch: Annotated[
@@ -74,7 +74,9 @@ def evaluate(
     tree.load_nodes()
     chosen = policies(engines.policy)
     options = engines.options()
-    alone_here = cluster is None and workers in (None, 1)
+    if cluster is None and workers is None:
+        workers = evaluation.usual_workers(options, episodes)
+    alone_here = cluster is None and workers == 1
     job = evaluation.Job(
         tree.tree,
         tree.scene,

@@ -1,8 +1,10 @@
 """Simulated worlds, stepped by threads, and the laws of their states over all of them at once.
 
-A simulator lets go of the interpreter's lock while it steps, so threads step several worlds at a time. What
-each world reports of itself is plain and raw; positions of tool and tips, efforts and wrenches are computed
-from that for all worlds together, with operations whose result for one row does not depend on the others.
+MuJoCo lets go of the interpreter's lock while it steps, so threads step several of its worlds at a time.
+SAPIEN 3.0 does not: there a second thread gains nothing, and a second process, with a batch of its own, twice
+as much. What each world reports of itself is plain and raw; positions of tool and tips, efforts and wrenches
+are computed from that for all worlds together, with operations whose result for one row does not depend on
+the others.
 """
 
 from __future__ import annotations

@@ -334,7 +334,7 @@ CODES = {Status.INVALID: INVALID, Status.RUNNING: RUNNING, Status.SUCCESS: SUCCE
 
 def test_what_cannot_be_compiled_is_said():
     with pytest.raises(InputError, match="build="):
-        batch(trees.sequence("root", Unknown()))
+        batch(trees.sequence("root", Unknown()), worlds=2)
     with pytest.raises(InputError, match="another tree"):
         batch(trees.sequence("root", Unknown()), build=Unknown)
     same = trees.sequence("root", Unknown())

@@ -57,7 +57,7 @@ if "ray" in sys.modules:  # an actor
                 os.kill(os.getpid(), signal.SIGKILL)
             return super().step(*arguments)
 
-    bt_tasksim.training.episode_batch.Worlds = Deadly
+    bt_tasksim.training.episode_batch.worlds_for = lambda robot, options, count, threads: Deadly(robot, count)
     HEIGHT = float(os.environ.get("HEIGHT_THERE", HEIGHT))
 
 

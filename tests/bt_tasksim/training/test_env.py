@@ -6,7 +6,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
+from py_trees.composites import Sequence
 from toys import (
     DONE,
     DOWN,
@@ -21,16 +23,20 @@ from toys import (
     Raise,
     Turn,
     Unprogrammed,
+    activations,
     honest,
     play,
 )  # fmt: skip
 
 from bt_tasksim.concept_nodes import Wait
+from bt_tasksim.core.batch_leaf import RUNNING
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
 from bt_tasksim.core.outcomes import PRECONDITION_UNMET
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import LearnedPolicy
-from bt_tasksim.training.env import REDRAWS, EpisodeEnv, find_train
+from bt_tasksim.training.env import EpisodeEnv
+from bt_tasksim.training.episode_batch import REDRAWS
+from bt_tasksim.training.learning_leaves import find_train
 from bt_tasksim.training.reward import PARTS, Reward
 from bt_tasksim.trees import (
     fallback,
@@ -61,8 +67,9 @@ def paid(info):
     return {part: value for part, value in info["reward"].items() if value and part != "shaping"}
 
 
-def running(tree):
-    return [node.name for node in tree.iterate() if node.status == Status.RUNNING]
+def running(env):
+    tree = env.batch.batch
+    return [node.name for node, status in zip(tree.nodes, tree.status[0], strict=True) if status == RUNNING]
 
 
 # ---- when the leaf acts --------------------------------------------------------------------------------
@@ -102,10 +109,10 @@ def test_the_leaf_acts_once_a_period_and_only_when_told(env_of, nest, before):
     leaf = Raise()
     tree = sequence("root", *(make() for make in before), nest(Train(leaf)), Check())
     env = env_of(tree)
-    world = env.runner.pipeline
+    world = env.batch.worlds.pipeline
     features, _ = env.reset(seed=3)
     for _ in range(3):
-        assert leaf.log == ["begin"] and leaf.activations == 1, "it has begun, and did nothing yet"
+        assert leaf.log == ["begin"] and activations(env, leaf) == 1, "it has begun, and did nothing yet"
         steps, expected = len(world.steps), []
         while True:
             action = honest(features)
@@ -118,7 +125,7 @@ def test_the_leaf_acts_once_a_period_and_only_when_told(env_of, nest, before):
         assert leaf.log == ["begin", *expected] and len(expected) >= 5
         assert info["is_success"] and info["follower"] == "SUCCESS", info["why"]
         leaf.log.clear()
-        leaf.activation.activations[:] = 0
+        activations(env, leaf)[:] = 0
         features, _ = env.reset()
     assert env.redrawn == 0
 
@@ -173,7 +180,7 @@ def test_ticks_without_a_decision_go_by(env_of):
     leaf = Late()
     env = env_of(Train(leaf))
     env.reset(seed=0)
-    assert leaf.log == ["begin"] + ["command 0"] * 4 and env.runner.context.now == pytest.approx(0.2)
+    assert leaf.log == ["begin"] + ["command 0"] * 4 and env.batch.context.now == pytest.approx(0.2)
 
 
 # ---- what it is paid -----------------------------------------------------------------------------------
@@ -186,7 +193,7 @@ def test_the_motion_counts_for_nothing_when_it_is_done(env_of):
     env.step(np.array(UP))
     _, reward, terminated, _, info = env.step(np.array([1.0, 1.0]))
     assert terminated and leaf.log == ["begin", "command 1"]
-    assert env.runner.pipeline.now.tool_pose[2] == pytest.approx(HERE + STEP)
+    assert env.batch.worlds.pipeline.now.tool_pose[2] == pytest.approx(HERE + STEP)
     gained = STEP / 0.1
     assert info["reward"]["shaping"] == pytest.approx(-Reward().shaping * gained), "failed: nothing is kept"
     assert reward == pytest.approx(-1.0 - Reward().shaping * gained)
@@ -232,7 +239,7 @@ def test_how_it_ends_and_what_is_said(env_of, tree, decide, parts, why):
     assert paid(info) == parts and info["why"].startswith(why)
     assert info["is_success"] is ("success" in parts)
     assert info["status"] == {"interrupted": "INVALID"}.get(why, "SUCCESS" if "check" in why else "FAILURE")
-    assert not info["discarded"] and info["seconds"] == env.runner.context.now
+    assert not info["discarded"] and info["seconds"] == env.batch.context.now
     assert features.shape == (3,), "an end has an observation too"
     with pytest.raises(RuntimeError, match="call reset"):
         env.step(np.array(STILL))
@@ -248,7 +255,7 @@ def test_the_next_attempt_is_another_episode(env_of):
     leaf = Raise(limit=0.4)
     env = env_of(retry(3, Train(leaf)))
     _, terminated, _, info = play(env, lambda f: UP)
-    assert terminated and paid(info) == {"violated": -1.0} and leaf.activations == 1
+    assert terminated and paid(info) == {"violated": -1.0} and activations(env, leaf) == 1
 
 
 def test_an_attempt_that_could_not_begin_is_passed_over(env_of):
@@ -325,7 +332,7 @@ def shared_env():
 
         import toys
 
-        with mock.patch("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: toys.World()):
+        with mock.patch("bt_tasksim.training.episode_batch.worlds_for", toys.toy_worlds):
             _SHARED.append(EpisodeEnv(simple(), SCENE))
     return _SHARED[0]
 
@@ -359,7 +366,7 @@ def test_a_limit_from_outside_truncates(env_of):
     rewards, terminated, truncated, info = play(env, lambda f: STILL)
     assert truncated and not terminated and info["reason"] == "time_over"
     assert paid(info) == {} and not info["discarded"] and env.discarded == 0
-    assert len(rewards) == 5 and env.runner.context.now == pytest.approx(0.2)
+    assert len(rewards) == 5 and env.batch.context.now == pytest.approx(0.2)
 
 
 def test_a_limit_while_it_is_judged_discards(env_of):
@@ -379,18 +386,18 @@ def test_a_limit_while_it_is_judged_discards(env_of):
 def test_an_error_while_it_is_judged_discards(env_of, error, reason):
     env = env_of(simple(HERE))
     env.reset(seed=0)
-    env.runner.pipeline.error = error
+    env.batch.worlds.pipeline.error = error
     _, _, terminated, truncated, info = env.step(np.array(DONE))
     assert truncated and not terminated and info["discarded"] and env.discarded == 1
     assert paid(info) == {} and not info["is_success"] and info["reason"] == reason
-    env.runner.pipeline.error = None
+    env.batch.worlds.pipeline.error = None
     assert play(env, honest)[3]["is_success"] and env.discarded == 1
 
 
 def test_out_of_reach_of_the_learner_is_its_failure(env_of):
     env = env_of(simple())
     env.reset(seed=0)
-    env.runner.pipeline.error = UnreachableError("100 mm too far", 0.1, 0.0)
+    env.batch.worlds.pipeline.error = UnreachableError("100 mm too far", 0.1, 0.0)
     _, _, terminated, _, info = env.step(np.array(UP))
     assert terminated and paid(info) == {"failure": -1.0} and info["reason"] == "out_of_reach"
 
@@ -407,7 +414,7 @@ def test_a_leaf_that_raises_is_named_and_nothing_runs_on(env_of):
     env.reset(seed=0)
     with pytest.raises(LeafError, match=r"leaf 'bad' raised ZeroDivisionError in test_env.py:\d+: no"):
         env.step(np.array(DONE))
-    assert running(env.tree) == []
+    assert running(env) == []
     with pytest.raises(RuntimeError, match="call reset"):
         env.step(np.array(DONE))
     env.reset(seed=0)
@@ -440,6 +447,65 @@ def test_what_cannot_be_an_episode_is_refused(env_of):
         env_of(sequence("s", Train(Raise(), "a"), Train(Raise(), "b")), train="c")
     with pytest.raises(InputError, match="render_mode should be"):
         env_of(Train(Raise()), render_mode="human")
+
+
+class Ticks(Behaviour):
+    """A user's own behaviour, which no batch knows: runs for two ticks."""
+
+    def __init__(self, end=Status.SUCCESS):
+        super().__init__("ticks")
+        self.end, self.count = end, 0
+
+    def initialise(self):
+        self.count = 0
+
+    def update(self):
+        self.count += 1
+        self.feedback_message = "ticked enough" if self.count > 2 else ""
+        return self.end if self.count > 2 else Status.RUNNING
+
+
+class Own(Sequence):
+    """A user's own composite."""
+
+    def __init__(self, *children):
+        super().__init__("own", memory=True, children=list(children))
+
+
+def test_behaviours_of_ones_own_run_before_between_and_in_what_follows(env_of):
+    follower = Own(Below(), Check(), Ticks(), Check(name="second"))
+    env = env_of(sequence("s", Ticks(), Train(sequence("i", Raise(), Ticks())), Ticks(), follower))
+    for seed in (0, 1):
+        rewards, _, _, info = play(env, honest, seed)
+        assert info["is_success"] and info["why"] == "own succeeded" and len(rewards) == 6
+        # Two ticks each of what is unknown, five of the leaf, two of each check.
+        assert info["seconds"] == pytest.approx(0.05 * (2 + 5 + 2 + 2 + 2 + 2 + 2))
+    info = play(env, lambda features: DONE)[3]
+    assert info["follower"] == "FAILURE" and info["why"].startswith("check 0.45: limit violated")
+
+
+def test_one_of_ones_own_that_fails_says_why(env_of):
+    failing = sequence("s", Train(Raise()), Own(Check(), Ticks(Status.FAILURE)))
+    info = play(env_of(failing), honest)[3]
+    assert paid(info) == {"failure": -1.0} and info["why"] == "ticks: ticked enough"
+
+
+def test_goals_below_a_composite_of_ones_own_are_judged(env_of):
+    for tree in (
+        lambda: sequence("s", Train(Raise()), Own(Check(blind=True))),
+        lambda: Train(sequence("i", Raise(), Own(Check(blind=True)))),
+    ):
+        env = env_of(tree())
+        assert play(env, honest)[3]["is_success"]
+        env.batch.worlds.pipeline.truth = -0.05
+        info = play(env, honest)[3]
+        assert info["reason"] == "goal_missed" and not info["is_success"]
+
+
+@pytest.mark.parametrize("make", [lambda: Own(Train(Raise())), lambda: Train(Own(Raise()))])
+def test_what_learns_below_a_composite_of_ones_own_is_refused(env_of, make):
+    with pytest.raises(InputError, match=r"cannot be trained below 'own': Own has no form that waits"):
+        env_of(make())
 
 
 def test_features_that_do_not_fit_their_layout_are_refused(env_of):
@@ -487,7 +553,7 @@ def test_a_reset_in_the_middle_leaves_nothing_running(env_of, steps):
         env.step(np.array(UP))
     leaf.log.clear()
     env.reset(seed=4)
-    assert running(tree) == [] and leaf.log == ["begin"], "it is in its first tick, and nothing else is"
+    assert running(env) == [] and leaf.log == ["begin"], "it is in its first tick, and nothing else is"
     assert play(env, honest, seed=4) == whole
 
 
@@ -537,7 +603,7 @@ def test_after_it_the_tree_can_be_run(env_of, toy):
     env.reset(seed=0)
     env.step(np.array(UP))
     env.close()
-    assert env.runner.pipeline.closed == 1
+    assert env.batch.worlds.pipeline.closed == 1
     stage = toy(tree)
     assert stage.tick(50) == Status.SUCCESS
 

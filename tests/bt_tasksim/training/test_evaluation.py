@@ -22,6 +22,7 @@ from bt_tasksim.training.evaluation import (
     Job,
     episode,
     evaluate,
+    usual_workers,
 )
 from bt_tasksim.training.evaluation_file import EvaluationFile
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation, wilson
@@ -135,6 +136,12 @@ def test_confidence_interval(successes, n, low, high):
     z, p = 1.959964, successes / n
     middle, half = (p + z * z / 2 / n), z * math.sqrt(p * (1 - p) / n + z * z / 4 / n / n)
     assert wilson(successes, n)[1] == pytest.approx(min(1.0, (middle + half) / (1 + z * z / n)), abs=1e-6)
+
+
+def test_many_episodes_have_a_process_for_each_core(monkeypatch):
+    monkeypatch.setattr("os.cpu_count", lambda: 6)
+    assert [usual_workers(EngineOptions(), n) for n in (1, 199, 200)] == [1, 1, 6]
+    assert usual_workers(EngineOptions(perception="camera"), 10**6) == 1, "pictures take much memory"
 
 
 def test_progress_is_told_of_every_episode():

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from py_trees.behaviours import Failure
-from toys import DONE, SCENE, Below, Check, Move, Raise, Unprogrammed, honest, play
+from toys import DONE, SCENE, Below, Check, Move, Raise, Unprogrammed, activations, honest, play
 
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept_nodes import Wait
@@ -40,18 +40,18 @@ def test_status_and_hidden_state_agree(env_of):
 
 def test_a_follower_that_succeeds_with_an_empty_hand_has_failed(env_of):
     env = env_of(sequence("s", Train(Raise()), Check(blind=True)))
-    env.runner.pipeline.truth = -0.05
+    env.batch.worlds.pipeline.truth = -0.05
     info = end_of(env)
     assert info["status"] == "SUCCESS" and info["follower"] == "SUCCESS" and not info["is_success"]
     assert paid(info) == {"failure": -1.0}
     assert info["reason"] == "goal_missed"
-    env.runner.pipeline.truth = 0.0
+    env.batch.worlds.pipeline.truth = 0.0
     assert end_of(env)["is_success"], "and the next episode begins anew"
 
 
 def test_two_bodies_in_one_place_are_no_success(env_of):
     env = env_of(sequence("s", Train(Raise()), Check()))
-    env.runner.pipeline.depth = 0.003
+    env.batch.worlds.pipeline.depth = 0.003
     info = end_of(env)
     assert not info["is_success"] and info["reason"] == "penetration"
 
@@ -61,7 +61,7 @@ def test_a_stage_may_tolerate_more(env_of):
     scene = dataclasses.replace(SCENE, stages=stages)
     for stage, expected in ((0, True), (1, False), (None, False)):
         env = env_of(sequence("s", Train(Raise()), Check(blind=True)), scene, stage=stage)
-        env.runner.pipeline.truth = -0.05
+        env.batch.worlds.pipeline.truth = -0.05
         assert end_of(env)["is_success"] is expected
 
 
@@ -92,7 +92,7 @@ def test_it_judges_once_it_has_one(env_of):
     env = env_of(sequence("s", Train(Raise()), later), policies={"later": Up()})
     info = end_of(env)
     assert info["is_success"] and info["reason"] == "followed" and info["why"] == "later succeeded"
-    env.runner.pipeline.truth = 0.05
+    env.batch.worlds.pipeline.truth = 0.05
     assert not end_of(env)["is_success"]
 
 
@@ -155,7 +155,7 @@ def test_a_failure_that_is_tried_again_from_the_start_ends_the_episode(env_of, f
     env = env_of(retry(5, sequence("s", Train(leaf), follower())))
     info = end_of(env)
     assert not info["is_success"] and paid(info) == {"failure": -1.0}
-    assert leaf.activations == 1, "the next attempt is not part of it"
+    assert activations(env, leaf) == 1, "the next attempt is not part of it"
 
 
 def test_something_else_that_ends_the_sequence_is_a_failure(env_of):

@@ -141,7 +141,7 @@ import toys
 import bt_tasksim.execution.runner
 import bt_tasksim.training.episode_batch
 bt_tasksim.execution.runner.build_pipeline = lambda robot, options: toys.World()
-bt_tasksim.training.episode_batch.Worlds = toys.Worlds
+bt_tasksim.training.episode_batch.worlds_for = toys.toy_worlds
 from bt_tasksim.scene.scene import CurriculumStage
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.trees.nodes.train import Train

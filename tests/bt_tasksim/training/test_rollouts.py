@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-from toys import SCENE, Check, Even, Raise, Unprogrammed
+from toys import SCENE, Check, Even, Raise, Unprogrammed, alone
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.policy.network import Network
 from bt_tasksim.training.collectors import DrawTask, RolloutTask
 from bt_tasksim.training.env import EpisodeEnv
-from bt_tasksim.training.rollouts import alone, results
+from bt_tasksim.training.episode_batch import EpisodeBatch
+from bt_tasksim.training.rollouts import results
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.nodes.train import Train
 
@@ -19,8 +20,13 @@ UP = Network(
 """Brings the tool up and says so; noise apart."""
 
 
-def make(tree=None):
-    return EpisodeEnv(sequence("s", Even(), Train(Raise()), Check()) if tree is None else tree, SCENE)
+def make(tree=None, kind=EpisodeEnv, **settings):
+    return kind(sequence("s", Even(), Train(Raise()), Check()) if tree is None else tree, SCENE, **settings)
+
+
+def kept(tree=None, worlds=1):
+    """What a worker keeps."""
+    return make(tree, EpisodeBatch, worlds=worlds)
 
 
 def environment(number, decisions=40, network=UP, std=0.3, stage=None):
@@ -31,7 +37,7 @@ def as_bytes(found):
     return {k: v.tobytes() if isinstance(v, np.ndarray) else v for k, v in vars(found).items()}
 
 
-def run(tasks, count, maker=make):
+def run(tasks, count, maker=kept):
     with Workers(maker, count) as pool:
         return dict(enumerate(map(as_bytes, results(pool, tasks, count))))
 
@@ -73,7 +79,7 @@ def test_a_truncated_episode_is_marked(maker):
 def test_environments_are_the_same_whatever_the_workers_and_their_order(maker):
     tasks = [environment(k) for k in range(5)]
     here = {k: as_bytes(alone(maker(), task)) for k, task in enumerate(tasks)}
-    assert run(tasks, 1) == run(tasks, 2) == here
+    assert run(tasks, 1) == run(tasks, 2) == run(tasks, 2, lambda: kept(worlds=3)) == here
     back = run(tasks[::-1], 2)
     assert [back[k] for k in range(5)] == [here[4 - k] for k in range(5)]
     assert len({row["features"] for row in here.values()}) == 5, "and no two are alike"
@@ -87,12 +93,11 @@ def test_held_apart_draws_are_judged_without_noise_and_apart(maker):
     reached = [SCENE.sample(k, "validation").objects[0].pose[0] > 0.5 for k in range(8)]
     assert [won for _, won, _ in found] == reached and 0 < sum(reached) < 8
     assert all("was not reached" in why for _, won, why in found if not won)
-    assert env.stream == "training"
     assert [alone(env, task) for task in tasks[::-1]] == found[::-1]
 
 
 def test_a_worker_that_finds_an_error_says_it(maker):
     with pytest.raises(InputError, match="leaf 'first' has no policy yet"):
-        run([environment(0)], 1, lambda: make(sequence("s", Unprogrammed(name="first"), Train(Raise()))))
+        run([environment(0)], 1, lambda: kept(sequence("s", Unprogrammed(name="first"), Train(Raise()))))
     with pytest.raises(InputError, match="has 0 stages, and none number 3"):
         run([environment(0, stage=3)], 1)

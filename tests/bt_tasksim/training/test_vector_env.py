@@ -7,17 +7,16 @@ import toys
 from py_trees.behaviours import Failure
 from py_trees.common import Status
 from test_rollouts import UP as NETWORK
-from toys import DONE, SCENE, STILL, UP, Below, Check, Even, Move, Raise, Turn, Unprogrammed, honest
+from toys import DONE, SCENE, STILL, UP, Below, Check, Even, Move, Raise, Turn, Unprogrammed, alone, honest
 
 from bt_tasksim.concept_nodes import Wait
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
 from bt_tasksim.core.registry import register
 from bt_tasksim.training.collectors import DrawTask, RolloutTask
-from bt_tasksim.training.env import REDRAWS
-from bt_tasksim.training.episode_batch import EpisodeBatch
+from bt_tasksim.training.episode_batch import REDRAWS, EpisodeBatch
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.reward_parts import RewardPart
-from bt_tasksim.training.rollouts import alone, in_batch
+from bt_tasksim.training.rollouts import in_batch
 from bt_tasksim.training.vector_env import EpisodeVectorEnv
 from bt_tasksim.trees import (
     fallback,
@@ -163,7 +162,7 @@ def test_an_episode_is_pulled_up_by_no_other(batch_of):
 def test_an_error_while_it_is_judged_discards_this_world_alone(env_of, vector_of, error):
     env = env_of(simple(HERE))
     env.reset(seed=1)
-    env.runner.pipeline.error = error
+    env.batch.worlds.pipeline.error = error
     expected = env.step(np.array(DONE))
     vector = vector_of(simple(HERE), num_envs=3)
     vector.reset(seed=0)

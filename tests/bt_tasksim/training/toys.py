@@ -14,11 +14,12 @@ from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Flag, Metres, ObjectName, Ratio
 from bt_tasksim.concept.seen import Known, Seen
-from bt_tasksim.core.errors import BtTasksimError, UnreachableError
+from bt_tasksim.core.errors import BtTasksimError, InputError, UnreachableError
 from bt_tasksim.core.outcomes import Form
 from bt_tasksim.core.units import METRES
 from bt_tasksim.core.world import Command, Hidden
-from bt_tasksim.execution.worlds import Unreached
+from bt_tasksim.execution import worlds
+from bt_tasksim.execution.pipeline_worlds import PipelineWorlds
 
 _spec = importlib.util.spec_from_file_location("toy_world", Path(__file__).parents[2] / "conftest.py")
 _shared = importlib.util.module_from_spec(_spec)
@@ -63,8 +64,8 @@ class World(_shared.ToyWorld):
         self.closed += 1
 
 
-class Worlds:
-    """Several toy worlds in place of `bt_tasksim.execution.worlds.Worlds`.
+class Worlds(worlds.Worlds):
+    """Several toy worlds in place of `bt_tasksim.execution.worlds.BatchWorlds`.
 
     Attributes:
         each: The worlds.
@@ -74,9 +75,8 @@ class Worlds:
     made: list[Any] = []
     """Those that a test has made."""
 
-    def __init__(self, robot: Any, options: Any, count: int, threads: int) -> None:
-        self.each, self.threads = [World() for _ in range(count)], threads
-        self.robot, self.observation, self.physics = robot, None, self
+    def __init__(self, robot: Any, count: int) -> None:
+        self.each, self.count, self.robot = [World() for _ in range(count)], count, robot
         self._seen: list[Any] = [None] * count
         self._failed: dict[int, Any] = {}
         self.sizes: list[int] = []
@@ -97,7 +97,7 @@ class Worlds:
         self.observation = stacked([some if seen is None else seen for seen in self._seen])
         return self.observation
 
-    def step(self, tool: Any, hand: Any, rows: Any) -> list[Unreached]:
+    def step(self, tool: Any, hand: Any, rows: Any) -> list[worlds.Unreached]:
         unreached = []
         self.sizes.append(len(rows))
         for k, row in enumerate(rows.tolist()):
@@ -105,7 +105,7 @@ class Worlds:
             try:
                 self._seen[row] = self.each[row].step(Command(*parts))
             except UnreachableError as error:
-                unreached.append(Unreached(row, error))
+                unreached.append(worlds.Unreached(row, error))
                 self._seen[row] = self.each[row].step(Command())
             except BtTasksimError as error:
                 self._failed[row] = error
@@ -120,10 +120,15 @@ class Worlds:
             world.close()
 
 
+def toy_worlds(robot: Any, options: Any, count: int, threads: int) -> worlds.Worlds:
+    """Toy worlds in place of those of `bt_tasksim.execution.pipeline_worlds.worlds_for`."""
+    return PipelineWorlds(robot, World()) if count == 1 else Worlds(robot, count)
+
+
 def instead_of_engines(put: Any) -> None:
     """Every world is a toy from now on; ``put(path, value)`` puts a value in the place of another."""
     put("bt_tasksim.execution.runner.build_pipeline", lambda robot, options: World())
-    put("bt_tasksim.training.episode_batch.Worlds", Worlds)
+    put("bt_tasksim.training.episode_batch.worlds_for", toy_worlds)
     put("toys.Worlds.made", [])
 
 
@@ -305,3 +310,30 @@ def play(env: Any, decide: Any, seed: int | None = 0) -> tuple[list[float], bool
         if terminated or truncated:
             return rewards, terminated, truncated, info
     raise AssertionError("the episode does not end")
+
+
+def alone(env: Any, task: Any) -> Any:
+    """The result of a task of `bt_tasksim.training.collectors`, in an environment of its own."""
+    collector = task.collector()
+    try:
+        while (wanted := collector.begin()) is not None:
+            env.stream, env.stage = wanted.stream, wanted.stage
+            draw = {} if wanted.draw is None else {"draw": wanted.draw}
+            features, info = env.reset(seed=wanted.seed, options=draw)
+            collector.began(info["redrawn"])
+            over = False
+            while not over:
+                action = collector.action(features, collector.network(features))
+                features, reward, terminated, truncated, info = env.step(action)
+                ended = terminated or truncated
+                over = collector.paid(features, reward, info if ended else None, truncated) or ended
+    except InputError as error:
+        collector.failed(error)
+    return collector.result()
+
+
+def activations(env: Any, leaf: Any) -> Any:
+    """How often a leaf has begun in each world ``(N,)`` of an environment."""
+    tree = env.batch.batch
+    (number,) = (n for n, node in enumerate(tree.nodes) if node is leaf)
+    return tree.compiled[number].activation.activations
