@@ -66,7 +66,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     )
     try:
         for worlds in WORLDS:
-            found = out[str(worlds)] = _measured(worlds, options, peer)
+            found = out[str(worlds)] = measured(worlds, options, peer)
             ratio = f"{found['ratio']:8.2f}" if "ratio" in found else f"{'':>8}"
             print(
                 f"{worlds:8}{found['steps_per_s']:10.0f}{ratio}"
@@ -133,8 +133,8 @@ def split(kept: Episodes, shares: Sequence[int], /) -> Iterator[tuple[int, dict[
         yield index, _split(kept, steps)
 
 
-def _measured(worlds: int, options: argparse.Namespace, peer: Peer) -> dict[str, float]:
-    """Medians over rounds, both sides in turns, and then where the time goes."""
+def measured(worlds: int, options: argparse.Namespace, peer: Peer, apart: bool = True) -> dict[str, float]:
+    """Medians over rounds, both sides in turns; ``apart``: and then where the time goes."""
     processes, threads = options.processes, options.threads
     episodes, steps, rows = max(2 * worlds, 8), 150 * max(worlds, 16), []
     with Workers(partial(Episodes, worlds, threads), processes, "spawn") as fleet:
