@@ -96,9 +96,11 @@ class BatchTree:
         self._at: tuple[int, Array] | None = None
         children, self._ends = _shape(tree)
         self.compiled: dict[int, BatchNode | BatchLeaf] = {}
-        self._compile(children, leaves, Copies(tree, worlds, build, contexts))
+        self._copies = Copies(tree, worlds, build, contexts)
+        self._compile(children, leaves, self._copies)
         self.reasons = BatchReasons(self.nodes, children, self.compiled, self._status_of)
-        self._may_be_invalid = any(isinstance(c, WorldByWorld) for c in self.compiled.values())
+        self.unknown = {n: c for n, c in self.compiled.items() if isinstance(c, WorldByWorld)}
+        """What py_trees ticks, world by world, by number."""
 
     @property
     def status(self) -> Array:
@@ -161,6 +163,15 @@ class BatchTree:
                 self._waiting -= len(there)
         self.stop_node(0, rows)
 
+    def renew(self, rows: Array) -> None:
+        """Give worlds that begin anew new copies of what py_trees ticks: such nodes may remember things.
+
+        A single world that has the tree's own nodes keeps them.
+        """
+        for row in rows.tolist() if self.unknown else ():
+            for number, copy in self._copies.renewed(row).items():
+                self.unknown[number].renew(row, copy)
+
     def watch(self, node: int, callback: Watcher) -> None:
         """Be told whenever a node ends its tick in some worlds.
 
@@ -198,7 +209,7 @@ class BatchTree:
 
     def end_node(self, node: int, rows: Array, status: Array) -> None:
         """A node ends its tick; for nodes, see `trees.nodes.batch.Batch`."""
-        if self._may_be_invalid:
+        if self.unknown:
             invalid = self.arrays.where(status == INVALID)
             if len(invalid):
                 self.stop_node(node, rows[invalid])

@@ -14,12 +14,13 @@ from bt_tasksim.concept.batch_leaves import leaf_in_batch
 from bt_tasksim.concept.context import Context, Refusal, only_world
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.status import STATUSES
-from bt_tasksim.core.batch_leaf import RUNNING
+from bt_tasksim.core.batch_leaf import INVALID, RUNNING
 from bt_tasksim.core.errors import BtTasksimError, InputError, UnreachableError
 from bt_tasksim.core.outcomes import FAILED, OUT_OF_REACH, TIME_OVER, Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Command, Hidden, WorldModel
 from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.execution.leaf_errors import no_status, set_up
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import LONGEST, NOT_JUDGED, SETTLE, Runner
@@ -86,8 +87,7 @@ class BatchRunner:
         self.worlds = BatchWorlds(self.robot, self.options, worlds, threads)
         self.context = Context(self.robot, worlds)
         self.context.hidden = self.worlds.hidden
-        for node in self.tree.iterate():
-            node.setup(context=self.context)
+        set_up(self.tree, context=self.context)
         self._own: dict[int, Context] = {}  # of worlds in which something is ticked by py_trees
         self.batch = BatchTree(
             self.tree,
@@ -184,6 +184,8 @@ class BatchRunner:
         self._show(rows)
         status = self.batch.tick(rows, self.context.times[rows])
         self._collect(rows)
+        if self.batch.unknown and (status == INVALID).any():
+            raise no_status(self.tree)  # alone, that world says which leaf it is
         for k, row in enumerate(rows.tolist()):
             episode = self._episodes[row]
             assert episode is not None
@@ -312,6 +314,7 @@ class BatchRunner:
         models = [world.world_model(tips, self.robot.opening) for world in worlds]
         rows = np.array([row for row, _ in drawn])
         self.batch.reset(rows)
+        self.batch.renew(rows)
         self.context.begin(models, rows)
         now = time.perf_counter()
         for (row, seed), configuration, model in zip(drawn, worlds, models, strict=True):
@@ -342,6 +345,8 @@ class BatchRunner:
         try:
             for seed in seeds:
                 try:
+                    if self.batch.unknown:
+                        runner.plant(self._build())
                     yield seed, runner.run(seed, stream)
                 except InputError:
                     raise

@@ -3,12 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.core.culprit import users_place
-from bt_tasksim.core.errors import BtTasksimError, LeafError
+from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError
+
+
+def set_up(tree: Behaviour, **arguments: Any) -> None:
+    """Set all nodes of a tree up.
+
+    Raises:
+        InputError: A node's ``setup`` raised; says which.
+        BtTasksimError: It found an error of its own kind.
+    """
+    for node in tree.iterate():
+        try:
+            node.setup(**arguments)
+        except BtTasksimError:
+            raise
+        except Exception as error:
+            place = users_place(error)
+            raise InputError(
+                f"'{node.name}' cannot be set up: {type(error).__name__}{f' in {place}' if place else ''}: "
+                f"{error}; a node's setup takes what there is to know by name: def setup(self, **kwargs)"
+            ) from error
 
 
 def ticking(tree: Behaviour) -> Generator[Behaviour, None, None]:
@@ -38,6 +59,14 @@ def end_all(tree: Behaviour, culprit: Behaviour | None = None) -> None:
                 node.terminate(Status.INVALID)
                 node.status = Status.INVALID
                 node.iterator = node.tick()
+
+
+def no_status(node: Behaviour) -> LeafError:
+    """The error that a tree has no status after its tick, as py_trees gives none to what returned none."""
+    return LeafError(
+        f"leaf '{node.name}' ({type(node).__name__}) has no status after its tick: update returns RUNNING, "
+        "SUCCESS or FAILURE of py_trees.common.Status"
+    )
 
 
 def leaf_error(error: Exception, name: str) -> LeafError:

@@ -31,7 +31,7 @@ from bt_tasksim.core.outcomes import (
 from bt_tasksim.core.units import SECONDS
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
-from bt_tasksim.execution.leaf_errors import end_all, ticking
+from bt_tasksim.execution.leaf_errors import end_all, no_status, set_up, ticking
 from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
 from bt_tasksim.execution.result import Result
 from bt_tasksim.hardware.safety.stop import SafetyStop
@@ -82,9 +82,6 @@ class Runner:
         pipeline: EnginePipeline | None = None,
         longest: float = LONGEST,
     ) -> None:
-        from bt_tasksim.trees.check import check_tree
-
-        check_tree(tree)
         self.options = options or EngineOptions()
         if scene is None:
             scene = self.options.own_world()
@@ -92,11 +89,22 @@ class Runner:
             raise InputError(f"'{self.options.engines}' brings no world of its own: name a scene")
         self.robot = load_robot(scene.robot)
         self.pipeline = pipeline or build_pipeline(self.robot, self.options)
-        self.tree, self.scene, self.longest = tree, self.pipeline.worlds(scene), longest
+        self.scene, self.longest = self.pipeline.worlds(scene), longest
         self.context = Context(self.robot)
         self.configuration: ActorConfiguration | None = None
-        for node in tree.iterate():
-            node.setup(context=self.context)
+        self.plant(tree)
+
+    def plant(self, tree: Behaviour) -> None:
+        """Run another tree from the next episode on, such as a new one, whose nodes remember nothing.
+
+        Raises:
+            InputError: The tree does not fit.
+        """
+        from bt_tasksim.trees.check import check_tree
+
+        check_tree(tree)
+        self.tree = tree
+        set_up(tree, context=self.context)
 
     def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:
         """Draw a world, reset the engines and the tree."""
@@ -266,11 +274,14 @@ class Runner:
         """Tick the tree once; returns the command that its leaves have written.
 
         Raises:
-            LeafError: See `ticking`; or a leaf commands what is not finite, and every node has ended.
+            LeafError: See `ticking` and `no_status`; or a leaf commands what is not finite. Every node has
+                ended.
             BtTasksimError: See `ticking`.
         """
-        for _ in ticking(self.tree):
-            pass
+        without = [node for node in ticking(self.tree) if node.status == Status.INVALID]
+        if self.tree.status == Status.INVALID:
+            end_all(self.tree)
+            raise no_status(without[0])
         try:
             return self.context.command
         except LeafError:

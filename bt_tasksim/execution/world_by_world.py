@@ -16,7 +16,7 @@ from bt_tasksim.core.batch_leaf import FAILURE, INVALID, RUNNING, SUCCESS, Batch
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
-from bt_tasksim.execution.leaf_errors import ticking
+from bt_tasksim.execution.leaf_errors import set_up, ticking
 from bt_tasksim.trees.nodes.batch import Arrays
 from bt_tasksim.trees.walk import nodes_of
 
@@ -66,6 +66,10 @@ class WorldByWorld(BatchLeaf):
         """See `BatchLeaf.outcome`: what the node says that was decided last."""
         found = speaker(self.copies[row])
         return None if found is None else outcome_of(found)
+
+    def renew(self, row: int, copy: Behaviour) -> None:
+        """Another copy for a world that begins anew."""
+        self.copies[row], self._nodes[row] = copy, nodes_of(copy)
 
     def node(self, row: int, position: int) -> Behaviour:
         """A node of a world's copy, by its position in the order of `trees.walk`, the behaviour's being 0."""
@@ -137,6 +141,7 @@ class Copies:
         self._nodes: list[list[Behaviour]] = []
         self._known: dict[int, Context] = {}
         self._said: set[type[Behaviour]] = set()
+        self._used: list[int] = []
 
     def of(self, number: int, node: Behaviour) -> list[Behaviour]:
         """A node of each copy, set up with all below it; says once for each class that it is not known.
@@ -163,10 +168,20 @@ class Copies:
             )
         if not self._nodes:
             self._nodes = [self._copy(self._build) for _ in range(self._worlds)]
+        self._used.append(number)
         found = [nodes[number] for nodes in self._nodes]
         for world, copy in enumerate(found):
             self._set_up(copy, world)
         return found
+
+    def renewed(self, world: int) -> dict[int, Behaviour]:
+        """A new copy of one world, whose nodes remember nothing: those that were asked for, by number."""
+        if self._build is None or not self._nodes:
+            return {}
+        nodes = self._nodes[world] = self._copy(self._build)
+        for number in self._used:
+            self._set_up(nodes[number], world)
+        return {number: nodes[number] for number in self._used}
 
     def _copy(self, build: Callable[[], Behaviour]) -> list[Behaviour]:
         copy = build()
@@ -185,5 +200,4 @@ class Copies:
             if world not in self._known:
                 self._known[world] = self._contexts(world)
             arguments["context"] = self._known[world]
-        for node in copy.iterate():
-            node.setup(**arguments)
+        set_up(copy, **arguments)

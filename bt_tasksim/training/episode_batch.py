@@ -20,6 +20,7 @@ from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, Unreac
 from bt_tasksim.core.outcomes import INTERRUPTED, OUT_OF_REACH, TIME_OVER, Outcome, outcome_of_error
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.execution.leaf_errors import set_up
 from bt_tasksim.execution.pipeline_worlds import worlds_for
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import LONGEST
@@ -143,8 +144,7 @@ class EpisodeBatch:
         self.context = Context(self.robot, worlds)
         for leaf in concepts_in(tree):
             leaf.under_training = leaf in self.learners
-        for node in tree.iterate():
-            node.setup(context=self.context)
+        set_up(tree, context=self.context)
         for leaf in concepts_in(tree):
             if policies and leaf.name in policies and leaf not in self.learners:
                 leaf.use(policies[leaf.name])

@@ -17,6 +17,7 @@ from typing import Self
 
 from py_trees.common import Status
 
+from bt_tasksim.concept.batch_leaves import leaf_in_batch
 from bt_tasksim.concept.plugins import load_all
 from bt_tasksim.core.cluster import Cluster
 from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
@@ -26,6 +27,7 @@ from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import outcome_of_error
 from bt_tasksim.core.plugins import loaded
 from bt_tasksim.core.workers import Workers
+from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.execution.result import Result
@@ -281,6 +283,9 @@ class Player:
         self._job, self._build = job, source.build
         self.runner = Runner(source.build(), source.scene, job.options)
         self._batch: BatchRunner | None = None
+        context = self.runner.context
+        tree = BatchTree(self.runner.tree, 1, lambda leaf: leaf_in_batch(leaf, context))
+        self._remembers = bool(tree.unknown)  # such a node may: each episode has a new one
 
     def __enter__(self) -> Self:
         return self
@@ -309,6 +314,8 @@ class Player:
         batch = usual_batch(self._job.options) if self._job.batch is None else self._job.batch
         if batch == 1 or len(seeds) == 1:
             for index, seed in enumerate(seeds):
+                if self._remembers:
+                    self.runner.plant(self._build())
                 yield index, episode(self.runner, seed, stream)
             return
         if self._batch is None:

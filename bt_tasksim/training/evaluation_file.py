@@ -35,6 +35,20 @@ def journal_of(path: str | Path) -> Path:
     return path.with_name(f"{path.name}.episodes")
 
 
+def check_ended(path: str | Path) -> None:
+    """Check that no evaluation that was killed waits to be gone on from: beginning anew would lose it.
+
+    Raises:
+        InputError: One does.
+    """
+    journal = journal_of(path)
+    if journal.is_file() and journal.stat().st_size > 0:
+        raise InputError(
+            f"'{path}' holds an evaluation that did not end: go on with --resume, or remove '{journal}' and "
+            "evaluate anew"
+        )
+
+
 class EvaluationFile:
     """Keeps an evaluation in a file while it is made: give it to `evaluate` as ``keep``.
 

@@ -64,7 +64,7 @@ def evaluate(
     from bt_tasksim.core.files import alone, check_targets
     from bt_tasksim.core.identity import identity
     from bt_tasksim.training import evaluation
-    from bt_tasksim.training.evaluation_file import EvaluationFile, read_kept
+    from bt_tasksim.training.evaluation_file import EvaluationFile, check_ended, read_kept
 
     if resume and json_ is None:
         raise InputError("evaluate: --resume goes on from the file of --json: name it")
@@ -94,6 +94,8 @@ def evaluate(
     only = contextlib.nullcontext() if json_ is None else alone(json_)
     try:
         with only, progress("episodes", episodes) as advance:
+            if json_ is not None and not resume:
+                check_ended(json_)
             kept = read_kept(json_, identity()) if resume and json_ is not None else None
             found = evaluation.evaluate(
                 job,

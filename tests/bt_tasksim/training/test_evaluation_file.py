@@ -215,7 +215,7 @@ def test_only_the_same_evaluation_goes_on(tmp_path, policy):
         evaluate(JOB, range(1, 9), kept=kept)
 
 
-def test_a_killed_command_goes_on(tmp_path, whole):
+def test_a_killed_command_goes_on(tmp_path, whole, capsys):
     words = ["evaluate", "pick_and_throw", "--noise", "none", "--episodes", "6", "--json", "e.json"]
     command = [sys.executable, "-m", "bt_tasksim.cli", *words, "--batch", "1"]  # one after the other
     first = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL)
@@ -227,6 +227,9 @@ def test_a_killed_command_goes_on(tmp_path, whole):
     first.wait()
     kept = read_kept(tmp_path / "e.json", identity())
     assert 2 <= len(kept.outcomes) < 6
+    before = journal.read_bytes()
+    assert main([*words[:-1], str(tmp_path / "e.json")]) == 2, "anew would lose them"
+    assert journal.read_bytes() == before and "go on with --resume" in capsys.readouterr().err
     assert main([*words[:-1], str(tmp_path / "e.json"), "--resume"]) == 0
     content = json.loads((tmp_path / "e.json").read_text())
     ended = [EpisodeOutcome.from_data(data) for data in content["outcomes"]]
