@@ -147,9 +147,9 @@ def measured(worlds: int, options: argparse.Namespace, peer: Peer, apart: bool =
                 best = max(rate(PEER_STEPS) for rate in _ways(peer, max(threads, processes)))
                 rows[-1] |= {"peer_steps_per_s": best, "ratio": rows[-1]["steps_per_s"] / best}
         found = {name: statistics.median(row[name] for row in rows) for name in rows[0]}
-        list(
-            fleet.spread(go_on, [2 * steps] * processes)
-        )  # the worlds' episodes begin at unlike times by now
+        if not apart:
+            return found
+        list(fleet.spread(go_on, [2 * steps] * processes))  # episodes begin at unlike times by now
         rates = [_rate(fleet.spread(go_on, [steps] * processes)) for _ in range(1 if options.quick else 3)]
         found["mixed_per_s"] = statistics.median(rates)
         if threads > 1:  # PhysX's steps overlap: only the whole is told
