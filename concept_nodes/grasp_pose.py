@@ -58,12 +58,14 @@ def _above(seen: Seen, local: Array, margin: float) -> Array:
 
 
 def nearest_place(seen: Seen, fits: Array, gap: Array) -> FoundPlace:
-    """Of the places that fit, booleans ``(N, n_places)``, the first with the smallest gap."""
+    """Of the places that fit, booleans ``(N, n_places)``, the first of its world with the smallest gap."""
     xp = array_namespace(gap)
     if not gap.shape[1]:
         return FoundPlace(xp.zeros(gap.shape[:1], dtype=xp.bool, device=gap.device), _nowhere(gap))
     cost = xp.where(fits, gap, xp.full_like(gap, _WORST))
-    best = _first_best(cost, 1e-6)
+    rank = xp.astype(seen.world.place_facts.rank, cost.dtype)
+    good = cost <= xp.min(cost, axis=1, keepdims=True) + 1e-6
+    best = xp.argmin(xp.where(good & fits, rank, xp.full_like(cost, _WORST)), axis=1)
     return FoundPlace(xp.any(fits, axis=-1), seen.world.place_at(best))
 
 
@@ -74,7 +76,7 @@ def _nowhere(like: Array) -> PlaceFacts:
     up = none[:, None] + constant([0.0, 0.0, 1.0], like)
     pose = none[:, None] + constant([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], like)
     flags = xp.zeros((n,), dtype=xp.bool, device=like.device)
-    return PlaceFacts(flags, pose, up[:, :2], up[:, :2], none, up, up, none, flags)
+    return PlaceFacts(flags, pose, up[:, :2], up[:, :2], none, up, up, none, flags, none)
 
 
 def grasp_pose(

@@ -72,9 +72,11 @@ class Context:
         self.worlds = worlds
         self.rows: Array = np.arange(worlds)
         self._facts = FactsTable(worlds)
+        self._looked: Observation | None = None
         self._observation: Observation | None = None
-        self.hidden: Callable[[], Hidden | None] = lambda: None
-        """Asks for the hidden state ``(N, ...)``; None where nobody knows it."""
+        self.ask_hidden: Callable[[Array | None], Hidden | None] = lambda rows: None
+        """Asks for the hidden state ``(k, ...)`` of worlds ``rows (k,)``, or of all, the objects of each in
+        its own order; None where nobody knows it."""
         self.times: Array = np.zeros(worlds)
         """Seconds ``(N,)`` since each episode began."""
         self.refused: dict[int, Refusal] = {}
@@ -101,14 +103,34 @@ class Context:
 
     @property
     def observation(self) -> Observation:
-        """The observation of this tick ``(N, ...)``.
+        """The observation of this tick ``(N, ...)``, whose objects have the columns of `world`.
 
         Raises:
             RuntimeError: The tree is ticked outside an episode.
         """
         if self._observation is None:
-            raise RuntimeError(NO_EPISODE)
+            if self._looked is None:
+                raise RuntimeError(NO_EPISODE)
+            self._observation = self._facts.arranged(self._looked)
         return self._observation
+
+    def hidden(self, rows: Array | None = None) -> Hidden | None:
+        """The hidden state ``(k, ...)``, in the columns of `world`; None where nobody knows it.
+
+        Args:
+            rows: Of which worlds ``(k,)``; by default of all.
+        """
+        found = self.ask_hidden(rows)
+        return None if found is None else self.in_columns(found, rows)
+
+    def in_columns(self, bundle: _T, rows: Array | None = None) -> _T:
+        """An observation or a hidden state whose objects have the columns of `world`, see `Order.arranged`.
+
+        Args:
+            bundle: Of worlds ``(k, ...)``, the objects of each in its own order.
+            rows: Which worlds ``(k,)``; by default all.
+        """
+        return self._facts.arranged(bundle, rows)
 
     def begin(self, models: Sequence[WorldModel], rows: Array | None = None) -> None:
         """Begin episodes; `advance` comes next.
@@ -119,6 +141,7 @@ class Context:
         """
         rows = self.rows if rows is None else rows
         self._facts.replace(rows, models)
+        self._observation = None
         for held in self._held.values():
             held[rows] = False
         for row in rows.tolist():
@@ -128,11 +151,11 @@ class Context:
         """Go on to the next tick: a new observation, and an empty command.
 
         Args:
-            observation: Of all worlds ``(N, ...)``.
+            observation: Of all worlds ``(N, ...)``, the objects of each in the order of its `WorldModel`.
             rows: The worlds ``(k,)`` that have gone on; by default all. The others are as they were, in the
                 middle of a tick.
         """
-        self._observation = observation
+        self._looked, self._observation = observation, None
         self.times = observation.time
         rows = self.rows if rows is None else rows
         for part in self._parts.values():

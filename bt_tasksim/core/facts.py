@@ -14,11 +14,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.columns import Order, filled, with_rows
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.poses import Array, array_namespace
-from bt_tasksim.core.world import ObjectModel, PlaceModel, WorldModel
+from bt_tasksim.core.world import Hidden, ObjectModel, Observation, PlaceModel, WorldModel
 
 _T = TypeVar("_T", bound="FactArrays")
+_B = TypeVar("_B", Observation, Hidden)
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ class PlaceFacts(FactArrays):
         exit: Unit vectors ``(..., 3)``.
         clearance: ``(...)`` metres.
         container: Boolean ``(...)``: it is one, such as a bin, and ``height`` is that of its walls.
+        rank: ``(...)`` its number among the places of its own world, whichever column it has.
     """
 
     present: Array
@@ -97,6 +100,7 @@ class PlaceFacts(FactArrays):
     exit: Array
     clearance: Array
     container: Array
+    rank: Array
 
     @property
     def rim(self) -> Array:
@@ -125,9 +129,9 @@ class WorldFacts:
     """What is known beforehand of ``N`` worlds.
 
     Attributes:
-        columns: Column of each object's name in all arrays of objects; `Observation` and `Hidden` have the
-            same ones.
-        places: Column of each place's name.
+        columns: Column of each object's name in all arrays of objects, those of `Observation` and `Hidden`
+            too, as concepts see them. When a world begins anew, names may come to have other columns.
+        place_columns: Column of each place's name, likewise.
         tips: Names of the fingertips.
         opening: Widest distance between opposing fingertips, metres.
         control_period: Seconds from one tick to the next, the same in all worlds.
@@ -180,7 +184,7 @@ class WorldFacts:
             object_facts=_object_facts(
                 [[w.objects[w.index[n]] if n in w.index else None for n in names] for w in worlds]
             ),
-            place_facts=_place_facts([[w.places.get(name) for name in places] for w in worlds]),
+            place_facts=_place_facts(worlds, places),
             obstacle_facts=_obstacle_facts(worlds),
         )
 
@@ -214,7 +218,7 @@ class WorldFacts:
             mine, others = getattr(self, kind), getattr(other, kind)
             return type(mine)(
                 **{
-                    f.name: _with_rows(
+                    f.name: with_rows(
                         getattr(mine, f.name), rows, getattr(others, f.name), _FILLING.get(f.name, 0)
                     )
                     for f in fields(mine)
@@ -308,9 +312,11 @@ def _object_facts(rows: Sequence[Sequence[ObjectModel | None]]) -> ObjectFacts:
     )
 
 
-def _place_facts(rows: Sequence[Sequence[PlaceModel | None]]) -> PlaceFacts:
-    shape = (len(rows), len(rows[0]))
-    places = [place for row in rows for place in row]
+def _place_facts(worlds: Sequence[WorldModel], names: Sequence[str]) -> PlaceFacts:
+    shape = (len(worlds), len(names))
+    places = [world.places.get(name) for world in worlds for name in names]
+    ranked = [{name: k for k, name in enumerate(world.places)} for world in worlds]
+    ranks = [own.get(name, 0) for own in ranked for name in names]
 
     def each(value: Callable[[PlaceModel], Any], nothing: Any) -> Array:
         found = [nothing if place is None else value(place) for place in places]
@@ -329,6 +335,7 @@ def _place_facts(rows: Sequence[Sequence[PlaceModel | None]]) -> PlaceFacts:
         exit=each(lambda place: place.exit, up),
         clearance=each(lambda place: place.clearance, 0.0),
         container=each(lambda place: place.kind == "bin", False),
+        rank=np.array(ranks, float).reshape(shape),
     )
 
 
@@ -394,6 +401,7 @@ class FactsTable:
     def __init__(self, worlds: int) -> None:
         self._models: list[WorldModel | None] = [None] * worlds
         self._facts: WorldFacts | None = None
+        self._order: Order | None = None
         self._stale: set[int] = set()
         self._taken: dict[bytes, WorldFacts] = {}
 
@@ -419,13 +427,26 @@ class FactsTable:
             rows, known = sorted(self._stale), self._facts
             begun = [model for model in self._models if model is not None]
             if known is None or _names(begun) != (set(known.columns), set(known.place_columns)):
-                self._facts = WorldFacts.of([begun[0] if model is None else model for model in self._models])
+                worlds = [begun[0] if model is None else model for model in self._models]
+                self._facts = WorldFacts.of(worlds)
+                self._order = Order.of(worlds, list(self._facts.columns))
             else:
                 fresh = [model for row in rows if (model := self._models[row]) is not None]
                 anew = WorldFacts.of(fresh, list(known.columns), list(known.place_columns))
                 self._facts = known.replaced(np.array(rows), anew)
+                assert self._order is not None, "it is made with the facts"
+                self._order = self._order.replaced(np.array(rows), Order.of(fresh, list(known.columns)))
             self._stale.clear()
         return self._facts
+
+    def arranged(self, bundle: _B, rows: Array | None = None) -> _B:
+        """An observation or a hidden state ``(k, ...)`` with the columns of the facts, see `Order.arranged`.
+
+        Args:
+            bundle: Of worlds whose objects stand in their own orders.
+            rows: Which ``(k,)``; by default all.
+        """
+        return bundle if self.facts is None or self._order is None else self._order.arranged(bundle, rows)
 
     def taken(self, rows: Array) -> WorldFacts:
         """The facts of some worlds ``rows (k,)``."""
@@ -480,23 +501,8 @@ def _concatenated(arrays: Sequence[Array], filling: Any) -> Array:
     shapes = {array.shape[1:] for array in arrays}
     if len(shapes) > 1:
         most = tuple(np.max(list(shapes), axis=0).tolist())
-        arrays = [_filled(array, most, filling) for array in arrays]
+        arrays = [filled(array, most, filling) for array in arrays]
     return np.concatenate(arrays)
-
-
-def _with_rows(array: Array, rows: Array, values: Array, filling: Any) -> Array:
-    """An array ``(N, ...)`` with other rows ``(k, ...)``; what is shorter is filled up."""
-    most = tuple(max(n, m) for n, m in zip(array.shape[1:], values.shape[1:], strict=True))
-    out = array.copy() if most == array.shape[1:] else _filled(array, most, filling)
-    out[rows] = values if most == values.shape[1:] else _filled(values, most, filling)
-    return out
-
-
-def _filled(array: Array, most: tuple[int, ...], filling: Any) -> Array:
-    """An array ``(n, ...)`` as ``(n, *most)``."""
-    out = np.full((array.shape[0], *most), filling, array.dtype)
-    out[(slice(None), *(slice(0, n) for n in array.shape[1:]))] = array
-    return out
 
 
 def _check_alike(first: WorldModel | WorldFacts, other: WorldModel | WorldFacts) -> None:

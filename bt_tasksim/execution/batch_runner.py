@@ -86,7 +86,7 @@ class BatchRunner:
         self.tree = build()
         self.worlds = BatchWorlds(self.robot, self.options, worlds, threads)
         self.context = Context(self.robot, worlds)
-        self.context.hidden = self.worlds.hidden
+        self.context.ask_hidden = self.worlds.hidden
         set_up(self.tree, context=self.context)
         self._own: dict[int, Context] = {}  # of worlds in which something is ticked by py_trees
         self.batch = BatchTree(
@@ -204,12 +204,12 @@ class BatchRunner:
     def _show(self, rows: Array) -> None:
         """Let what py_trees ticks see its worlds."""
         for row in rows.tolist() if self._own else ():
-            own, episode = self._own[row], self._episodes[row]
-            assert episode is not None
+            own, episode, seen = self._own[row], self._episodes[row], self.worlds.observation
+            assert episode is not None and seen is not None
             if not episode.shown:
                 own.begin([episode.world])
                 episode.shown = True
-            own.advance(only_world(self.context.observation, row))
+            own.advance(only_world(seen, row))
             if row in self.context.refused:
                 own.refused[0] = self.context.refused[row]
 

@@ -28,6 +28,7 @@ from bt_tasksim.core.outcomes import (
     outcome_of_error,
     register_reason,
 )
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.units import SECONDS
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
@@ -116,7 +117,7 @@ class Runner:
         self.configuration, self._began = configuration, time.perf_counter()
         world = configuration.world_model([tip.name for tip in self.robot.tips], self.robot.opening)
         self.tree.stop(Status.INVALID)
-        self.context.hidden = self._hidden
+        self.context.ask_hidden = self._hidden
         self.context.begin([world])
         self._observed(self.pipeline.reset(configuration, world))
         return world
@@ -126,7 +127,7 @@ class Runner:
         self.observation = observation
         self.context.advance(one_world(observation))
 
-    def _hidden(self) -> Hidden | None:
+    def _hidden(self, rows: Array | None = None) -> Hidden | None:
         """What only a simulator knows, ``(1, ...)``."""
         hidden = self.pipeline.hidden()
         return None if hidden is None else one_world(hidden)

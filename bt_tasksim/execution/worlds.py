@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from bt_tasksim.core.available_memory import available_memory
+from bt_tasksim.core.columns import with_rows
 from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Command, Hidden, Observation
@@ -79,7 +80,8 @@ class Worlds(ABC):
 
     Attributes:
         count: How many, N.
-        observation: What was last seen of all of them ``(N, ...)``; None before the first look.
+        observation: What was last seen of all of them ``(N, ...)``, the objects of each in its own order;
+            None before the first look.
     """
 
     count: int
@@ -107,7 +109,11 @@ class Worlds(ABC):
 
     @abstractmethod
     def observe(self, rows: Array) -> Observation:
-        """What is seen now ``(N, ...)``: of worlds ``rows (k,)`` anew, of the others as it was."""
+        """What is seen now ``(N, ...)``: of worlds ``rows (k,)`` anew, of the others as it was.
+
+        The objects of each world are in its own order, with NaN behind them where others have more. Of worlds
+        that nobody has looked at so far, numbers are NaN.
+        """
 
     @abstractmethod
     def step(self, tool: Array | None, hand: Array | None, rows: Array) -> list[Unreached]:
@@ -124,7 +130,10 @@ class Worlds(ABC):
 
     @abstractmethod
     def hidden(self, rows: Array | None = None) -> Hidden | None:
-        """What only a simulator knows of worlds ``rows (k,)``, by default of all; None: nobody knows it."""
+        """What only a simulator knows of worlds ``rows (k,)``, by default of all; None: nobody knows it.
+
+        The objects of each world are in its own order.
+        """
 
     def picture(self, camera: str) -> Array:
         """A picture ``(height, width, 3)`` of the first world, uint8.
@@ -194,9 +203,8 @@ class BatchWorlds(Worlds):
     def observe(self, rows: Array) -> Observation:
         """See `Worlds.observe`."""
         seen = self._perception.observe(self.physics.state(rows), rows if len(rows) < self.count else None)
-        before = self.observation
-        if before is not None and len(rows) < self.count:
-            seen = _merged(before, rows, seen)
+        if len(rows) < self.count:
+            seen = _merged(self.observation, rows, seen, self.count)
         self.observation = seen
         return seen
 
@@ -244,16 +252,14 @@ def _hands(last: Array, hand: Array) -> Array:
     return out
 
 
-def _merged(before: Observation, rows: Array, seen: Observation) -> Observation:
-    """Observations of all worlds, with some of them seen anew."""
+def _merged(before: Observation | None, rows: Array, seen: Observation, worlds: int) -> Observation:
+    """Observations of all worlds, with some of them seen anew; NaN or False where nothing was seen so far."""
     out = {}
     for name in FIELDS:
-        old, new = getattr(before, name), getattr(seen, name)
-        if old.shape[1:] != new.shape[1:]:
-            raise InputError("the worlds of a batch should hold equally many objects")
-        merged = old.copy()
-        merged[rows] = new
-        out[name] = merged
+        new = getattr(seen, name)
+        nothing = False if new.dtype == bool else np.nan
+        old = np.full((worlds, *new.shape[1:]), nothing) if before is None else getattr(before, name)
+        out[name] = with_rows(old, rows, new, nothing)
     return Observation(**out)
 
 

@@ -154,8 +154,8 @@ class EpisodeBatch:
         self._check_known()
         self.worlds = worlds_for(self.robot, options, worlds, threads)
         self.scene = self.worlds.source(scene)
-        self.context.hidden = self.worlds.hidden
-        self._judgement = Judgement(self.train, self.batch, self.context, self.worlds.hidden)
+        self.context.ask_hidden = self.worlds.hidden
+        self._judgement = Judgement(self.train, self.batch, self.context)
         for number in self._judgement.nodes:
             self.batch.watch(number, self._watcher(number))
         compiled = self.batch.compiled[self._judgement.train]
@@ -518,7 +518,7 @@ class EpisodeBatch:
         active = rows[(self.batch.status[rows] != INVALID).any(axis=1) | (self.batch.waits_at[rows] >= 0)]
         self.batch.reset(active)
         if self.worlds.observation is not None:
-            self.context.advance(self.context.observation, rows)  # what they have commanded is void
+            self.context.advance(self.worlds.observation, rows)  # what they have commanded is void
 
     def _check_known(self) -> None:
         """Refuse what is to learn where py_trees ticks it, which waits for nobody."""

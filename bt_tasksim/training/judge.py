@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,8 +59,7 @@ class Judgement:
     Args:
         train: The Train node.
         tree: The tree.
-        context: The tree's.
-        hidden: The hidden state of worlds ``(k,)``; None where nobody knows it.
+        context: The tree's; it knows the hidden state, or nobody does.
 
     Attributes:
         train: The Train node, by number.
@@ -70,10 +68,8 @@ class Judgement:
         tolerance: ``(N,)`` sufficient cost below which a goal counts as reached.
     """
 
-    def __init__(
-        self, train: Train, tree: BatchTree, context: Context, hidden: Callable[[Array], Hidden | None]
-    ) -> None:
-        self._tree, self._context, self._hidden = tree, context, hidden
+    def __init__(self, train: Train, tree: BatchTree, context: Context) -> None:
+        self._tree, self._context = tree, context
         numbers = {id(node): number for number, node in enumerate(tree.nodes)}
         found = follower_of(train)
         self.train = numbers[id(train)]
@@ -111,7 +107,7 @@ class Judgement:
         fresh = known & (judged.began[rows] != now)
         if fresh.any():
             begins = rows[fresh]
-            hidden = self._hidden(begins)
+            hidden = self._context.ask_hidden(begins)
             judged.began[begins] = now[fresh]
             for k, row in enumerate(begins.tolist()):
                 judged.hidden[row] = None if hidden is None else taken(hidden, np.array([k]))
@@ -144,7 +140,7 @@ class Judgement:
         if self._tree.status[row, node] == FAILURE:
             outcome = self._failed(node, row) or FOLLOWER_FAILED(node=name)
             return SignalOutcome(False, status, outcome, discarded=outcome.is_a(OUT_OF_REACH))
-        hidden, cost = self._hidden(np.array([row])), float(self._cost[row])
+        hidden, cost = self._context.ask_hidden(np.array([row])), float(self._cost[row])
         if cost >= self.tolerance[row]:
             missed = self._missed.get(row, GOAL_MISSED(leaf="", cost=0.0))
             return SignalOutcome(False, status, missed, cost=cost)
@@ -155,7 +151,7 @@ class Judgement:
 
     def _charge(self, node: int, judged: _Judged, rows: Array) -> None:
         """Take in the sufficient costs of a leaf that has succeeded in worlds ``(k,)``."""
-        hidden = self._hidden(rows)
+        hidden = self._context.ask_hidden(rows)
         if hidden is None:
             return
         model, memory = judged.leaf.model, judged.activation.memory
@@ -166,7 +162,12 @@ class Judgement:
             def one_of(values: Array, one: Array = one) -> Array:
                 return values[one]
 
-            known = Known(taken(hidden, one), facts.map(one_of), judged.hidden.get(row))
+            now, began = (
+                None if state is None else self._context.in_columns(state, np.array([row]))
+                for state in (taken(hidden, one), judged.hidden.get(row))
+            )
+            assert now is not None, "it was asked for above"
+            known = Known(now, facts.map(one_of), began)
             cost = float(model.sufficient_cost(known, taken(memory, np.array([row])))[0])
             if cost >= self._cost[row] and cost > 0.0:
                 self._cost[row] = cost
@@ -197,7 +198,8 @@ class _Judged:
         activation: Its activations there.
         before: ``(N,)`` how often it had begun when the episode did.
         began: ``(N,)`` the activation whose beginning was seen; `NEVER` without one.
-        hidden: The hidden state ``(1, ...)`` then, by world.
+        hidden: The hidden state ``(1, ...)`` then, by world, its objects in the world's own order: names may
+            come to have other columns until it is looked at.
     """
 
     def __init__(self, leaf: tuple[ConceptNode, Activation], worlds: int) -> None:

@@ -1,5 +1,6 @@
 """Where the tool has to be: of unlike objects on unlike places, each world as alone."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -160,3 +161,32 @@ def test_obstacles_of_a_world_are_its_own_again(seen_of):
         assert [(o.pose.tolist(), o.size) for o in found] == [
             (o.pose.tolist(), o.size) for o in WORLDS[k].obstacles
         ]
+
+
+def test_of_places_at_one_height_it_is_the_first_of_its_own_world(seen_of):
+    """A spot lies on its board: whatever columns others give them, the world's own order counts."""
+    seen = seen_of(np.arange(N))
+    stands = np.flatnonzero(resting_place(seen, "thing").found)[:2].tolist()
+    models = []
+    for turn, k in zip((1, -1), stands, strict=True):
+        name, on = next((n, p) for n, p in WORLDS[k].places.items() if _stands_on(seen_of, k, n))
+        spot = dataclasses.replace(on, name="spot", clearance=on.clearance + 0.1)
+        models.append(dataclasses.replace(WORLDS[k], places=dict([(name, on), ("spot", spot)][::turn])))
+    expected = []
+    for k, model in zip(stands, models, strict=True):
+        one = seen_of(np.array([k]))
+        alone = Seen(one.observation, WorldFacts.of([model]), one.robot, one.elapsed)
+        expected += resting_place(alone, "thing").place.clearance.tolist()
+    for rows in (np.array([0, 1]), np.array([1, 0])):
+        some = seen_of(np.array(stands)[rows])
+        facts = WorldFacts.of([models[k] for k in rows])
+        found = resting_place(Seen(some.observation, facts, some.robot, some.elapsed), "thing")
+        assert found.found.all() and found.place.clearance.tolist() == [expected[k] for k in rows]
+
+
+def _stands_on(seen_of, k, name):
+    one = seen_of(np.array([k]))
+    model = dataclasses.replace(WORLDS[k], places={name: WORLDS[k].places[name]})
+    return resting_place(
+        Seen(one.observation, WorldFacts.of([model]), one.robot, one.elapsed), "thing"
+    ).found.all()

@@ -102,8 +102,9 @@ class BatchState:
         if self._local is None or self._unseen[index].any():
             self._look(state.objects, index)
         assert self._local is not None
-        local = self._local if rows is None else rows_of(self._local, rows)
-        estimate = poses.multiply(state.objects, local[:, : state.objects.shape[1], :])
+        most = state.objects.shape[1]  # more than anybody has looked at, where a world did not begin
+        local = widened(self._local if rows is None else rows_of(self._local, rows), most)
+        estimate = poses.multiply(state.objects, local[:, :most, :])
         return self._builder.build(state, estimate, rows)
 
     def _look(self, objects: Array, rows: np.ndarray) -> None:

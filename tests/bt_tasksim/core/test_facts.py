@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.columns import filled
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.facts import FactArrays, FactsTable, WorldFacts, joined, rotations, take_rows
 from bt_tasksim.core.world import ObjectModel, Obstacle, PlaceModel, WorldModel
@@ -61,14 +62,49 @@ def arrays(facts):
 
 
 def same(first, second):
-    """They say the same, whatever they are padded to."""
+    """They say the same of as many worlds, objects and places, whatever they are padded to."""
     a, b = arrays(first), arrays(second)
     for name, values in a.items():
-        other = b[name]
-        shape = tuple(min(n, m) for n, m in zip(values.shape, other.shape, strict=True))
-        inner = tuple(slice(0, n) for n in shape)
-        np.testing.assert_array_equal(values[inner], other[inner], err_msg=name)
+        other, padded = b[name], 1 if name.startswith("obstacle") else 2
+        assert values.shape[:padded] == other.shape[:padded], name
+        most = tuple(max(n, m) for n, m in zip(values.shape, other.shape, strict=True))[1:]
+        nothing = PADDING.get(name.partition(".")[2], 0)
+        np.testing.assert_array_equal(
+            filled(values, most, nothing), filled(other, most, nothing), err_msg=name
+        )
     return (first.columns, first.place_columns) == (second.columns, second.place_columns)
+
+
+PADDING = {
+    "rotations": (1.0, 0, 0, 0), "grasp_axes": (0.0, 1, 0), "grasp_widths": np.inf,
+    "pose": (0.0, 0, 0, 1, 0, 0, 0),
+}  # fmt: skip
+"""What stands where there is nothing; else zeros."""
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        lambda facts: facts.map(lambda values: values[:3]),
+        lambda facts: facts.map(lambda values: values[:0]),
+        lambda facts: dataclasses.replace(
+            facts,
+            object_facts=dataclasses.replace(
+                facts.object_facts,
+                rotations=facts.object_facts.rotations[:, :, :1],
+                rotation_counts=facts.object_facts.rotation_counts[:, :, :1],
+            ),
+        ),
+        lambda facts: dataclasses.replace(
+            facts, obstacle_facts=facts.obstacle_facts.map(lambda values: values[:, :1])
+        ),
+    ],
+    ids=["fewer worlds", "none", "lost rotations", "lost obstacles"],
+)
+def test_facts_that_lack_something_are_not_the_same(other):
+    facts = WorldFacts.of(UNLIKE)
+    with pytest.raises(AssertionError):
+        same(facts, other(facts))
 
 
 def test_every_array_has_a_row_for_each_world_and_a_column_for_each_name():

@@ -8,6 +8,7 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Success
 from py_trees.common import Status
+from py_trees.decorators import Decorator
 
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import ObjectName
@@ -20,6 +21,7 @@ from bt_tasksim.execution.runner import Runner
 from bt_tasksim.execution.worlds import most_worlds, why_alone
 from bt_tasksim.trees import retry, sequence, timeout
 from bt_tasksim.trees.load import load_source
+from tests.unlike_worlds import holding, mixed
 
 pytestmark = pytest.mark.physical
 SCENARIO = "pick_and_place_recovering"  # retries, disturbances, and several ways for it to end
@@ -132,6 +134,13 @@ def test_a_leaf_that_raises_in_one_world_leaves_the_others_alone():
     assert in_batch(lambda: sequence("root", Raises("target")), scene, seeds, 3) == alone
 
 
+class Counted(Decorator):
+    """A decorator of somebody's own: the leaf below is ticked by py_trees, world by world."""
+
+    def update(self):
+        return self.decorated.status
+
+
 class Counts(Behaviour):
     """A behaviour of somebody's own: done in its third tick."""
 
@@ -196,3 +205,29 @@ def test_unlike_objects_share_a_batch():
     scene = dataclasses.replace(source.scene, stages=())
     alone = one_by_one(source.build, scene, seeds)
     assert in_batch(source.build, scene, seeds, 3) == alone
+
+
+@pytest.mark.parametrize(
+    ("scenes", "worlds"),
+    [
+        ((holding("target", "box"), holding("box", "target")), 2),
+        ((holding("target"), holding("box", "target"), holding("tall", "box", "target")), 2),
+        ((holding("tall", "target", fixtures=("stand",)), holding("target"), holding("box", "target")), 3),
+    ],
+)
+def test_unlike_objects_orders_and_numbers_share_a_batch(scenes, worlds):
+    source, seeds, scene = load_source("pick_and_place"), (0, 1, 2, 3), mixed(*scenes)
+    alone = {seed: one_by_one(source.build, scene, (seed,))[seed] for seed in seeds}
+    assert any(found[1] for found in alone.values()), "some succeed"
+    assert in_batch(source.build, scene, seeds, worlds) == alone
+    assert one_by_one(source.build, scene, seeds[::-1]) == alone
+
+
+def test_behaviours_of_ones_own_see_their_worlds_objects():
+    scene, seeds = mixed(holding("target", "box"), holding("box", "target"), holding("target")), range(4)
+
+    def build():
+        return sequence("root", Counted("own", Grasp("target")), Pick("target"))
+
+    alone = {seed: one_by_one(build, scene, (seed,))[seed] for seed in seeds}
+    assert in_batch(build, scene, seeds, 3) == alone

@@ -9,10 +9,11 @@ from py_trees.common import Status
 from test_rollouts import UP as NETWORK
 from toys import DONE, SCENE, STILL, UP, Below, Check, Even, Move, Raise, Turn, Unprogrammed, alone, honest
 
-from bt_tasksim.concept_nodes import Wait
+from bt_tasksim.concept_nodes import Grasp, Pick, Wait
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
 from bt_tasksim.core.registry import register
 from bt_tasksim.training.collectors import DrawTask, RolloutTask
+from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.episode_batch import REDRAWS, EpisodeBatch
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.reward_parts import RewardPart
@@ -33,6 +34,7 @@ from bt_tasksim.trees import (
     timeout,
 )
 from bt_tasksim.trees.nodes.train import Train
+from tests.unlike_worlds import holding, mixed
 
 HERE = 0.35
 
@@ -337,3 +339,64 @@ def test_after_it_the_tree_can_be_run(vector_of, toy):
     vector.close()
     assert [world.closed for world in vector.batch.worlds.each] == [1, 1]
     assert toy(tree).tick(50) == Status.SUCCESS
+
+
+# ---- worlds that physics simulates -------------------------------------------------------------------------
+
+
+def grasp_env(make, scene, **settings):
+    return make(sequence("s", Train(Grasp("target", timeout=10.0)), Pick("target")), scene, **settings)
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize("first", [[1], [2, 0]])
+def test_some_worlds_may_be_the_first_to_begin(first):
+    scene = holding("target")
+    vector = grasp_env(EpisodeVectorEnv, scene, num_envs=3)
+    env = grasp_env(EpisodeEnv, scene)
+    vector.begin(first, seed=5)
+    begun = {}
+    while len(begun) < len(first):
+        rows, ready = vector.recv()
+        begun |= dict(zip(rows.tolist(), ready.features, strict=True))
+    assert sorted(begun) == sorted(first)
+    for row, features in begun.items():
+        assert np.array_equal(features, env.reset(seed=5 + row)[0])
+    vector.close()
+    env.close()
+
+
+def scripted(count):
+    """Go on fast, and say after a while that it is held."""
+    return np.array([0.0] * 5 + [1.0, 1.0 if count == HELD else -1.0])
+
+
+HELD, EPISODES = 70, 2
+
+
+@pytest.mark.physical
+def test_worlds_with_unlike_objects_are_judged_each_by_its_own():
+    scene = mixed(holding("target", "box"), holding("box", "target"), holding("tall", "box", "target"))
+    vector, env = grasp_env(EpisodeVectorEnv, scene, num_envs=2), grasp_env(EpisodeEnv, scene)
+    first, _ = vector.reset(seed=0)
+    found, now, ends = {0: [], 1: []}, {row: [first[row].tobytes()] for row in (0, 1)}, []
+    while min(map(len, found.values())) < EPISODES:
+        features, paid, ended, cut, infos = vector.step(np.stack([scripted(len(now[row])) for row in now]))
+        for row, episodes in found.items():
+            if ended[row] or cut[row]:
+                final = infos["final_info"]
+                episodes.append((now[row], paid[row], final["reason"][row], final["seconds"][row]))
+                ends.append(final["follower"][row])
+                now[row] = []
+            now[row].append(features[row].tobytes())
+    assert any(ends), "some are judged by what follows"
+    for row, episodes in found.items():
+        for k, episode in enumerate(episodes[:EPISODES]):
+            seen, over = [env.reset(seed=None if k else row)[0].tobytes()], False
+            while not over:
+                features, reward, ended, cut, info = env.step(scripted(len(seen)))
+                over = ended or cut
+                seen += [] if over else [features.tobytes()]
+            assert episode == (seen, reward, info["reason"], info["seconds"])
+    vector.close()
+    env.close()
