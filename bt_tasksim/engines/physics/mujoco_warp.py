@@ -31,8 +31,10 @@ if TYPE_CHECKING:
     from bt_tasksim.engines.physics.warp_batch.structure import Prepared
 
 DEVICES = ("cpu", "cuda")
-OVERFLOW = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE")
-"""What MuJoCo Warp calls too little room for contacts; that a solver took all its iterations is no fault."""
+FULL = (
+    "MuJoCo Warp has too little room for the contacts of this world: too many things touch; "
+    "take --engines mujoco, or a scene in which fewer do"
+)
 
 
 class WarpWorld:
@@ -49,6 +51,7 @@ class WarpWorld:
         slot: Where it is in its group.
         control: What the drives are told next ``(n_joints,)``.
         falling: It goes on in fine steps.
+        full: It had more contacts than there is room for, and cannot go on.
         periods: Control periods so far.
         report: What was read last.
     """
@@ -58,7 +61,7 @@ class WarpWorld:
     report: Array
 
     def __init__(self, prepared: Prepared, configuration: ActorConfiguration, gains: Array) -> None:
-        self.prepared, self.falling, self.periods = prepared, False, 0
+        self.prepared, self.falling, self.full, self.periods = prepared, False, False, 0
         self.n_objects, self.n_fixtures = len(configuration.objects), len(configuration.fixtures)
         self.control: Array = np.zeros(0)
         self._gains = gains
@@ -126,8 +129,6 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
         self._hulls = meshes.HullStore(self.device)
         self.groups: dict[bytes, WarpGroup] = {}
         self._gains = np.array([self._stiffness, self._damping])
-        kinds = self._warp.OverflowType
-        self._overflow = sum(int(kinds[name]) for name in OVERFLOW)
 
     # ---- worlds come and go -----------------------------------------------------------------------------
 
@@ -174,14 +175,16 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
 
     def _begin(self, rows: Array) -> None:
         """Worlds that were built enter their groups, and are looked at."""
-        fresh = [world for row in rows.tolist() if (world := self.simulated[row]) is not None]
-        for worlds in _by_structure(fresh).values():
+        fresh = [(row, world) for row in rows.tolist() if (world := self.simulated[row]) is not None]
+        row_of = {id(world): row for row, world in fresh}
+        for worlds in _by_structure([world for _, world in fresh]).values():
             try:
                 self._enter(worlds)
             except InputError as error:
-                for row in rows.tolist():
-                    if any(self.simulated[row] is world for world in worlds):
-                        self.errors[row], self.simulated[row] = error, None
+                for world in worlds:
+                    row = row_of[id(world)]
+                    self.errors[row], self.simulated[row] = error, None
+        self._refuse_full(fresh)
 
     def _enter(self, worlds: list[WarpWorld]) -> None:
         """Worlds of one structure enter their group.
@@ -197,28 +200,29 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
         slots = group.enter([world.prepared for world in worlds])
         self.groups[first.prepared.key] = group
         reports = group.look(np.array(slots))
-        for world, slot, report in zip(worlds, slots, reports, strict=True):
-            world.group, world.slot, world.report = group, slot, report
+        full = group.full(reports).tolist()
+        for world, slot, report, over in zip(worlds, slots, reports, full, strict=True):
+            world.group, world.slot, world.report, world.full = group, slot, report, over
 
     # ---- running ----------------------------------------------------------------------------------------
 
     def _go_on(self, worlds: Sequence[tuple[int, WarpWorld, list[float], list[float]]]) -> None:
         """See `ThreadedBatch`; all worlds of one structure at once."""
-        row_of = {id(world): row for row, world, _, _ in worlds}
         for _, world, position, velocity in worlds:
             world.drive_to(position, velocity)
-        for some in _by_structure([world for _, world, _, _ in worlds]).values():
+        for some in _by_structure([world for _, world, _, _ in worlds if not world.full]).values():
             group, slots = some[0].group, np.array([world.slot for world in some])
             group.write(slots, "ctrl", np.array([world.control for world in some]))
             reports = group.period(slots, np.array([world.falling for world in some]))
-            full = group.columns.integers(reports, "overflow")[:, 0] & self._overflow
-            for world, report, over in zip(some, reports, full.tolist(), strict=True):
-                world.report = report
+            for world, report, over in zip(some, reports, group.full(reports).tolist(), strict=True):
+                world.report, world.full = report, over
                 world.periods += 1
-                if over:
-                    self.errors[row_of[id(world)]] = MachineError(
-                        "MuJoCo Warp has no room for all contacts of this world: too many things touch"
-                    )
+        self._refuse_full([(row, world) for row, world, _, _ in worlds])
+
+    def _refuse_full(self, worlds: Sequence[tuple[int, WarpWorld]]) -> None:
+        for row, world in worlds:
+            if world.full:
+                self.errors[row] = MachineError(FULL)
 
     def _read(self, rows: Array, worlds: list[WarpWorld], layout: Layout) -> tuple[WorldState, Hidden]:
         """See `ThreadedBatch`."""
