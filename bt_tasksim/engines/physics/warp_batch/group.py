@@ -18,8 +18,9 @@ import numpy as np
 import warp as wp
 
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.mujoco_model import BodyNumbers
 from bt_tasksim.engines.physics.warp_batch.meshes import HullStore
-from bt_tasksim.engines.physics.warp_batch.report import BodyNumbers, Columns
+from bt_tasksim.engines.physics.warp_batch.report import Columns
 from bt_tasksim.engines.physics.warp_batch.structure import Prepared, idle
 from bt_tasksim.engines.physics.warp_batch.worlds import WarpWorlds
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.mujoco_model import World
+from bt_tasksim.engines.physics.mujoco_timing import StepPlan
 from bt_tasksim.engines.physics.warp_batch.geoms import GeomTable
 from bt_tasksim.engines.physics.warp_batch.meshes import Hull
 from bt_tasksim.engines.physics.warp_batch.words import host_words
@@ -21,28 +22,6 @@ OUT_OF_IT = ("mesh_", "nmesh", "tex_", "ntex", "mat_", "vis_", "dof_length")
 lengths of degrees of freedom are for bodies that may fall asleep, which none here may."""
 APART = 100.0
 """Metres to an object of a world in which nothing goes on, and from one to the next."""
-
-
-@dataclass(frozen=True)
-class StepPlan:
-    """How a control period is stepped.
-
-    Attributes:
-        period: Seconds.
-        steps: Ordinary steps in it.
-        sensed: The last steps, in which forces are felt.
-        finer: Fine steps that an ordinary one becomes while something falls.
-    """
-
-    period: float
-    steps: int
-    sensed: int
-    finer: int
-
-    @property
-    def step(self) -> float:
-        """Seconds of an ordinary step."""
-        return self.period / self.steps
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,10 @@ import warp as wp
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.mujoco_model import BodyNumbers
 from bt_tasksim.engines.physics.warp_batch import kernels
 from bt_tasksim.engines.physics.warp_batch.meshes import HullStore
-from bt_tasksim.engines.physics.warp_batch.report import BodyNumbers, Columns
+from bt_tasksim.engines.physics.warp_batch.report import Columns
 from bt_tasksim.engines.physics.warp_batch.structure import Prepared
 from bt_tasksim.engines.physics.warp_batch.words import RowFields, copy, host_words, words, write
 
