@@ -14,10 +14,12 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Hidden, WorldState
 from bt_tasksim.engines.base import EngineSetup
-from bt_tasksim.engines.physics.mujoco_sensing import wrist_wrenches
+from bt_tasksim.engines.physics.layout import Layout
+from bt_tasksim.engines.physics.mujoco_sensing import mean_wrenches
 from bt_tasksim.engines.physics.mujoco_state import StateArrays, states
 from bt_tasksim.engines.physics.mujoco_stepping import MujocoWorld
-from bt_tasksim.engines.physics.threaded import Layout, SimulatedPhysics, ThreadedBatch
+from bt_tasksim.engines.physics.single import SimulatedPhysics
+from bt_tasksim.engines.physics.threaded import ThreadedBatch
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
@@ -73,7 +75,11 @@ class MujocoBatch(ThreadedBatch[MujocoWorld]):
             objects=np.concatenate([position, rotation], axis=-1),
             motion=np.concatenate([r.object_motion for r in readings]),
             com=np.concatenate([r.object_com for r in readings]),
-            wrench=self._wrench([r.wrist for r in readings]),
+            wrench=mean_wrenches(
+                np.array([step for r in readings for step in r.wrist]),
+                np.array([len(r.wrist) for r in readings]),
+                self.robot.tool_pose,
+            ),
             tip_force=np.array([r.tip_force for r in readings]).reshape(len(rows), -1, 3),
             hand_force=np.array([force for r in readings for force in r.hand_force]),
             hand_distance=np.array([far for r in readings for far in r.near.hand_distance]),
@@ -81,16 +87,6 @@ class MujocoBatch(ThreadedBatch[MujocoWorld]):
             penetration=np.array([r.penetration for r in readings]),
         )
         return states(self.robot, layout, read)
-
-    def _wrench(self, felt: list[list[list[float]]]) -> Array:
-        """External wrenches ``(k, 6)``: of each world the mean of the steps in which it was felt."""
-        counts = np.array([len(steps) for steps in felt])
-        each = wrist_wrenches(np.array([step for steps in felt for step in steps]), self.robot.tool_pose)
-        first, total = np.cumsum(counts) - counts, np.zeros((len(felt), 6))
-        for step in range(counts.max()):  # one after the other: NumPy's sums have an order of their own
-            there = counts > step
-            total[there] += each[first[there] + step]
-        return total / counts[:, None]
 
 
 @register("engine/physics", "mujoco")

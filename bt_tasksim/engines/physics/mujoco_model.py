@@ -55,6 +55,49 @@ class World:
     weight: Array
 
 
+@dataclass(frozen=True, eq=False)
+class BodyNumbers:
+    """Numbers of bodies in a model, and counts.
+
+    Attributes:
+        tool: The one that carries the tool.
+        wrist: The one behind the wrist's sensor.
+        root: The robot's root.
+        read: Those whose poses are read: the tool's, the fingertips', the objects'.
+        n_tips: Number of fingertips.
+        n_objects: Number of objects.
+        n_fixtures: Number of fixtures.
+    """
+
+    tool: int
+    wrist: int
+    root: int
+    read: Array
+    n_tips: int
+    n_objects: int
+    n_fixtures: int
+
+    @classmethod
+    def of(cls, robot: RobotDescription, world: World, n_fixtures: int) -> BodyNumbers:
+        """The numbers of a world."""
+        model = world.model
+
+        def body(link: str) -> int:
+            return int(model.body(f"robot/{link}").id)
+
+        wrist = body(robot.wrist_link)
+        frames = [body(robot.tool_link), *(body(tip.links[0]) for tip in robot.tips)]
+        return cls(
+            tool=frames[0],
+            wrist=wrist,
+            root=int(model.body_rootid[wrist]),
+            read=np.array([*frames, *world.object_body.tolist()], np.int32),
+            n_tips=len(robot.tips),
+            n_objects=len(world.object_body),
+            n_fixtures=n_fixtures,
+        )
+
+
 def build_world(mujoco: ModuleType, robot: RobotDescription, configuration: ActorConfiguration) -> World:
     """The model of a drawn world. Gravity is that on objects alone, which the engine applies.
 

@@ -162,6 +162,22 @@ def wrist_wrenches(felt: Array, tool_pose: Array) -> Array:
     return poses.rotate(back, np.stack([-force, moment], axis=1)).reshape(-1, 6)
 
 
+def mean_wrenches(felt: Array, counts: Array, tool_pose: Array) -> Array:
+    """External wrenches ``(k, 6)`` of worlds: of each the mean of the steps in which it was felt.
+
+    Args:
+        felt: Of all steps, world after world ``(n, 16)``, see `wrist_wrenches`.
+        counts: How many steps each world has ``(k,)``.
+        tool_pose: See `wrist_wrenches`.
+    """
+    each = wrist_wrenches(felt, tool_pose)
+    first, total = np.cumsum(counts) - counts, np.zeros((len(counts), 6))
+    for step in range(counts.max()):  # one after the other: NumPy's sums have an order of their own
+        there = counts > step
+        total[there] += each[first[there] + step]
+    return total / counts[:, None]
+
+
 def object_velocities(moving: Array, rotation: Array, com: Array) -> Array:
     """Velocities ``(n, 6)`` of centres of mass and angular, base frame.
 

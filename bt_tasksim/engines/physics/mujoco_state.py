@@ -9,8 +9,8 @@ import numpy as np
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, WorldState
+from bt_tasksim.engines.physics.layout import Layout
 from bt_tasksim.engines.physics.mujoco_sensing import object_velocities
-from bt_tasksim.engines.physics.threaded import Layout
 from bt_tasksim.robot.description import RobotDescription
 
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
-from bt_tasksim.engines.physics.mujoco_contacts import FINE_STEP, TIMESTEP
-from bt_tasksim.engines.physics.mujoco_model import World, build_world
+from bt_tasksim.engines.physics.mujoco_model import BodyNumbers, World, build_world
 from bt_tasksim.engines.physics.mujoco_sensing import ContactReader, Forces, Near, object_velocities
+from bt_tasksim.engines.physics.mujoco_timing import StepPlan
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
@@ -86,11 +86,7 @@ class MujocoWorld:
         self.data = mujoco.MjData(self.world.model)
         names = [actor.name for actor in configuration.objects]
         self.n_objects, self.n_fixtures = len(names), len(configuration.fixtures)
-        self._period = 1.0 / configuration.control_frequency
-        self._steps = math.ceil(self._period / TIMESTEP - 1e-9)
-        share = configuration.control_frequency / configuration.physics_frequency
-        self._sensed = min(max(round(self._steps * share), 1), self._steps)
-        self._finer = math.ceil(self._period / self._steps / FINE_STEP - 1e-9)
+        self._plan = StepPlan.of(configuration)
         self._periods = 0
         self._reader = ContactReader(
             self.world.bodies, self.world.model.geom_bodyid, len(robot.tips), len(names), self.n_fixtures
@@ -98,7 +94,9 @@ class MujocoWorld:
         self._stiffness = robot.drive_array("stiffness")
         self._damping = robot.drive_array("damping")
         self._n_arm = len(robot.arm_joints)
-        self._index_bodies(robot)
+        self._numbers = BodyNumbers.of(robot, self.world, self.n_fixtures)
+        self._frames = self._numbers.read[: 1 + len(robot.tips)]
+        self._object_com = self.world.model.body_ipos[self.world.object_body]
         disturbance = configuration.disturbance
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
@@ -113,17 +111,6 @@ class MujocoWorld:
         mujoco.mj_forward(self.world.model, self.data)
         self._samples = [self._feel()]
 
-    def _index_bodies(self, robot: RobotDescription) -> None:
-        model = self.world.model
-
-        def body(link: str) -> int:
-            return int(model.body(f"robot/{link}").id)
-
-        self._tool_body, self._wrist_body = body(robot.tool_link), body(robot.wrist_link)
-        self._root_body = int(model.body_rootid[self._wrist_body])
-        self._frames = np.array([self._tool_body, *(body(tip.links[0]) for tip in robot.tips)])
-        self._object_com = model.body_ipos[self.world.object_body]
-
     # ---- running ----------------------------------------------------------------------------------------
 
     def drive_to(self, position: list[float], velocity: list[float]) -> None:
@@ -135,13 +122,14 @@ class MujocoWorld:
 
     def advance(self) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
-        self.world.model.opt.timestep = self._period / self._steps
+        plan = self._plan
+        self.world.model.opt.timestep = plan.step
         self._samples = []
         quiet = self._disturbance.over and not self._falling and self._watch == 0
         if quiet:
-            self._mujoco.mj_step(self.world.model, self.data, self._steps - self._sensed)
-        for k in range(self._steps - self._sensed if quiet else 0, self._steps):
-            self._step(sensed=k >= self._steps - self._sensed)
+            self._mujoco.mj_step(self.world.model, self.data, plan.steps - plan.sensed)
+        for k in range(plan.steps - plan.sensed if quiet else 0, plan.steps):
+            self._step(sensed=k >= plan.steps - plan.sensed)
         self._watch = max(self._watch - 1, 0)
         self._periods += 1
 
@@ -159,8 +147,8 @@ class MujocoWorld:
             self._falling |= self._disturbance.pushing  # until the period's end, where it is looked at again
         if self._falling:
             ordinary = model.opt.timestep
-            model.opt.timestep = ordinary / self._finer
-            for _ in range(self._finer):
+            model.opt.timestep = ordinary / self._plan.finer
+            for _ in range(self._plan.finer):
                 if self._disturbance.pushing:
                     self._push()
                 mj_step(model, data)
@@ -176,14 +164,13 @@ class MujocoWorld:
 
     def _feel(self) -> tuple[Forces, list[float]]:
         """The forces of the last step, and what its wrench at the wrist is computed from."""
-        data = self.data
+        data, numbers = self.data, self._numbers
         self._mujoco.mj_rnePostConstraint(self.world.model, data)
-        tool = self._tool_body
         wrist = [
-            *data.cfrc_int[self._wrist_body].tolist(),
-            *data.subtree_com[self._root_body].tolist(),
-            *data.xpos[tool].tolist(),
-            *data.xquat[tool].tolist(),
+            *data.cfrc_int[numbers.wrist].tolist(),
+            *data.subtree_com[numbers.root].tolist(),
+            *data.xpos[numbers.tool].tolist(),
+            *data.xquat[numbers.tool].tolist(),
         ]
         return self._reader.forces(data), wrist
 
@@ -208,7 +195,7 @@ class MujocoWorld:
         self._near, self._hand_force = near, felt.hand
         bodies = world.object_body
         self.reading = MujocoReading(
-            self._periods * self._period,
+            self._periods * self._plan.period,
             data.qpos[world.joint_qpos],
             data.qvel[world.joint_dof],
             data.xpos[self._frames],

@@ -7,7 +7,6 @@ precision. Those whose models have one structure are stepped together, see
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -18,11 +17,13 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Hidden, WorldState
 from bt_tasksim.engines.base import EngineSetup
-from bt_tasksim.engines.physics.mujoco_contacts import FINE_STEP, TIMESTEP
-from bt_tasksim.engines.physics.mujoco_model import build_world
-from bt_tasksim.engines.physics.mujoco_sensing import wrist_wrenches
+from bt_tasksim.engines.physics.layout import Layout, put, rows_for, wider_support
+from bt_tasksim.engines.physics.mujoco_model import BodyNumbers, build_world
+from bt_tasksim.engines.physics.mujoco_sensing import mean_wrenches
 from bt_tasksim.engines.physics.mujoco_state import StateArrays, states
-from bt_tasksim.engines.physics.threaded import Layout, SimulatedPhysics, ThreadedBatch, put, rows_for
+from bt_tasksim.engines.physics.mujoco_timing import StepPlan
+from bt_tasksim.engines.physics.single import SimulatedPhysics
+from bt_tasksim.engines.physics.threaded import ThreadedBatch
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
@@ -31,8 +32,10 @@ if TYPE_CHECKING:
     from bt_tasksim.engines.physics.warp_batch.structure import Prepared
 
 DEVICES = ("cpu", "cuda")
-OVERFLOW = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE")
-"""What MuJoCo Warp calls too little room for contacts; that a solver took all its iterations is no fault."""
+FULL = (
+    "MuJoCo Warp has too little room for the contacts of this world: too many things touch; "
+    "take --engines mujoco, or a scene in which fewer do"
+)
 
 
 class WarpWorld:
@@ -49,6 +52,7 @@ class WarpWorld:
         slot: Where it is in its group.
         control: What the drives are told next ``(n_joints,)``.
         falling: It goes on in fine steps.
+        full: It had more contacts than there is room for, and cannot go on.
         periods: Control periods so far.
         report: What was read last.
     """
@@ -58,7 +62,7 @@ class WarpWorld:
     report: Array
 
     def __init__(self, prepared: Prepared, configuration: ActorConfiguration, gains: Array) -> None:
-        self.prepared, self.falling, self.periods = prepared, False, 0
+        self.prepared, self.falling, self.full, self.periods = prepared, False, False, 0
         self.n_objects, self.n_fixtures = len(configuration.objects), len(configuration.fixtures)
         self.control: Array = np.zeros(0)
         self._gains = gains
@@ -111,7 +115,7 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
             import mujoco
 
             from bt_tasksim.engines.physics.warp_batch import device as devices
-            from bt_tasksim.engines.physics.warp_batch import group, meshes, report, structure
+            from bt_tasksim.engines.physics.warp_batch import group, meshes, structure
 
             self.device = devices.start(device)
             self._warp = devices.mujoco_warp_library()
@@ -121,13 +125,11 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
                 "install the extra 'warp': pip install 'bt-tasksim[warp]'"
             ) from error
         super().__init__(robot, worlds, threads)
-        self._mujoco, self._structure, self._report = mujoco, structure, report
+        self._mujoco, self._structure = mujoco, structure
         self._group_class = group.WarpGroup
         self._hulls = meshes.HullStore(self.device)
         self.groups: dict[bytes, WarpGroup] = {}
         self._gains = np.array([self._stiffness, self._damping])
-        kinds = self._warp.OverflowType
-        self._overflow = sum(int(kinds[name]) for name in OVERFLOW)
 
     # ---- worlds come and go -----------------------------------------------------------------------------
 
@@ -152,15 +154,6 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
         world = build_world(mujoco, self.robot, configuration)
         model = world.model
         model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # which Warp never does
-        period = 1.0 / configuration.control_frequency
-        steps = math.ceil(period / TIMESTEP - 1e-9)
-        share = configuration.control_frequency / configuration.physics_frequency
-        timing = self._structure.StepPlan(
-            period,
-            steps,
-            sensed=min(max(round(steps * share), 1), steps),
-            finer=math.ceil(period / steps / FINE_STEP - 1e-9),
-        )
         data = mujoco.MjData(model)
         data.qpos[world.joint_qpos] = start
         data.xfrc_applied[world.object_body, 2] = -world.weight
@@ -169,19 +162,23 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
         state = {"qpos": data.qpos, "xfrc_applied": data.xfrc_applied, "ctrl": control}
         state |= {"geom_xpos": data.geom_xpos, "geom_xmat": data.geom_xmat}
         return WarpWorld(
-            self._structure.prepare(self._warp, world, timing, state), configuration, self._gains
+            self._structure.prepare(self._warp, world, StepPlan.of(configuration), state),
+            configuration,
+            self._gains,
         )
 
     def _begin(self, rows: Array) -> None:
         """Worlds that were built enter their groups, and are looked at."""
-        fresh = [world for row in rows.tolist() if (world := self.simulated[row]) is not None]
-        for worlds in _by_structure(fresh).values():
+        fresh = [(row, world) for row in rows.tolist() if (world := self.simulated[row]) is not None]
+        row_of = {id(world): row for row, world in fresh}
+        for worlds in _by_structure([world for _, world in fresh]).values():
             try:
                 self._enter(worlds)
             except InputError as error:
-                for row in rows.tolist():
-                    if any(self.simulated[row] is world for world in worlds):
-                        self.errors[row], self.simulated[row] = error, None
+                for world in worlds:
+                    row = row_of[id(world)]
+                    self.errors[row], self.simulated[row] = error, None
+        self._refuse_full(fresh)
 
     def _enter(self, worlds: list[WarpWorld]) -> None:
         """Worlds of one structure enter their group.
@@ -192,33 +189,34 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
         first = worlds[0]
         group = self.groups.get(first.prepared.key)
         if group is None:
-            bodies = self._report.BodyNumbers.of(self.robot, first.prepared.world, first.n_fixtures)
+            bodies = BodyNumbers.of(self.robot, first.prepared.world, first.n_fixtures)
             group = self._group_class(self._warp, self.device, first.prepared, bodies, self._hulls)
         slots = group.enter([world.prepared for world in worlds])
         self.groups[first.prepared.key] = group
         reports = group.look(np.array(slots))
-        for world, slot, report in zip(worlds, slots, reports, strict=True):
-            world.group, world.slot, world.report = group, slot, report
+        full = group.full(reports).tolist()
+        for world, slot, report, over in zip(worlds, slots, reports, full, strict=True):
+            world.group, world.slot, world.report, world.full = group, slot, report, over
 
     # ---- running ----------------------------------------------------------------------------------------
 
     def _go_on(self, worlds: Sequence[tuple[int, WarpWorld, list[float], list[float]]]) -> None:
         """See `ThreadedBatch`; all worlds of one structure at once."""
-        row_of = {id(world): row for row, world, _, _ in worlds}
         for _, world, position, velocity in worlds:
             world.drive_to(position, velocity)
-        for some in _by_structure([world for _, world, _, _ in worlds]).values():
+        for some in _by_structure([world for _, world, _, _ in worlds if not world.full]).values():
             group, slots = some[0].group, np.array([world.slot for world in some])
             group.write(slots, "ctrl", np.array([world.control for world in some]))
             reports = group.period(slots, np.array([world.falling for world in some]))
-            full = group.columns.integers(reports, "overflow")[:, 0] & self._overflow
-            for world, report, over in zip(some, reports, full.tolist(), strict=True):
-                world.report = report
+            for world, report, over in zip(some, reports, group.full(reports).tolist(), strict=True):
+                world.report, world.full = report, over
                 world.periods += 1
-                if over:
-                    self.errors[row_of[id(world)]] = MachineError(
-                        "MuJoCo Warp has no room for all contacts of this world: too many things touch"
-                    )
+        self._refuse_full([(row, world) for row, world, _, _ in worlds])
+
+    def _refuse_full(self, worlds: Sequence[tuple[int, WarpWorld]]) -> None:
+        for row, world in worlds:
+            if world.full:
+                self.errors[row] = MachineError(FULL)
 
     def _read(self, rows: Array, worlds: list[WarpWorld], layout: Layout) -> tuple[WorldState, Hidden]:
         """See `ThreadedBatch`."""
@@ -247,10 +245,8 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
         joints, speeds = q[:, world.joint_qpos], v[:, world.joint_dof]
         periods = np.array([w.periods for w in worlds])
         felt = np.where(periods == 0, 1, group.timing.sensed)[:, None]  # a look feels once
-        touched = columns.floats(report, "support").reshape(k, max(n, 1), -1)[:, :n] > 0.0
-        support = np.zeros((k, layout.objects, layout.objects + layout.fixtures), bool)
-        support[:, :n, :n] = touched[..., :n]
-        support[:, :n, layout.objects : layout.objects + fixed] = touched[..., n : n + fixed]
+        each = columns.floats(report, "felt").reshape(k, -1, 16)
+        touched = columns.floats(report, "support").reshape(k, max(n, 1), -1)[:, :n, : n + fixed] > 0.0
         com = [w.prepared.world.model.body_ipos[w.prepared.world.object_body] for w in worlds]
         read = StateArrays(
             time=periods * group.timing.period,
@@ -261,23 +257,14 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
             objects=positions[:, 1 + tips :].reshape(-1, 7),
             motion=v[:, world.object_dof].reshape(-1, 6),
             com=np.concatenate(com),
-            wrench=self._wrench(columns.floats(report, "felt").reshape(k, -1, 16), felt),
+            wrench=mean_wrenches(each[np.arange(each.shape[1]) < felt], felt[:, 0], self.robot.tool_pose),
             tip_force=columns.floats(report, "tips").reshape(k, -1, 3)[:, :tips] / felt[..., None],
             hand_force=(columns.floats(report, "hand")[:, :n] / felt).ravel(),
             hand_distance=columns.floats(report, "distance")[:, :n].ravel(),
-            support=support,
+            support=wider_support(touched, n, layout.objects, layout.fixtures),
             penetration=columns.floats(report, "deepest")[:, 0],
         )
         return states(self.robot, layout, read)
-
-    def _wrench(self, felt: Array, counts: Array) -> Array:
-        """External wrenches ``(k, 6)``, the mean of the steps ``(k, n, 16)`` in which they were felt."""
-        k, n, _ = felt.shape
-        each = wrist_wrenches(felt.reshape(k * n, 16), self.robot.tool_pose).reshape(k, n, 6)
-        total = np.zeros((k, 6))
-        for step in range(n):
-            total += np.where(step < counts, each[:, step], 0.0)
-        return total / counts
 
 
 @register("engine/physics", "mujoco_warp")

@@ -16,12 +16,14 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Hidden, WorldState
 from bt_tasksim.engines.base import EngineSetup
+from bt_tasksim.engines.physics.layout import Layout
 from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import RobotBuilder
 from bt_tasksim.engines.physics.sapien_stepping import SapienWorld
 from bt_tasksim.engines.physics.sapien_world import build_world
 from bt_tasksim.engines.physics.sapien_wrist import external_wrench
-from bt_tasksim.engines.physics.threaded import Layout, SimulatedPhysics, ThreadedBatch
+from bt_tasksim.engines.physics.single import SimulatedPhysics
+from bt_tasksim.engines.physics.threaded import ThreadedBatch
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration

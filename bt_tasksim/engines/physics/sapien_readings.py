@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from bt_tasksim.engines.physics.layout import wider_support
+
 
 class SapienReadings:
     """What PhysX says of all worlds of a batch, each of which writes into a row of its own.
@@ -55,10 +57,7 @@ class SapienReadings:
             room = np.full((n, objects, *before.shape[2:]), np.nan)
             room[:, :had] = before
             setattr(self, name, room)
-        support = np.zeros((n, objects, objects + fixtures), bool)
-        support[:, :had, :had] = self.support[..., :had]
-        support[:, :had, objects : objects + self.support.shape[2] - had] = self.support[..., had:]
-        self.support = support
+        self.support = wider_support(self.support, had, objects, fixtures)
 
     def clear(self, row: int) -> None:
         """Forget what the last world of a row has had."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
+from bt_tasksim.engines.physics.layout import body_column
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import Robot
@@ -138,9 +139,8 @@ class SapienWorld:
         if before is None or now.support != before.support:
             support = out.support[row]
             support[:] = False
-            gap = len(support) - n  # objects that other worlds have stand before the fixtures
             for i, j in now.support:
-                support[i, j if j < n else j + gap] = True
+                support[i, body_column(j, n, len(support))] = True
         self._written = now
 
     def _feel(self, asleep: bool = False) -> None:

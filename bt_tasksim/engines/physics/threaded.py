@@ -10,26 +10,25 @@ the others.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from dataclasses import replace
+from typing import ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from bt_tasksim.core.bundles import taken
 from bt_tasksim.core.errors import BtTasksimError, MachineError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, JointTarget, WorldState
-from bt_tasksim.engines.base import PhysicsEngine
 from bt_tasksim.engines.batch import PhysicsBatch
+from bt_tasksim.engines.physics.layout import Layout, put, rows_for, wider_support
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
 FALLING = (0.1, 1.5)
 """Speeds in m/s and rad/s of an object that the hand does not touch, from which an engine takes finer steps:
 a tilted object that lands spins so fast that it would be millimetres deep within an ordinary one."""
-ONE = np.zeros(1, int)
-"""The row of a batch of one."""
 
 
 class SimulatedWorld(Protocol):
@@ -75,48 +74,6 @@ class SimulatedWorld(Protocol):
 
 W = TypeVar("W", bound=SimulatedWorld)
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How objects of several worlds stand in arrays.
-
-    Attributes:
-        counts: Objects of each world ``(k,)``.
-        objects: The most objects that a world of the batch has had.
-        fixtures: The most fixtures.
-    """
-
-    counts: Array
-    objects: int
-    fixtures: int
-
-    def padded(self, values: Array | Sequence[Any], width: int = 0) -> Array:
-        """What objects have, ``(k, objects)`` or with a ``width`` ``(k, objects, width)``, NaN at the end.
-
-        Args:
-            values: Of all objects, world after world.
-            width: Numbers that each has; 0 for one alone.
-        """
-        tail = (width,) if width else ()
-        out = np.full((len(self.counts), self.objects, *tail), np.nan)
-        out[np.arange(self.objects) < self.counts[:, None]] = np.asarray(values, float).reshape(-1, *tail)
-        return out
-
-    def finite(self, state: WorldState) -> Array:
-        """Whether all numbers of a state are finite, ``(k,)``, but for the padding."""
-        assert state.objects is not None and state.velocities is not None
-        joints = np.isfinite(state.joint_position) & np.isfinite(state.joint_velocity)
-        objects = np.isfinite(state.objects).all(axis=-1) & np.isfinite(state.velocities).all(axis=-1)
-        return joints.all(axis=1) & (objects.sum(axis=1) == self.counts)
-
-    def support(self, pairs: Sequence[Iterable[tuple[int, int]]]) -> Array:
-        """`Hidden.support` from the pairs of each world, whose fixtures are numbered behind its objects."""
-        out = np.zeros((len(self.counts), self.objects, self.objects + self.fixtures), bool)
-        found = np.array([(k, i, j) for k, world in enumerate(pairs) for i, j in world], int).reshape(-1, 3)
-        k, i, j = found[:, 0], found[:, 1], found[:, 2]
-        out[k, i, np.where(j < self.counts[k], j, j + self.objects - self.counts[k])] = True
-        return out
 
 
 class ThreadedBatch(PhysicsBatch, Generic[W]):
@@ -220,12 +177,14 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
     def state(self, rows: Array) -> WorldState:
         """See `PhysicsBatch.state`."""
         assert self._state is not None, "no world was ever reset"
-        return taken(self._state, rows)
+        state: WorldState = taken(self._state, rows)
+        return state
 
     def hidden(self, rows: Array) -> Hidden:
         """See `PhysicsBatch.hidden`."""
         assert self._hidden is not None, "no world was ever reset"
-        return taken(self._hidden, rows)
+        hidden: Hidden = taken(self._hidden, rows)
+        return hidden
 
     def close(self) -> None:
         """See `PhysicsBatch.close`."""
@@ -292,9 +251,6 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             return room
 
         state, hidden = self._state, self._hidden
-        support = np.zeros((self.worlds, objects, objects + fixtures), bool)
-        support[:, :n, :n] = hidden.support[..., :n]
-        support[:, :n, objects : objects + m] = hidden.support[..., n:]
         both = {"objects": wider(state.objects), "velocities": wider(state.velocities)}
         self._state = replace(state, **both)
         self._hidden = replace(
@@ -302,7 +258,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             **both,
             hand_force=wider(hidden.hand_force),
             hand_distance=wider(hidden.hand_distance),
-            support=support,
+            support=wider_support(hidden.support, n, objects, fixtures),
         )
 
     def _gather(self, rows: Array) -> None:
@@ -338,87 +294,3 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         fastest = spin.max(axis=1, initial=0.0)
         for k, world in enumerate(worlds):
             world.note_motion(bool(falling[k]), float(fastest[k]))
-
-
-class SimulatedPhysics(PhysicsEngine, Generic[W]):
-    """A physics engine of one world: the case of one of a batch.
-
-    Args:
-        batch: The batch, of one world.
-    """
-
-    def __init__(self, batch: ThreadedBatch[W]) -> None:
-        self.robot = batch.robot
-        self._batch = batch
-
-    @property
-    def simulated(self) -> W:
-        """The world itself, after a reset."""
-        (world,) = self._batch.simulated
-        assert world is not None, "it was not reset"
-        return world
-
-    @property
-    def deepest_pair(self) -> tuple[str, str, float, float] | None:
-        """Names of the bodies that overlapped most, metres, and seconds; None before any."""
-        return self.simulated.deepest_pair
-
-    def reset(self, configuration: ActorConfiguration) -> WorldState:
-        """See `PhysicsEngine.reset`."""
-        self._batch.reset(ONE, [configuration])
-        return self._now()
-
-    def step(self, target: JointTarget) -> WorldState:
-        """See `PhysicsEngine.step`.
-
-        Raises:
-            MachineError: The target or the state is not finite; nothing has moved for a bad target.
-        """
-        self._batch.errors[0] = None  # who was told may try again
-        self._batch.step(JointTarget(target.position[None], target.velocity[None]), ONE)
-        return self._now()
-
-    def hidden(self) -> Hidden:
-        """See `PhysicsEngine.hidden`."""
-        return _unbatched(self._batch.hidden(ONE))
-
-    def close(self) -> None:
-        """See `Engine.close`."""
-        self._batch.close()
-
-    def _now(self) -> WorldState:
-        (error,) = self._batch.errors
-        if error is not None:
-            raise error
-        return _unbatched(self._batch.state(ONE))
-
-
-B = TypeVar("B", WorldState, Hidden)
-
-
-def taken(bundle: B, rows: Array) -> B:
-    """Some rows of a bundle of arrays."""
-    return type(bundle)(**{name: value[rows] for name, value in _arrays(bundle)})
-
-
-def _unbatched(bundle: B) -> B:
-    return type(bundle)(**{name: value[0] for name, value in _arrays(bundle)})
-
-
-def rows_for(bundle: B, n: int) -> B:
-    """Arrays for ``n`` rows like those of a bundle, zero."""
-    return type(bundle)(**{name: _rows_like(value, n) for name, value in _arrays(bundle)})
-
-
-def _rows_like(value: Array, n: int) -> Array:
-    return np.zeros((n, *value.shape[1:]), value.dtype)
-
-
-def put(bundle: B, rows: Array, values: B) -> None:
-    """Write rows of a bundle of arrays."""
-    for name, value in _arrays(values):
-        getattr(bundle, name)[rows] = value
-
-
-def _arrays(bundle: WorldState | Hidden) -> list[tuple[str, Array]]:
-    return [(field.name, getattr(bundle, field.name)) for field in fields(bundle)]

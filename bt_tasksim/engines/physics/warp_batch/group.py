@@ -2,6 +2,10 @@
 
 A world that begins anew, or in which something falls, is copied to the side and back: what is done there in
 more steps costs the others nothing, and changes nothing in them.
+
+All contacts of worlds that are stepped together stand in one list. Where it was too short in a period, which
+takes a world with far more than its share, that period is done anew in smaller and smaller groups aside; so
+worlds beside an overfull one do not feel it, and it has its fault alone as in any company.
 """
 
 from __future__ import annotations
@@ -14,9 +18,10 @@ import numpy as np
 import warp as wp
 
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.mujoco_model import BodyNumbers
 from bt_tasksim.engines.physics.warp_batch.meshes import HullStore
-from bt_tasksim.engines.physics.warp_batch.report import BodyNumbers, Columns
-from bt_tasksim.engines.physics.warp_batch.structure import Prepared
+from bt_tasksim.engines.physics.warp_batch.report import Columns
+from bt_tasksim.engines.physics.warp_batch.structure import Prepared, idle
 from bt_tasksim.engines.physics.warp_batch.worlds import WarpWorlds
 
 ASIDE = (1, 4, 32)
@@ -38,7 +43,7 @@ class WarpGroup:
     def __init__(
         self, library: ModuleType, device: wp.Device, first: Prepared, bodies: BodyNumbers, hulls: HullStore
     ) -> None:
-        self._library, self._device, self._first = library, device, first
+        self._library, self._device, self._first, self._idle = library, device, first, idle(first)
         self.bodies, self._hulls = bodies, hulls
         self.timing = first.timing
         self._meshes = self._enter_hulls(first)
@@ -74,7 +79,7 @@ class WarpGroup:
     def leave(self, slot: int) -> None:
         """A world ends, and its slot is free."""
         assert self._main is not None
-        self._main.load(np.array([slot]), [self._first], self._meshes[None])  # that nothing goes wild there
+        self._rest(self._main, np.array([slot]))
         for room in self._rooms.pop(slot).tolist():
             if room >= 0:
                 self._hulls.leave(room)
@@ -97,35 +102,61 @@ class WarpGroup:
         assert self._main is not None
         reports, usual = np.zeros((len(slots), self.columns.width), np.int32), slots[~fine]
         if 2 * len(usual) > self._main.count or len(usual) > ASIDE[-1]:
-            reports[~fine] = self._main.period(usual, fine=False)[usual]
+            reports[~fine] = self._together(self._main, usual)
         else:  # the most of them stand still
             reports[~fine] = self._aside(usual, lambda side, rows: side.period(rows, fine=False))
         reports[fine] = self._aside(slots[fine], lambda side, rows: side.period(rows, fine=True))
+        self._rest(self._main, slots[self.full(reports)])
         return reports
+
+    def full(self, reports: Array) -> Array:
+        """Which of the worlds with these reports ``(k, columns)`` were too full: they are here no more."""
+        assert self._main is not None
+        return self._main.full(reports)
 
     def write(self, slots: Array, name: str, values: Array) -> None:
         """Write numbers ``(k, n)`` into a part of the state of worlds ``(k,)``, such as ``ctrl``."""
         assert self._main is not None
         self._main.write(slots, name, values)
 
+    def _together(self, main: WarpWorlds, slots: Array) -> Array:
+        """An ordinary period where the worlds are, or aside if their contacts lacked room."""
+        reports = main.period(slots, fine=False)
+        if not main.crowded(reports):
+            return np.asarray(reports[slots])
+        main.undo()
+        return self._aside(slots, lambda side, rows: side.period(rows, fine=False))
+
     def _aside(self, slots: Array, what: Callable[[WarpWorlds, Array], Array]) -> Array:
-        main = self._main
-        assert main is not None
         reports = np.zeros((len(slots), self.columns.width), np.int32)
         for first in range(0, len(slots), ASIDE[-1]):
             some = slots[first : first + ASIDE[-1]]
-            side, there = self._side(len(some)), np.arange(len(some))
-            main.copy_to(some, side, there)
-            report = what(side, there)
-            side.state.copy_to(there, main.state, some)
-            reports[first : first + len(some)] = report[there]
+            reports[first : first + len(some)] = self._beside(some, what)
         return reports
+
+    def _beside(self, some: Array, what: Callable[[WarpWorlds, Array], Array]) -> Array:
+        main, side, there = self._main, self._side(len(some)), np.arange(len(some))
+        assert main is not None
+        main.copy_to(some, side, there)
+        reports = what(side, there)[there]
+        if len(some) > 1 and side.crowded(reports):
+            self._rest(side, there)
+            half = len(some) // 2
+            return np.concatenate([self._beside(some[:half], what), self._beside(some[half:], what)])
+        side.state.copy_to(there, main.state, some)
+        self._rest(side, there[side.full(reports)])
+        return reports
+
+    def _rest(self, worlds: WarpWorlds, rows: Array) -> None:
+        """Nothing goes on in these rows any more, nothing goes wild there, and nothing touches."""
+        if len(rows):
+            worlds.load(rows, [self._idle] * len(rows), np.tile(self._meshes, (len(rows), 1)))
 
     def _side(self, worlds: int) -> WarpWorlds:
         count = next(count for count in ASIDE if count >= worlds)
         if count not in self._sides:
             self._hulls.flush()
-            self._sides[count] = self.apart(count)
+            self._sides[count] = self._made(count, self._idle)
         return self._sides[count]
 
     def _grow(self, lacking: int) -> None:
@@ -133,15 +164,18 @@ class WarpGroup:
         before, n = self._main, 0 if self._main is None else self._main.count
         count = n + lacking if before is None else math.ceil(GROWTH * (n + lacking))
         self._hulls.flush()
-        self._main = self.apart(count)
+        self._main = self._made(count, self._idle)
         if before is not None:
             before.copy_to(np.arange(n), self._main, np.arange(n))
         self._free += range(count - 1, n - 1, -1)
 
     def apart(self, count: int) -> WarpWorlds:
         """Worlds of this structure apart from those of the group, all as the first one."""
+        return self._made(count, self._first)
+
+    def _made(self, count: int, alike: Prepared) -> WarpWorlds:
         made = WarpWorlds(self._library, self._device, self._first, self.bodies, self._hulls, count)
-        made.load(np.arange(count), [self._first] * count, np.tile(self._meshes, (count, 1)))
+        made.load(np.arange(count), [alike] * count, np.tile(self._meshes, (count, 1)))
         return made
 
     def _enter_hulls(self, world: Prepared) -> Array:

@@ -35,6 +35,36 @@ def put_back(
 
 
 @wp.kernel
+def count_contacts(
+    count: wp.array(dtype=wp.int32),
+    room: int,
+    worlds: wp.array(dtype=wp.int32),
+    found: wp.array(dtype=wp.int32),
+):
+    """How many contacts each world has."""
+    c = wp.tid()
+    if c < wp.min(count[0], room):
+        wp.atomic_add(found, worlds[c], 1)
+
+
+@wp.kernel
+def note_most(
+    found: wp.array(dtype=wp.int32),
+    contacts: wp.array(dtype=wp.int32),
+    pairs: wp.array(dtype=wp.int32),
+    room: int,
+    most: wp.array(dtype=wp.int32),
+    crowded: wp.array(dtype=wp.int32),
+):
+    """The most contacts so far of each world, and whether those of all worlds together lacked room."""
+    w = wp.tid()
+    most[w] = wp.max(most[w], found[w])
+    found[w] = 0
+    if contacts[0] > room or pairs[0] > room:
+        crowded[w] = 1
+
+
+@wp.kernel
 def note_depth(
     count: wp.array(dtype=wp.int32),
     room: int,

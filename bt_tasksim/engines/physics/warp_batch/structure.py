@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from types import ModuleType
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.mujoco_model import World
+from bt_tasksim.engines.physics.mujoco_timing import StepPlan
 from bt_tasksim.engines.physics.warp_batch.geoms import GeomTable
 from bt_tasksim.engines.physics.warp_batch.meshes import Hull
 from bt_tasksim.engines.physics.warp_batch.words import host_words
@@ -19,28 +20,8 @@ from bt_tasksim.engines.physics.warp_batch.words import host_words
 OUT_OF_IT = ("mesh_", "nmesh", "tex_", "ntex", "mat_", "vis_", "dof_length")
 """Fields of a model that are no part of its structure: hulls have their own store, looks do not matter, and
 lengths of degrees of freedom are for bodies that may fall asleep, which none here may."""
-
-
-@dataclass(frozen=True)
-class StepPlan:
-    """How a control period is stepped.
-
-    Attributes:
-        period: Seconds.
-        steps: Ordinary steps in it.
-        sensed: The last steps, in which forces are felt.
-        finer: Fine steps that an ordinary one becomes while something falls.
-    """
-
-    period: float
-    steps: int
-    sensed: int
-    finer: int
-
-    @property
-    def step(self) -> float:
-        """Seconds of an ordinary step."""
-        return self.period / self.steps
+APART = 100.0
+"""Metres to an object of a world in which nothing goes on, and from one to the next."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +45,15 @@ class Prepared:
     state: dict[str, Array]
     fields: dict[str, Array] = field(repr=False)
     key: bytes = b""
+
+
+def idle(first: Prepared) -> Prepared:
+    """A world of the same structure in which nothing goes on: its objects lie far apart, without weight."""
+    qpos = first.state["qpos"].view(np.float32).copy()
+    for k, (x, y, z) in enumerate(first.world.object_qpos[:, :3].tolist()):
+        qpos[[x, y, z]] = APART * (k + 1), 0.0, APART
+    state = first.state | {"qpos": qpos.view(np.int32)}
+    return replace(first, state=state | {"xfrc_applied": np.zeros_like(state["xfrc_applied"])})
 
 
 def prepare(library: ModuleType, world: World, timing: StepPlan, state: dict[str, Array]) -> Prepared:

@@ -11,22 +11,41 @@ import warp as wp
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.mujoco_model import BodyNumbers
 from bt_tasksim.engines.physics.warp_batch import kernels
 from bt_tasksim.engines.physics.warp_batch.meshes import HullStore
-from bt_tasksim.engines.physics.warp_batch.report import BodyNumbers, Columns
+from bt_tasksim.engines.physics.warp_batch.report import Columns
 from bt_tasksim.engines.physics.warp_batch.structure import Prepared
 from bt_tasksim.engines.physics.warp_batch.words import RowFields, copy, host_words, words, write
 
-GOING = ("qpos", "qvel", "qacc_warmstart")
-"""The part of a state that steps change."""
-STATE = (*GOING, "ctrl", "xfrc_applied", "geom_xpos", "geom_xmat", "overflow")
-"""A state, with what stands still in it, and whether it ever had too little room."""
-CONTACTS = (48, 32)
-"""Contacts that there is room for in each world, and more for each object beyond the first. The worlds of a
-group have this room in common."""
+GOING = ("qpos", "qvel", "qacc_warmstart", "overflow")
+"""The part of a state that steps change, and whether it ever had too little room."""
+STATE = (*GOING, "ctrl", "xfrc_applied", "geom_xpos", "geom_xmat")
+"""A state, with what stands still in it."""
+OVERFLOW = ("NEFC", "NJMAX_NNZ")
+"""What MuJoCo Warp says of a world that has too little room, as far as it says it of each world for itself.
+That the list of all contacts is full it says of all at once; here they are counted (see `CONTACTS`)."""
+CONTACTS = (64, 32)
+"""Contacts that each world may have, and more for each object beyond the first. In 48 episodes a scenario of
+one object has had 12 at most (`pick_and_place`), 31 (`grasp_fast_heavy`) and 38 (`pick_and_throw`, when a cup
+lands), so there is room for half as many again and more; a resting object has 4 or 5. One world of MuJoCo has
+as many (``data.ncon``), and needs fewer rows of constraints (81) than there are for these contacts."""
 ROWS = 5
 """Rows of constraints for each of these contacts: a finger's takes 4, one between objects 6. Besides them
 each joint has room for its limits and for following another one."""
+
+
+def room(share: int, count: int, pairs: int) -> int:
+    """Length of the list of all worlds' contacts, and of that of pairs which may touch.
+
+    The pairs of one world alone always fit.
+
+    Args:
+        share: Contacts that a world may have.
+        count: How many worlds.
+        pairs: Pairs of shapes in a world that can touch at all.
+    """
+    return share * count + pairs
 
 
 class WarpWorlds:
@@ -59,12 +78,17 @@ class WarpWorlds:
         self._loaded: set[str] = set()
         model, geoms = first.world.model, first.geoms
         self.n_objects, self.n_bodies = bodies.n_objects, bodies.n_objects + bodies.n_fixtures
-        contacts = CONTACTS[0] + CONTACTS[1] * max(self.n_objects - 1, 0)
+        self.share = CONTACTS[0] + CONTACTS[1] * max(self.n_objects - 1, 0)
+        kinds = library.OverflowType
+        self._overflow = sum(int(kinds[name]) for name in OVERFLOW)
         with wp.ScopedDevice(device):
             try:
                 self.model: Any = library.put_model(model)
                 self.data: Any = library.make_data(
-                    model, nworld=count, nconmax=contacts, njmax=ROWS * contacts + 2 * model.njnt
+                    model,
+                    nworld=count,
+                    naconmax=room(self.share, count, model.npair),
+                    njmax=ROWS * self.share + 2 * model.njnt,
                 )
             except (NotImplementedError, ValueError) as error:
                 raise InputError(f"MuJoCo Warp cannot simulate this world: {error}") from error
@@ -85,12 +109,13 @@ class WarpWorlds:
             self._distance = wp.zeros((n, things), dtype=wp.float32)
             self._support = wp.zeros((n, things * max(self.n_bodies, 1)), dtype=wp.float32)
             self._poses = wp.zeros((n, 7 * len(bodies.read)), dtype=wp.float32)
-            self._before = {name: wp.clone(words(getattr(self.data, name))) for name in GOING}
-        self._words = {name: words(getattr(self.data, name)) for name in GOING}
-        self.state = RowFields(
-            {name: getattr(self.data, name) for name in STATE}
-            | {"deepest": self.deepest, "deepest_pair": self.deepest_pair}
-        )
+            self._found, self._most = wp.zeros(n, dtype=wp.int32), wp.zeros(n, dtype=wp.int32)
+            self._crowded = wp.zeros(n, dtype=wp.int32)
+            noted = {"deepest": self.deepest, "deepest_pair": self.deepest_pair}
+            changing = {name: getattr(self.data, name) for name in GOING} | noted
+            self._words = {name: words(array) for name, array in changing.items()}
+            self._before = {name: wp.clone(array) for name, array in self._words.items()}
+        self.state = RowFields({name: getattr(self.data, name) for name in STATE} | noted)
         self.own: dict[str, wp.array] = {}
         """Fields of the model that have a row for each world."""
         self._reported = {
@@ -105,6 +130,8 @@ class WarpWorlds:
             "deepest": words(self.deepest),
             "deepest_pair": words(self.deepest_pair),
             "overflow": words(self.data.overflow),
+            "most": words(self._most),
+            "crowded": words(self._crowded),
         }
         self.columns = Columns.of({name: array.shape[1] for name, array in self._reported.items()})
         self._report = wp.zeros((count, self.columns.width), dtype=wp.int32, device=device)
@@ -188,6 +215,26 @@ class WarpWorlds:
         self._run("feel", self._feel)
         return self._end()
 
+    def undo(self) -> None:
+        """All worlds are as they were before the last period or look."""
+        for name, before in self._before.items():
+            wp.copy(self._words[name], before)
+
+    def crowded(self, reports: Array) -> bool:
+        """Whether the list of all worlds' contacts, or of pairs that may touch, was too short in a period.
+
+        Some are lacking then, of whichever worlds: nothing of that period counts.
+
+        Args:
+            reports: What was read then ``(k, columns)``, of one world at least.
+        """
+        return bool(self.columns.integers(reports, "crowded").any())
+
+    def full(self, reports: Array) -> Array:
+        """Which worlds ``(k,)`` had more contacts than their share, or constraints than rows for them."""
+        over = self.columns.integers(reports, "overflow")[:, 0] & self._overflow
+        return (over != 0) | (self.columns.integers(reports, "most")[:, 0] > self.share)
+
     def _begin(self, rows: Array, step: float) -> None:
         if self._version != self._hulls.version:
             self._hulls.attach(self.model)
@@ -221,12 +268,12 @@ class WarpWorlds:
 
     def _step(self) -> None:
         self._library.step(self.model, self.data)
-        self._note_depth()
+        self._note_contacts()
 
     def _start(self) -> None:
         for name, before in self._before.items():
             wp.copy(before, self._words[name])
-        for array in (self._tips, self._hand, self._felt, self._sample):
+        for array in (self._tips, self._hand, self._felt, self._sample, self._most, self._crowded):
             array.zero_()
 
     def _finish(self) -> None:
@@ -236,7 +283,7 @@ class WarpWorlds:
         model, data, table = self.model, self.data, self._table
         self._library.kinematics(model, data)
         self._library.collision(model, data)
-        self._note_depth()
+        self._note_contacts()
         self._distance.fill_(float("inf"))
         self._support.zero_()
         self._launch(
@@ -268,10 +315,16 @@ class WarpWorlds:
         data, contact = self.data, self.data.contact
         return data.nacon, data.naconmax, contact.dist, contact.geom, contact.worldid
 
-    def _note_depth(self) -> None:
-        found = (*self._contacts(), self._table["judged"], self._going, self.deepest)
-        self._launch(kernels.note_depth, self.data.naconmax, *found)
-        self._launch(kernels.note_deepest_pair, self.data.naconmax, *found, self.deepest_pair)
+    def _note_contacts(self) -> None:
+        """How many there are, and the deepest."""
+        data = self.data
+        worlds, found = data.contact.worldid, self._found
+        self._launch(kernels.count_contacts, data.naconmax, data.nacon, data.naconmax, worlds, found)
+        counts = (found, data.nacon, data.ncollision, data.naconmax)
+        self._launch(kernels.note_most, self.count, *counts, self._most, self._crowded)
+        touching = (*self._contacts(), self._table["judged"], self._going, self.deepest)
+        self._launch(kernels.note_depth, data.naconmax, *touching)
+        self._launch(kernels.note_deepest_pair, data.naconmax, *touching, self.deepest_pair)
 
     def _feel(self) -> None:
         """Take the forces of the last step."""

@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import functools
+import importlib
 import os
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import Scene
 
 pytest.importorskip("mujoco_warp", reason="MuJoCo Warp is not installed: pip install 'bt-tasksim[warp]'")
+warp_worlds = importlib.import_module("bt_tasksim.engines.physics.warp_batch.worlds")
 
 PERIODS = 40
 CLOSING, LIFTING = 8, 28
@@ -250,6 +252,64 @@ def test_a_world_that_fails_does_so_alone():
     assert batch.errors == [None] * 3
     assert_same(batch.state(rows), 0, warp().states[2], HELD)
     assert_same(batch.state(rows), 2, warp().states[1], RESTING)
+
+
+FEW = 6
+"""Contacts that a box on the table is far from, and one that is held is not."""
+
+
+def until_full(shown):
+    """Some of the cases side by side, and when those that were too full failed."""
+    configurations, targets = cases()
+    batch, rows = batch_of("mujoco_warp", len(shown)), np.arange(len(shown))
+    batch.reset(rows, [configurations[k] for k in shown])
+    failed = {}
+    for k in range(CLOSING):
+        step(batch, rows, targets[list(shown), k])
+        for row in rows[[error is not None for error in batch.errors]].tolist():
+            failed.setdefault(shown[row], (k, str(batch.errors[row])))
+    return batch, failed
+
+
+@pytest.mark.parametrize("crowded", [False, True])
+def test_a_world_with_too_many_contacts_fails_alone_as_in_company(monkeypatch, crowded):
+    monkeypatch.setattr(warp_worlds, "CONTACTS", (FEW, 0))
+    if crowded:  # the list of all contacts is too short, too: periods are done anew in smaller groups
+        monkeypatch.setattr(
+            warp_worlds, "room", lambda share, n, pairs: share * n - 2 if n > 1 else share + pairs
+        )
+    _, alone = until_full((HELD,))
+    assert alone.keys() == {HELD} and 0 < alone[HELD][0] < CLOSING and "too many" in alone[HELD][1]
+    for shown in ((RESTING,), (RESTING, HELD), (HELD, RESTING, RESTING), (PUSHED, HELD, RESTING)):
+        batch, failed = until_full(shown)
+        assert failed == (alone if HELD in shown else {}), shown
+        for row, case in enumerate(shown):
+            if case != HELD:
+                assert_same(batch.state(np.arange(len(shown))), row, warp().states[CLOSING], case)
+                assert_same(batch.hidden(np.arange(len(shown))), row, warp().hidden[CLOSING], case)
+
+
+def test_a_world_that_was_too_full_does_not_go_on_until_it_begins_anew(monkeypatch):
+    monkeypatch.setattr(warp_worlds, "CONTACTS", (FEW, 0))
+    configurations, targets = cases()
+    batch, _ = until_full((HELD, RESTING))
+    batch.errors[0] = None
+    step(batch, np.zeros(1, int), targets[[HELD], CLOSING])
+    assert isinstance(batch.errors[0], MachineError) and batch.simulated[0].deepest_pair is not None
+    batch.reset(np.zeros(1, int), [configurations[RESTING]])
+    step(batch, np.zeros(1, int), targets[[RESTING], 0])
+    assert batch.errors == [None, None]
+    assert_same(batch.state(np.arange(2)), 0, warp().states[1], RESTING)
+
+
+def test_a_world_that_begins_too_full_fails_at_once():
+    cup = scene("cup").sample(1)
+    batch, rows = batch_of("mujoco_warp", 2), np.arange(2)
+    batch.reset(rows, [lifted(cup, -0.01), cup])  # sunk into the table with all its pieces
+    assert isinstance(batch.errors[0], MachineError) and batch.errors[1] is None
+    state = batch.state(rows)
+    step(batch, rows, state.joint_position)
+    assert batch.errors[1] is None and batch.state(rows).time[1] > 0.0
 
 
 def test_one_world_plays_the_role():

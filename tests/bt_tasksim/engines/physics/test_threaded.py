@@ -12,7 +12,8 @@ from physics_cases import PHYSICS, Still, lifted, runner_of, scene
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.world import JointTarget
 from bt_tasksim.engines.base import EngineSetup, PhysicsEngine
-from bt_tasksim.engines.physics.threaded import ONE, Layout
+from bt_tasksim.engines.physics.layout import Layout, wider_support
+from bt_tasksim.engines.physics.single import ONE
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.scene import Scene
@@ -226,6 +227,8 @@ def test_objects_and_fixtures_have_their_columns():
         (2, 0, 1),
         (2, 1, 2),
     }
+    alone = Layout(np.array([1]), objects=1, fixtures=2).support([{(0, 1), (0, 2)}])
+    assert np.array_equal(wider_support(alone, 1, layout.objects, layout.fixtures), support[:1])
 
 
 @pytest.mark.parametrize("engine", ENGINES)
