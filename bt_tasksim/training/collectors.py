@@ -22,8 +22,8 @@ ResultT = TypeVar("ResultT")
 
 LENGTH = 64.0
 """Decisions that an episode is thought to have before any has ended."""
-SPARE = 0.25
-"""Episodes that are begun beyond those that are thought to do: where one was too few, worlds stand idle."""
+LACK = 0.25
+"""Share of an episode that may be thought to lack before one more begins: else much would go to waste."""
 NOISE = 64
 """Decisions for which noise is drawn at a time."""
 
@@ -227,11 +227,12 @@ class RolloutCollector(Collector[EnvironmentRollout]):
     def next(self) -> Collecting | None:
         """See `Collector.next`."""
         length = self._before / self._front if self._front else self._task.length
+        others = self._episodes[self._front :]
         expected = self._before + sum(
-            len(episode.rewards) if episode.over else max(length, len(episode.rewards))
-            for episode in self._episodes[self._front :]
+            len(episode.rewards) if episode.over else max(length, len(episode.rewards)) for episode in others
         )
-        if self._episodes and expected >= self._task.decisions + SPARE * length:
+        going = any(not episode.over for episode in others)
+        if going and expected >= self._task.decisions - LACK * length:
             return None
         self._episodes.append(RolloutEpisode(self._task, len(self._episodes), self.network.outputs))
         return self._episodes[-1]
