@@ -2,12 +2,13 @@
 
 ManiSkill's ``PickCube-v1`` is measured in turns with them, in a process of its own. Every control step of
 every world counts, those included in which things come to rest, and so does what it takes to begin an
-episode: worlds go on for ever, each with the next seed when its episode has ended. With one thread a step's
-time is then split into PhysX's own steps, the rest of stepping (drives, the overlaps that are looked for
-between the steps, rolling resistance), the beginning of episodes (draws, scenes), and what is outside
-physics: reading states, observations, the tree, concepts and kinematics. With ``--processes 2`` each has a
-batch of its own, and ManiSkill is measured at its best on as many: one process, or several
-(``SubprocVecEnv``).
+episode. A round is an evaluation, two episodes a world from the first step to the last. Then worlds go on
+for ever, each with the next seed when its episode has ended, so that they are at all leaves of the tree at
+once (`mixed`), which costs more: the time of a step is split there into PhysX's own steps, the rest of
+stepping (drives, the overlaps that are looked for between the steps, rolling resistance), the beginning of
+episodes (draws, scenes), and what is outside physics: reading states, observations, the tree, concepts and
+kinematics. With ``--processes 2`` each has a batch of its own, and ManiSkill is measured at its best on as
+many: one process, or several (``SubprocVecEnv``).
 """
 
 from __future__ import annotations
@@ -32,7 +33,13 @@ OUTSIDE_US = {1: 1200.0, 64: 110.0, 256: 70.0}
 """At most so many microseconds a control step and world are outside physics, by worlds."""
 RATIO = {1: 4.3, 2: 7.0}
 """At least so many times ManiSkill's control steps per second, by cores."""
-COLUMNS = (("physics_us", 10), ("stepping_us", 10), ("beginning_us", 11), ("outside_us", 10))
+COLUMNS = (
+    ("mixed_per_s", 8),
+    ("physics_us", 10),
+    ("stepping_us", 10),
+    ("beginning_us", 11),
+    ("outside_us", 10),
+)
 PEER_STEPS = 1000
 
 
@@ -54,17 +61,17 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     )
     print("the code before batches took 180 to 211 us, see docs/batches.md")
     print(
-        f"{'worlds':>8}{'steps/s':>10}{'ratio':>8}{'physics':>10}{'stepping':>10}{'beginning':>11}"
+        f"{'worlds':>8}{'steps/s':>10}{'ratio':>8}{'mixed':>8}{'physics':>10}{'stepping':>10}{'beginning':>11}"
         f"{'outside':>10}{'bar':>7}"
     )
     try:
         for worlds in WORLDS:
-            found = out[str(worlds)] = _measured(worlds, options, peer)
+            found = out[str(worlds)] = measured(worlds, options, peer)
             ratio = f"{found['ratio']:8.2f}" if "ratio" in found else f"{'':>8}"
             print(
                 f"{worlds:8}{found['steps_per_s']:10.0f}{ratio}"
                 + "".join(
-                    f"{found[name]:{width}.1f}" if name in found else " " * width for name, width in COLUMNS
+                    f"{found[name]:{width}.0f}" if name in found else " " * width for name, width in COLUMNS
                 )
                 + f"{OUTSIDE_US[worlds]:7.0f}",
                 flush=True,
@@ -79,29 +86,43 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
 
 
 class Episodes:
-    """A batch of worlds that goes on for ever: each world takes the next seed when its episode has ended.
+    """A batch of worlds in which episodes run.
 
     Args:
         worlds: How many.
         threads: How many threads step them.
-        first: The first seed.
     """
 
-    def __init__(self, worlds: int, threads: int, first: int) -> None:
+    def __init__(self, worlds: int, threads: int) -> None:
         source = load_source("pick_and_place")
         self.runner = BatchRunner(source.build, source.scene, worlds=worlds, threads=threads)
-        self._episodes = self.runner.run(itertools.count(first))
+        self._for_ever: Iterator[Any] | None = None
+
+    def whole(self, seeds: range) -> int:
+        """Run all episodes of these seeds; how many control steps they had."""
+        before = self.runner.control_steps
+        for _ in self.runner.run(seeds):
+            pass
+        return self.runner.control_steps - before
 
     def go_on(self, steps: int) -> int:
-        """Go on by so many control steps at least, of all worlds together; how many they were."""
+        """Go on by so many control steps at least: a world takes the next seed when its episode has ended."""
+        if self._for_ever is None:
+            self._for_ever = self.runner.run(itertools.count())
         before = self.runner.control_steps
         while self.runner.control_steps < before + steps:
-            next(self._episodes)
+            next(self._for_ever)
         return self.runner.control_steps - before
 
 
-def play(kept: Episodes, shares: Sequence[int], /) -> Iterator[tuple[int, int]]:
-    """Go on by so many control steps; what they were."""
+def whole(kept: Episodes, shares: Sequence[range], /) -> Iterator[tuple[int, int]]:
+    """Episodes of some seeds: their control steps."""
+    for index, seeds in enumerate(shares):
+        yield index, kept.whole(seeds)
+
+
+def go_on(kept: Episodes, shares: Sequence[int], /) -> Iterator[tuple[int, int]]:
+    """Go on by so many control steps; how many they were."""
     for index, steps in enumerate(shares):
         yield index, kept.go_on(steps)
 
@@ -112,24 +133,35 @@ def split(kept: Episodes, shares: Sequence[int], /) -> Iterator[tuple[int, dict[
         yield index, _split(kept, steps)
 
 
-def _measured(worlds: int, options: argparse.Namespace, peer: Peer) -> dict[str, float]:
-    """Medians over rounds, both sides in turns, and then where the time goes."""
+def measured(worlds: int, options: argparse.Namespace, peer: Peer, apart: bool = True) -> dict[str, float]:
+    """Medians over rounds, both sides in turns; ``apart``: and then where the time goes."""
     processes, threads = options.processes, options.threads
-    steps, rows = 150 * max(worlds, 16), []
-    with Workers(partial(Episodes, worlds, threads, 0), processes, "spawn") as fleet:
-        list(fleet.spread(play, [2 * steps] * processes))  # the worlds' episodes begin at unlike times by now
-        for _ in range(2 if options.quick else 7):
-            started = time.perf_counter()
-            done = sum(n for _, n in fleet.spread(play, [steps] * processes))
-            rows.append({"steps_per_s": done / (time.perf_counter() - started)})
+    episodes, steps, rows = max(2 * worlds, 8), 150 * max(worlds, 16), []
+    with Workers(partial(Episodes, worlds, threads), processes, "spawn") as fleet:
+        list(fleet.spread(whole, [range(2)] * processes))  # whatever is made but once
+        for k in range(2 if options.quick else 5):
+            first = k * processes * episodes
+            seeds = [range(first + n * episodes, first + (n + 1) * episodes) for n in range(processes)]
+            rows.append({"steps_per_s": _rate(fleet.spread(whole, seeds))})
             if not peer.missing:
                 best = max(rate(PEER_STEPS) for rate in _ways(peer, max(threads, processes)))
                 rows[-1] |= {"peer_steps_per_s": best, "ratio": rows[-1]["steps_per_s"] / best}
         found = {name: statistics.median(row[name] for row in rows) for name in rows[0]}
+        list(
+            fleet.spread(go_on, [2 * steps] * processes)
+        )  # the worlds' episodes begin at unlike times by now
+        rates = [_rate(fleet.spread(go_on, [steps] * processes)) for _ in range(1 if options.quick else 3)]
+        found["mixed_per_s"] = statistics.median(rates)
         if threads > 1:  # PhysX's steps overlap: only the whole is told
             return found
         parts = [part for _, part in fleet.spread(split, [steps] * processes)]
     return found | {name: statistics.fmean(part[name] for part in parts) for name in parts[0]}
+
+
+def _rate(found: Iterator[tuple[int, int]]) -> float:
+    """Control steps per second of what the processes do together."""
+    started = time.perf_counter()
+    return sum(steps for _, steps in found) / (time.perf_counter() - started)
 
 
 def _ways(peer: Peer, cores: int) -> list[Callable[[int], float]]:

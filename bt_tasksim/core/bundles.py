@@ -30,9 +30,14 @@ def parts(bundle: Any) -> dict[str, Any] | None:
 def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
     """A bundle like the first one, whose arrays are made by ``function`` from those of all of them."""
     first = bundles[0]
-    inner = parts(first)
+    if hasattr(first, "dtype"):
+        return function(*bundles)
+    named = isinstance(first, tuple) and hasattr(first, "_fields")
+    if named and all(type(b) is type(first) for b in bundles):
+        return type(first)(*(mapped(function, *each) for each in zip(*bundles, strict=True)))
     if first is None or isinstance(first, str):
         return first
+    inner = parts(first)
     if inner is None:
         return function(*bundles)
     others = [parts(b) or {} for b in bundles]
