@@ -67,10 +67,10 @@ class Row:
 
 
 ROWS = (
-    Row("steps_1", "`grasp_then_pick`, control periods, 1 process of 64 worlds", "1/s"),
+    Row("steps_1", "`grasp_then_pick`, control periods, 1 process", "1/s"),
     Row("peer_steps_1", "ManiSkill `PickCube-v1`, the same", "1/s"),
     Row("steps_ratio_1", "ratio", digits=2, bar="at least 3"),
-    Row("steps_2", "`grasp_then_pick`, control periods, 2 processes of 64 worlds", "1/s"),
+    Row("steps_2", "`grasp_then_pick`, control periods, 2 processes", "1/s"),
     Row("peer_steps_2", "ManiSkill `PickCube-v1`, the same (SubprocVecEnv)", "1/s"),
     Row("steps_ratio_2", "ratio", digits=2, bar="at least 3"),
     Row("decisions_1", "decisions, 1 process", "1/s"),
