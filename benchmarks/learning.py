@@ -94,7 +94,7 @@ class Kept:
 
     def __init__(self) -> None:
         self._envs = EpisodeVectorEnv(grasp_then_pick.build(), grasp_then_pick.scene(), WORLDS, stage=2)
-        self._network = untrained(self._envs.batch.robot)
+        self._network = untrained(self._envs.batch.scene.robot)
         self._seed = 0
         self._actions: list[list[Array]] = []
         worlds, self._periods = self._envs.batch.worlds, 0
