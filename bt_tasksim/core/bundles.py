@@ -64,13 +64,44 @@ def merged(whole: Any, rows: Array, new: Any, worlds: int) -> Any:
         worlds: How many there are in all.
 
     Raises:
-        InputError: The worlds do not fit together, since their arrays have unlike shapes.
+        InputError: The worlds do not fit together, since their parts are of unlike kinds, or their arrays of
+            unlike types or shapes.
     """
+    if whole is not None:
+        _check_alike(whole, new)
     if len(rows) == worlds:
         return new
     if whole is None:
         return mapped(lambda values: _spread(values, rows, worlds), new)
     return mapped(lambda before, values: _replaced(before, rows, values), whole, new)
+
+
+def _check_alike(before: Any, now: Any, name: str = "") -> None:
+    """Check that a bundle is made as it was before: an array of other numbers would be cut, a text kept.
+
+    Raises:
+        InputError: It is not.
+    """
+    kind, kept = getattr(now, "dtype", None), getattr(before, "dtype", None)
+    if kind is not None and kept is not None and kind == kept:
+        return
+    inner = None if kind is not None else parts(now)
+    old = None if inner is None or kept is not None else parts(before)
+    if inner is not None and old is not None and inner.keys() == old.keys():
+        for part, value in inner.items():
+            _check_alike(old[part], value, f"{name}.{part}" if name else part)
+    elif inner is not None or kind is not None or kept is not None or before != now:
+        raise InputError(
+            f"a memory is of one kind in all worlds and at all ticks, but {name or 'it'} is {_kind(before)} "
+            f"at first and {_kind(now)} then: make it the same in begin and in advance"
+        )
+
+
+def _kind(value: Any) -> str:
+    if hasattr(value, "dtype"):
+        return f"an array of {value.dtype}"
+    inner = parts(value)
+    return repr(value) if inner is None else f"a {type(value).__name__} of {', '.join(inner) or 'nothing'}"
 
 
 def _spread(values: Array, rows: Array, worlds: int) -> Array:
