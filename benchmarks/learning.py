@@ -4,8 +4,9 @@
     python -m benchmarks.learning --quick
 
 1. Environment steps per second without a learner: ``grasp_then_pick``, whole episodes with resets and what
-   follows, against ManiSkill's ``PickCube-v1``; both with actions that were decided beforehand, 100 Hz
-   physics and 20 Hz control, one step being one control period; in one process and in two.
+   follows, in an `EpisodeVectorEnv` of 64 worlds, against ManiSkill's ``PickCube-v1``; both with actions that
+   were decided beforehand, 100 Hz physics and 20 Hz control, one step being one control period; in one and in
+   two processes.
 2. Transitions per second that a learner gets: our `train` with two workers against stable-baselines3 PPO on
    ``PickCube-v1`` with the same network, rollout, minibatch and epochs, the better of one process and two. A
    transition of ours is a decision: control periods before the approach and during the pick come on top.
@@ -18,11 +19,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import statistics
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,14 +34,19 @@ from benchmarks.peer_maniskill import Peer
 from benchmarks.success import RESULTS
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.core.files import write_text
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.workers import Workers
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import LearnedPolicy, load_policy
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.env import EpisodeEnv
+from bt_tasksim.training.vector_env import EpisodeVectorEnv
 from bt_tasksim.trees.scenarios import grasp_then_pick
 
-ROLLOUT_STEPS = 256
-"""Decisions of an environment."""
+WORLDS = 64
+"""Worlds of a process, where there is no learner."""
+DECISIONS = 128
+"""Decisions of each that are kept, some two episodes."""
 DEVIATION = 0.165
 """Standard deviation of the noise on the actions, as in the middle of a training."""
 
@@ -73,99 +78,104 @@ ROWS = (
     Row("learned", "transitions while training, 2 workers", "1/s"),
     Row("peer_learned_1", "stable-baselines3 on `PickCube-v1`, 1 process (DummyVecEnv)", "1/s"),
     Row("peer_learned_2", "stable-baselines3 on `PickCube-v1`, 2 processes (SubprocVecEnv)", "1/s"),
-    Row("learned_ratio", "ratio to the better one", digits=2, bar="at least 2"),
+    Row("learned_ratio", "ratio to the better one", digits=2, bar="at least 5"),
     Row("network_us", "decision, network alone", "us", 1, "at most 30"),
     Row("decision_us", "decision, features and network", "us", 1),
     Row("torch_difference", "largest difference to torch", digits=-1, bar="at most 1e-5"),
 )
 
 
-class Ours:
-    """``grasp_then_pick`` in processes of its own, as `Peer` is, with actions that were decided beforehand.
+class Kept:
+    """Worlds of ``grasp_then_pick``, and what was decided in them beforehand.
 
-    An environment is run once with the reference policy and noise, and its actions are kept; the same worlds
-    with the same actions are the same episodes, and those are timed.
+    They are run once with a simple policy and noise, and its actions are kept; the same worlds with the same
+    actions are the same episodes, and those are timed.
     """
 
     def __init__(self) -> None:
-        self._workers: list[tuple[Any, Any]] = []
-        self._environment = 0
+        self._envs = EpisodeVectorEnv(grasp_then_pick.build(), grasp_then_pick.scene(), WORLDS, stage=2)
+        self._network = untrained(self._envs.batch.scene.robot)
+        self._seed = 0
+        self._actions: list[list[Array]] = []
+        worlds, self._periods = self._envs.batch.worlds, 0
+        step = worlds.step
 
-    def rate(self, processes: int, n_envs: int) -> tuple[float, float]:
-        """Control periods and decisions per second; `ROLLOUT_STEPS` decisions of each environment."""
-        context = multiprocessing.get_context("fork")
-        while len(self._workers) < processes:
-            mine, theirs = context.Pipe()
-            process = context.Process(target=_serve, args=(theirs,), daemon=True)
-            process.start()
-            theirs.close()
-            self._workers.append((mine, process))
-        pipes = [pipe for pipe, _ in self._workers[:processes]]
-        for pipe in pipes:
-            pipe.send(range(self._environment, self._environment + n_envs))
-            self._environment += n_envs
-        for pipe in pipes:
-            pipe.recv()
-        started = time.perf_counter()
-        for pipe in pipes:
-            pipe.send("again")
-        periods = sum(pipe.recv() for pipe in pipes)
-        spent = time.perf_counter() - started
-        return periods / spent, processes * n_envs * ROLLOUT_STEPS / spent
+        def counted(tool: Any, hand: Any, rows: Array) -> Any:
+            self._periods += len(rows)
+            return step(tool, hand, rows)
+
+        worlds.step = counted  # type: ignore[method-assign]
+
+    def decide(self, seed: int) -> None:
+        """Choose the actions of episodes whose worlds are drawn with a seed."""
+        self._seed, self._actions = seed, [[] for _ in range(WORLDS)]
+        rng = np.random.default_rng(seed)
+        noise = rng.normal(0.0, DEVIATION, (WORLDS, DECISIONS, Grasp.actions + 1)).astype(np.float32)
+        noise[..., -1] = 0.0
+
+        def action(row: int, output: Array) -> Array:
+            self._actions[row].append(np.clip(output + noise[row, len(self._actions[row])], -1.0, 1.0))
+            return self._actions[row][-1]
+
+        def decide(rows: list[int], seen: Array) -> Array:
+            return np.stack([action(*both) for both in zip(rows, self._network(seen), strict=True)])
+
+        self._play(decide)
+
+    def again(self) -> tuple[int, int, float]:
+        """The same once more: control periods, decisions and seconds, until a world has had its last one."""
+        done = [0] * WORLDS
+
+        def next_of(row: int) -> Array:
+            done[row] += 1
+            return self._actions[row][done[row] - 1]
+
+        self._periods, started = 0, time.perf_counter()
+        self._play(lambda rows, _: np.stack([next_of(row) for row in rows]))
+        return self._periods, sum(done), time.perf_counter() - started
+
+    def _play(self, decide: Callable[[list[int], Array], Array]) -> None:
+        """Go on until a world has had all its decisions."""
+        most = [0] * WORLDS
+        self._envs.begin(np.arange(WORLDS), self._seed * WORLDS)
+        while max(most) < DECISIONS:
+            rows, ready = self._envs.recv()
+            self._envs.send(rows, decide(rows.tolist(), ready.features))
+            for row in rows.tolist():
+                most[row] += 1
+
+
+def decide(kept: Kept, seeds: Sequence[int], /) -> Iterator[tuple[int, None]]:
+    """Work for a fleet: choose the actions of episodes."""
+    for index, seed in enumerate(seeds):
+        yield index, kept.decide(seed)
+
+
+def again(kept: Kept, numbers: Sequence[int], /) -> Iterator[tuple[int, tuple[int, int, float]]]:
+    """Work for a fleet: control periods, decisions and seconds of the same once more."""
+    for index in range(len(numbers)):
+        yield index, kept.again()
+
+
+class Ours:
+    """Processes with worlds of ``grasp_then_pick``, as `Peer` is one with ManiSkill's."""
+
+    def __init__(self) -> None:
+        self._fleets = {processes: Workers(Kept, processes) for processes in (1, 2)}
+        self._seed = 0
+
+    def rate(self, processes: int) -> tuple[float, float]:
+        """Control periods and decisions per second, of all processes together."""
+        fleet, seeds = self._fleets[processes], range(self._seed, self._seed + processes)
+        self._seed += processes
+        list(fleet.spread(decide, seeds))  # each process takes one
+        found = [result for _, result in fleet.spread(again, seeds)]
+        return sum(n / t for n, _, t in found), sum(n / t for _, n, t in found)
 
     def close(self) -> None:
         """End the processes."""
-        for pipe, process in self._workers:
-            pipe.close()
-            process.join(timeout=10.0)
-            if process.is_alive():
-                process.kill()
-
-
-def _serve(pipe: Any) -> None:
-    """Decide n_envs, and run them again and count their control periods, until nobody asks any more."""
-    env = EpisodeEnv(grasp_then_pick.build(), grasp_then_pick.scene(), stage=2)
-    network, periods, step = untrained(env.scene.robot), [0], env.batch.worlds.step
-
-    def counted(tool: Any, hand: Any, rows: Any) -> Any:
-        periods[0] += 1
-        return step(tool, hand, rows)
-
-    env.batch.worlds.step = counted  # type: ignore[method-assign]
-    n_envs: list[list[tuple[int, list[Any]]]] = []
-    while True:
-        try:
-            asked = pipe.recv()
-        except EOFError:
-            return
-        if asked != "again":
-            n_envs = [decided(env, network, environment) for environment in asked]
-        periods[0] = 0
-        if asked == "again":
-            for episodes in n_envs:
-                for seed, actions in episodes:
-                    env.reset(seed=seed)
-                    for action in actions:
-                        env.step(action)
-        pipe.send(periods[0])
-
-
-def decided(env: EpisodeEnv, network: Network, environment: int) -> list[tuple[int, list[Any]]]:
-    """The episodes of an environment: their seeds, and the actions of the network with noise."""
-    rng = np.random.default_rng((0, environment))
-    noise = rng.normal(0.0, DEVIATION, (ROLLOUT_STEPS, Grasp.actions + 1)).astype(np.float32)
-    noise[:, -1] = 0.0
-    episodes: list[tuple[int, list[Any]]] = []
-    over = True
-    for row in noise:
-        if over:
-            episodes.append((int(rng.integers(2**31)), []))
-            features, _ = env.reset(seed=episodes[-1][0])
-        action = np.clip(network(features) + row, -1.0, 1.0)
-        episodes[-1][1].append(action)
-        features, _, terminated, truncated, _ = env.step(action)
-        over = terminated or truncated
-    return episodes
+        for fleet in self._fleets.values():
+            fleet.close()
 
 
 def ours_learn(rollouts: int, config: TrainConfig) -> float:
@@ -189,18 +199,19 @@ def ours_learn(rollouts: int, config: TrainConfig) -> float:
     return len(rates) / sum(1.0 / rate for rate in rates)
 
 
-def throughput(rounds: int, n_envs: int, peer: Peer) -> dict[str, float]:
+def throughput(rounds: int, steps: int, peer: Peer) -> dict[str, float]:
     """Steps without a learner, in turns."""
     ours = Ours()
     table: dict[str, list[float]] = {}
     try:
-        ours.rate(1, 1)
+        for processes in (1, 2):
+            ours.rate(processes)
         for _ in range(rounds):
             for processes in (1, 2):
-                periods, decisions = ours.rate(processes, n_envs)
+                periods, decisions = ours.rate(processes)
                 _note(table, **{f"steps_{processes}": periods, f"decisions_{processes}": decisions})
                 if not peer.missing:
-                    other = peer.steps(processes, 150 * n_envs * processes)
+                    other = peer.steps(processes, steps * processes)
                     _note(table, **{f"peer_steps_{processes}": other})
                     _note(table, **{f"steps_ratio_{processes}": periods / other})
     finally:
@@ -295,7 +306,7 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"ManiSkill PickCube-v1 did not start: {peer.missing}")
         try:
             if "steps" in parts:
-                found |= throughput(3 if quick else 7, 2 if quick else 8, peer)
+                found |= throughput(1 if quick else 7, 300 if quick else 1200, peer)
             if "learning" in parts:
                 found |= learning(1 if quick else 3, 1 if quick else 3, peer)
         finally:

@@ -179,21 +179,34 @@ class BatchWorlds(Worlds):
 
     def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> dict[int, BtTasksimError]:
         """See `Worlds.reset`."""
-        failed: dict[int, BtTasksimError] = {}
-        placed = []
-        for row, configuration in zip(rows.tolist(), configurations, strict=True):
-            if configuration.hand_start:
-                try:
-                    joints = self._arm.joints_of_hand_start(configuration.hand_start)
-                except BtTasksimError as error:
-                    failed[row], joints = error, ()
-                configuration = replace(configuration, joint_position=joints)
-            placed.append(configuration)
+        placed, failed = self._placed(rows, configurations)
         self.physics.reset(rows, placed)
         self.kinematics.reset(rows, placed)
         self._perception.reset(rows, placed)
         self._tool[rows], self._hand[rows] = np.nan, np.nan
         return failed | self.errors(rows)
+
+    def _placed(
+        self, rows: Array, configurations: Sequence[ActorConfiguration]
+    ) -> tuple[list[ActorConfiguration], dict[int, BtTasksimError]]:
+        """Worlds with the joints that bring the hand to where it is to begin; why some have none, by row."""
+        placed = list(configurations)
+        asked = [k for k, configuration in enumerate(placed) if configuration.hand_start]
+        if not asked:
+            return placed, {}
+        robot = self._robot
+        failed: dict[int, BtTasksimError] = {}
+        starts = np.array([placed[k].hand_start for k in asked])
+        poses = np.stack([robot.pointing_down(start[:3], start[3]) for start in starts])
+        arms, failures = self._arm.batch.joints_at(poses)
+        for i, k in enumerate(asked):
+            joints: tuple[float, ...] = ()
+            if (error := failures.error(i)) is not None:
+                failed[int(rows[k])] = error
+            else:
+                joints = tuple(np.concatenate([arms[i], robot.hand_open]).tolist())
+            placed[k] = replace(placed[k], joint_position=joints)
+        return placed, failed
 
     def errors(self, rows: Array) -> dict[int, BtTasksimError]:
         """See `Worlds.errors`."""

@@ -1,7 +1,7 @@
 """What environments bring back: the tasks, and what asks for their episodes and takes note of them.
 
-A collector runs whole episodes in one world and does not know whose it is: so what it brings back depends on
-its task alone.
+A collector does not know whose worlds its episodes run in, nor how many at a time: what it brings back
+depends on its task alone.
 """
 
 from __future__ import annotations
@@ -19,6 +19,13 @@ from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import split_action
 
 ResultT = TypeVar("ResultT")
+
+LENGTH = 64.0
+"""Decisions that an episode is thought to have before any has ended."""
+LACK = 0.25
+"""Share of an episode that may be thought to lack before one more begins: else much would go to waste."""
+NOISE = 64
+"""Decisions for which noise is drawn at a time."""
 
 
 class Begin(NamedTuple):
@@ -103,6 +110,8 @@ class RolloutTask:
         seed: Of draws and noise.
         decisions: How many.
         stage: Number of the scene's stage that worlds are drawn from; None: the scene itself.
+        length: Decisions that an episode is thought to have: as many are begun side by side as will do, and
+            what comes of it does not depend on that.
     """
 
     network: dict[str, Array]
@@ -110,9 +119,10 @@ class RolloutTask:
     seed: tuple[int, ...]
     decisions: int
     stage: int | None = None
+    length: float = LENGTH
 
     def collector(self) -> RolloutCollector:
-        """What is to be done, step by step."""
+        """What is to be done, episode by episode."""
         return RolloutCollector(self)
 
 
@@ -129,12 +139,47 @@ class DrawTask:
     draw: int
 
     def collector(self) -> DrawCollector:
-        """What is to be done, step by step."""
+        """What is to be done, episode by episode."""
         return DrawCollector(self)
 
 
+class Collecting(abc.ABC):
+    """An episode that is collected, in whichever world."""
+
+    @abc.abstractmethod
+    def begin(self) -> Begin:
+        """Which episode it is."""
+
+    @abc.abstractmethod
+    def began(self, redrawn: int) -> None:
+        """It has begun, after so many draws without one."""
+
+    @abc.abstractmethod
+    def action(self, features: Array, output: Array) -> Array:
+        """What is decided ``(m,)`` where features ``(n,)`` are seen, and the network says ``(m,)``."""
+
+    @abc.abstractmethod
+    def paid(self, features: Array, reward: float, ending: Mapping[str, Any] | None, truncated: bool) -> None:
+        """What the decision paid, and the features ``(n,)`` after it.
+
+        Args:
+            features: What is seen next; at an end what was seen last.
+            reward: What was paid.
+            ending: What is said of the episode, where it is over.
+            truncated: It was cut off.
+        """
+
+    @abc.abstractmethod
+    def failed(self, error: Exception) -> None:
+        """There is no such episode.
+
+        Raises:
+            Exception: The error, unless it is known what to make of it.
+        """
+
+
 class Collector(abc.ABC, Generic[ResultT]):
-    """A row of episodes in a world, which asks for each next step; whose world it is does not matter.
+    """Collects what a task asks for, from one episode or several, of which some may go on side by side.
 
     Args:
         network: Arrays of the policy's network.
@@ -147,38 +192,17 @@ class Collector(abc.ABC, Generic[ResultT]):
         self.network = Network.from_arrays(network)
 
     @abc.abstractmethod
-    def begin(self) -> Begin | None:
-        """The next episode; None: it is done."""
+    def next(self) -> Collecting | None:
+        """An episode that should begin by now; None: those that go on should do."""
 
     @abc.abstractmethod
-    def began(self, redrawn: int) -> None:
-        """An episode has begun, after so many draws without one."""
+    def counts(self, episode: Collecting) -> bool:
+        """Whether an episode that goes on may still have something to do with the result."""
 
+    @property
     @abc.abstractmethod
-    def action(self, features: Array, output: Array) -> Array:
-        """What is decided ``(m,)`` where features ``(n,)`` are seen, and the network says ``(m,)``."""
-
-    @abc.abstractmethod
-    def paid(self, features: Array, reward: float, ending: Mapping[str, Any] | None, truncated: bool) -> bool:
-        """What the decision paid, and the features ``(n,)`` after it.
-
-        Args:
-            features: What is seen next; at an end what was seen last.
-            reward: What was paid.
-            ending: What is said of the episode, where it is over.
-            truncated: It was cut off.
-
-        Returns:
-            The collector is done, though the episode may go on.
-        """
-
-    def failed(self, error: Exception) -> None:
-        """There is no episode.
-
-        Raises:
-            Exception: The error, unless the collector knows what to make of it.
-        """
-        raise error
+    def done(self) -> bool:
+        """There is a result, though episodes may go on."""
 
     @abc.abstractmethod
     def result(self) -> ResultT:
@@ -186,7 +210,9 @@ class Collector(abc.ABC, Generic[ResultT]):
 
 
 class RolloutCollector(Collector[EnvironmentRollout]):
-    """An environment of a rollout.
+    """An environment of a rollout: its first episodes in a row, as many decisions of them as it has.
+
+    Each episode has draws and noise of its own, so that several may go on side by side.
 
     Args:
         task: Which.
@@ -195,64 +221,140 @@ class RolloutCollector(Collector[EnvironmentRollout]):
     def __init__(self, task: RolloutTask) -> None:
         super().__init__(task.network)
         self._task = task
-        rng, n = np.random.default_rng(task.seed), self.network.outputs
-        self._noise = rng.standard_normal((task.decisions, n)).astype(np.float32) * task.std
-        self._draws: list[int] = rng.integers(2**31, size=task.decisions + 1).tolist()
-        self._features: list[Array] = []
-        self._actions: list[Array] = []
-        self._rewards: list[float] = []
-        self._starts, self._over = [True], True
-        self._cut: list[Array] = []
-        self._cut_at: list[int] = []
-        self._ends: list[EpisodeEnd] = []
-        self._total, self._length, self._redrawn = 0.0, 0, 0
+        self._episodes: list[RolloutEpisode] = []
+        self._front, self._before = 0, 0  # of the episodes that are over, and so are all before them
 
-    def begin(self) -> Begin | None:
-        """See `Collector.begin`."""
-        if len(self._rewards) == self._task.decisions:
+    def next(self) -> Collecting | None:
+        """See `Collector.next`."""
+        length = self._before / self._front if self._front else self._task.length
+        others = self._episodes[self._front :]
+        expected = self._before + sum(
+            len(episode.rewards) if episode.over else max(length, len(episode.rewards)) for episode in others
+        )
+        going = any(not episode.over for episode in others)
+        if going and expected >= self._task.decisions - LACK * length:
             return None
-        return Begin(self._draws[len(self._ends)], None, "training", self._task.stage)
+        self._episodes.append(RolloutEpisode(self._task, len(self._episodes), self.network.outputs))
+        return self._episodes[-1]
 
-    def began(self, redrawn: int) -> None:
-        """See `Collector.began`."""
-        self._redrawn += redrawn
+    def counts(self, episode: Collecting) -> bool:
+        """See `Collector.counts`."""
+        assert isinstance(episode, RolloutEpisode)
+        others = self._episodes[self._front : episode.number]
+        before = self._before + sum(len(other.rewards) for other in others)
+        return not episode.over and before < self._task.decisions
 
-    def action(self, features: Array, output: Array) -> Array:
-        """See `Collector.action`."""
-        action = output + self._noise[len(self._rewards)]
-        self._features.append(features)
-        self._actions.append(action)
-        bounded: Array = np.minimum(np.maximum(action, -1.0), 1.0)
-        return bounded
-
-    def paid(self, features: Array, reward: float, ending: Mapping[str, Any] | None, truncated: bool) -> bool:
-        """See `Collector.paid`."""
-        k = len(self._rewards)
-        last, over = k == self._task.decisions - 1, ending is not None
-        self._rewards.append(reward)
-        self._total, self._length = self._total + reward, self._length + 1
-        if truncated or (last and not over):
-            self._cut.append(features)
-            self._cut_at.append(k)
-        if ending is not None:
-            end = EpisodeEnd(bool(ending["is_success"]), self._length, self._total, countable(ending))
-            self._ends.append(end)
-            self._total, self._length = 0.0, 0
-        self._starts.append(over)
-        return last
+    @property
+    def done(self) -> bool:
+        """See `Collector.done`; an error that an episode began with comes out when its turn has come."""
+        while self._front < len(self._episodes) and self._before < self._task.decisions:
+            episode = self._episodes[self._front]
+            if episode.error is not None:
+                raise episode.error
+            if not episode.over:
+                return self._before + len(episode.rewards) >= self._task.decisions
+            self._before += len(episode.rewards)
+            self._front += 1
+        return self._before >= self._task.decisions
 
     def result(self) -> EnvironmentRollout:
         """See `Collector.result`."""
+        left, parts = self._task.decisions, []
+        cut: list[Array] = []
+        cut_at: list[int] = []
+        for episode in self._episodes:
+            n = min(len(episode.rewards), left)
+            if n == 0:
+                break
+            parts.append((episode, n))
+            left -= n
+            whole = episode.over and n == len(episode.rewards)
+            if not whole or episode.truncated:
+                cut.append(episode.features[n] if n < len(episode.features) else episode.after)
+                cut_at.append(self._task.decisions - left - 1)
         return EnvironmentRollout(
-            features=np.array(self._features, np.float32),
-            actions=np.array(self._actions, np.float32),
-            rewards=np.array(self._rewards, np.float32),
-            starts=np.array(self._starts[:-1]),
-            cut=np.array(self._cut, np.float32).reshape(len(self._cut), self.network.inputs),
-            cut_at=np.array(self._cut_at, np.int64),
-            ends=self._ends,
-            redrawn=self._redrawn,
+            features=np.array([row for e, n in parts for row in e.features[:n]], np.float32),
+            actions=np.array([row for e, n in parts for row in e.actions[:n]], np.float32),
+            rewards=np.array([paid for e, n in parts for paid in e.rewards[:n]], np.float32),
+            starts=np.array([k == 0 for _, n in parts for k in range(n)]),
+            cut=np.array(cut, np.float32).reshape(len(cut), self.network.inputs),
+            cut_at=np.array(cut_at, np.int64),
+            ends=[e.end for e, n in parts if e.end is not None and n == len(e.rewards)],
+            redrawn=sum(e.redrawn for e, _ in parts),
         )
+
+
+class RolloutEpisode(Collecting):
+    """An episode of an environment, with noise on what is decided.
+
+    Args:
+        task: The environment.
+        number: Which one of its episodes.
+        outputs: Size of what is decided, m.
+
+    Attributes:
+        number: Which one.
+        features: Of each decision ``(n,)``.
+        actions: As drawn ``(m,)``, before they were cut off.
+        rewards: What each has paid.
+        after: Features after the last decision.
+        end: How it ended; None: it goes on.
+        truncated: It was cut off.
+        redrawn: How many draws had no episode.
+        error: Why there is none.
+    """
+
+    def __init__(self, task: RolloutTask, number: int, outputs: int) -> None:
+        self.number = number
+        self._task, self._outputs = task, outputs
+        self._rng = np.random.default_rng((*task.seed, number))
+        self._seed = int(self._rng.integers(2**31))
+        self._noise: Array = np.zeros((0, outputs), np.float32)
+        self.features: list[Array] = []
+        self.actions: list[Array] = []
+        self.rewards: list[float] = []
+        self.after: Array = np.zeros(0, np.float32)
+        self.end: EpisodeEnd | None = None
+        self.truncated = False
+        self.redrawn = 0
+        self.error: Exception | None = None
+
+    @property
+    def over(self) -> bool:
+        """It has ended, or there is none."""
+        return self.end is not None or self.error is not None
+
+    def begin(self) -> Begin:
+        """See `Collecting.begin`."""
+        return Begin(self._seed, None, "training", self._task.stage)
+
+    def began(self, redrawn: int) -> None:
+        """See `Collecting.began`."""
+        self.redrawn = redrawn
+
+    def action(self, features: Array, output: Array) -> Array:
+        """See `Collecting.action`."""
+        at = len(self.rewards) % NOISE
+        if at == 0:
+            noise = self._rng.standard_normal((NOISE, self._outputs)).astype(np.float32)
+            self._noise = noise * self._task.std
+        action = output + self._noise[at]
+        self.features.append(features)
+        self.actions.append(action)
+        bounded: Array = np.minimum(np.maximum(action, -1.0), 1.0)
+        return bounded
+
+    def paid(self, features: Array, reward: float, ending: Mapping[str, Any] | None, truncated: bool) -> None:
+        """See `Collecting.paid`."""
+        self.rewards.append(reward)
+        self.after, self.truncated = features, truncated
+        if ending is not None:
+            total = sum(self.rewards)
+            self.end = EpisodeEnd(bool(ending["is_success"]), len(self.rewards), total, countable(ending))
+
+    def failed(self, error: Exception) -> None:
+        """See `Collecting.failed`: it is raised when the episodes before are over, if it counts at all."""
+        self.error = error
 
 
 class DrawCollector(Collector[DrawResult]):
@@ -264,38 +366,69 @@ class DrawCollector(Collector[DrawResult]):
 
     def __init__(self, task: DrawTask) -> None:
         super().__init__(task.network)
-        self._draw, self._nearer = task.draw, 0.0
-        self._result: DrawResult | None = None
+        self._task = task
+        self._episode: DrawEpisode | None = None
 
-    def begin(self) -> Begin | None:
-        """See `Collector.begin`."""
-        return None if self._result is not None else Begin(self._draw, self._draw, "validation", None)
+    def next(self) -> Collecting | None:
+        """See `Collector.next`."""
+        if self._episode is not None:
+            return None
+        self._episode = DrawEpisode(self._task.draw, self.network.signal_std)
+        return self._episode
 
-    def began(self, redrawn: int) -> None:
-        """See `Collector.began`."""
+    def counts(self, episode: Collecting) -> bool:
+        """See `Collector.counts`."""
+        return not self.done
 
-    def action(self, features: Array, output: Array) -> Array:
-        """See `Collector.action`."""
-        motion, done = split_action(output, self.network.signal_std)
-        self._nearer += float(done)
-        return np.append(motion, 1.0 if self._nearer >= 1.0 else -1.0)
-
-    def paid(self, features: Array, reward: float, ending: Mapping[str, Any] | None, truncated: bool) -> bool:
-        """See `Collector.paid`."""
-        if ending is not None:
-            self._result = DrawResult(self._draw, bool(ending["is_success"]), countable(ending))
-        return ending is not None
-
-    def failed(self, error: Exception) -> None:
-        """See `Collector.failed`: a draw may have no episode."""
-        if not isinstance(error, InputError):
-            raise error
-        self._result = DrawResult(self._draw, False, str(error))
+    @property
+    def done(self) -> bool:
+        """See `Collector.done`."""
+        return self._episode is not None and self._episode.result is not None
 
     def result(self) -> DrawResult:
         """See `Collector.result`."""
-        assert self._result is not None, "it is not done"
-        return self._result
+        assert self._episode is not None and self._episode.result is not None, "it is not done"
+        return self._episode.result
+
+
+class DrawEpisode(Collecting):
+    """The episode of a held-apart draw, without noise.
+
+    Args:
+        draw: The seed of its world.
+        signal_std: Std of the completion signal's noise, see `bt_tasksim.policy.policy.done_share`.
+
+    Attributes:
+        result: What came of it; None: it goes on.
+    """
+
+    def __init__(self, draw: int, signal_std: float) -> None:
+        self._draw, self._signal_std, self._nearer = draw, signal_std, 0.0
+        self.result: DrawResult | None = None
+
+    def begin(self) -> Begin:
+        """See `Collecting.begin`."""
+        return Begin(self._draw, self._draw, "validation", None)
+
+    def began(self, redrawn: int) -> None:
+        """See `Collecting.began`."""
+
+    def action(self, features: Array, output: Array) -> Array:
+        """See `Collecting.action`."""
+        motion, done = split_action(output, self._signal_std)
+        self._nearer += float(done)
+        return np.append(motion, 1.0 if self._nearer >= 1.0 else -1.0)
+
+    def paid(self, features: Array, reward: float, ending: Mapping[str, Any] | None, truncated: bool) -> None:
+        """See `Collecting.paid`."""
+        if ending is not None:
+            self.result = DrawResult(self._draw, bool(ending["is_success"]), countable(ending))
+
+    def failed(self, error: Exception) -> None:
+        """See `Collecting.failed`: a draw may have no episode."""
+        if not isinstance(error, InputError):
+            raise error
+        self.result = DrawResult(self._draw, False, str(error))
 
 
 def countable(info: Mapping[str, Any]) -> str:

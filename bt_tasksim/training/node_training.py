@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import logging
+import math
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
@@ -35,9 +36,10 @@ from bt_tasksim.training.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
-from bt_tasksim.training.collectors import DrawResult, DrawTask, EnvironmentRollout, RolloutTask
+from bt_tasksim.training.collectors import LENGTH, DrawResult, DrawTask, EnvironmentRollout, RolloutTask
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.episode_batch import EpisodeBatch, why_alone_in
+from bt_tasksim.training.evaluation import usual_batch
 from bt_tasksim.training.keepers import KeeperElsewhere, Keeping
 from bt_tasksim.training.learning_leaves import shared_layout
 from bt_tasksim.training.named_tree import NamedTree
@@ -130,7 +132,7 @@ class NodeTraining:
         task, reward = self.task, self.config.reward
         members = min(task.workers, self.config.n_envs)
         alone = why_alone_in(task.tree, task.scene, task.options)
-        worlds = 1 if alone else -(-self.config.n_envs // members)
+        worlds = 1 if alone else self._worlds(members)
         keeping = Keeping(self.node.name, task.options, reward, self.trained, worlds)
 
         def make() -> EpisodeBatch:
@@ -153,6 +155,14 @@ class NodeTraining:
             return self._learn(Here(kept), resume, report)
         finally:
             kept.close()
+
+    def _worlds(self, members: int) -> int:
+        """How many worlds a member of the fleet has: as many as it has use and room for."""
+        config = self.config
+        episodes = -(-config.n_envs // members) * math.ceil(config.n_steps / LENGTH + 1.0)
+        draws = -(-config.evaluation_draws // members)
+        here = 1 if self.task.cluster is not None else members
+        return min(max(episodes, draws), usual_batch(self.task.options, here))
 
     def _learn(
         self, pool: Fleet[EpisodeBatch], resume: bool, report: Callable[[Progress], None] | None
@@ -220,8 +230,11 @@ class NodeTraining:
     ) -> list[EnvironmentRollout]:
         arrays, std = learner.network.arrays(), learner.std
         stage = self.stage if self.task.scene.stages else None
+        length = (self.history[-1]["length"] if self.history else 0.0) or LENGTH
         tasks = [
-            RolloutTask(arrays, std, (self.config.seed, int(warm), self.iteration, k), decisions, stage)
+            RolloutTask(
+                arrays, std, (self.config.seed, int(warm), self.iteration, k), decisions, stage, length
+            )
             for k in range(self.config.n_envs)
         ]
         return results(pool, tasks, self._members)

@@ -1,7 +1,8 @@
 """Episodes collected in batches of worlds, the same whatever their size and the number of processes.
 
-A rollout is a fixed number of environments. Each runs its own episodes for a fixed number of decisions, with
-its own seeds, in a world of its own beside others: so what it comes to does not depend on these.
+A rollout is a fixed number of environments, each of which is a row of episodes with a fixed number of
+decisions in all. Every episode has its own seeds, in a world of its own beside others, so it does not matter
+when and where it runs: those of one environment go on side by side, too.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from bt_tasksim.core.fleet import Fleet
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
-from bt_tasksim.training.collectors import Collector, DrawTask, RolloutTask
+from bt_tasksim.training.collectors import Collecting, Collector, DrawTask, RolloutTask
 from bt_tasksim.training.episode_batch import Draws, EpisodeBatch
 
 AnyTask = RolloutTask | DrawTask
@@ -36,64 +37,68 @@ class TaskShare:
 
 
 def in_batch(batch: EpisodeBatch, tasks: Sequence[AnyTask], /) -> Iterator[tuple[int, Any]]:
-    """Do tasks in the worlds of a batch: each world takes the next one when it has done one.
+    """Do tasks in the worlds of a batch: each that is free takes an episode of the task that is next in turn.
 
     Yields:
         The index of a task and its result, as they are done; these depend on nothing but the task.
     """
-    waiting = iter(enumerate(tasks))
-    collectors: dict[int, tuple[int, Collector[Any]]] = {}
+    collectors: dict[int, Collector[Any]] = {}
     networks: dict[int, Network] = {}  # by the identity of their arrays, of which tasks share one
-    done: list[tuple[int, Any]] = []
+    for index, task in enumerate(tasks):
+        collectors[index] = task.collector()
+        collectors[index].network = networks.setdefault(id(task.network), collectors[index].network)
+    free = list(range(batch.count))[::-1]
+    going: dict[int, tuple[int, Collecting]] = {}  # by world: a task and an episode of it
 
-    def next_task(row: int) -> None:
-        """A world takes the next task, if there is one."""
-        collectors.pop(row, None)
-        for index, task in waiting:
-            collector = task.collector()
-            collector.network = networks.setdefault(id(task.network), collector.network)
-            collectors[row] = index, collector
-            if next_episode(row):
-                return
+    def begin() -> None:
+        """Begin episodes as long as there are worlds, one of each task, and then the next ones."""
+        wanting = list(collectors)
+        while free and wanting:
+            for index in wanting.copy():
+                episode = collectors[index].next() if free else None
+                if episode is None:
+                    wanting.remove(index)
+                    continue
+                row, wanted = free.pop(), episode.begin()
+                going[row] = index, episode
+                rng = np.random.default_rng(wanted.seed)
+                batch.begin(row, Draws(rng, wanted.draw, wanted.stream, wanted.stage))
 
-    def next_episode(row: int) -> bool:
-        """The collector of a world goes on, or is done."""
-        index, collector = collectors[row]
-        wanted = collector.begin()
-        if wanted is None:
-            done.append((index, collector.result()))
-            return False
-        rng = np.random.default_rng(wanted.seed)
-        batch.begin(row, Draws(rng, wanted.draw, wanted.stream, wanted.stage))
-        return True
-
-    for row in range(batch.count):
-        next_task(row)
     try:
+        begin()
         while collectors:
             asked: list[tuple[int, Array]] = []
+            touched: set[int] = set()
             for event in batch.go_on():
-                row, (_, collector) = event.row, collectors[event.row]
-                over = event.ending is not None or event.error is not None
+                index, episode = going[event.row]
+                touched.add(index)
                 if event.error is not None:
-                    collector.failed(event.error)
+                    episode.failed(event.error)
                 elif event.paid is None:
-                    collector.began(event.redrawn)
+                    episode.began(event.redrawn)
                 else:
                     reward = sum(event.paid.values())
                     said = None if event.ending is None else event.ending.info(event.paid)
                     truncated = event.ending is not None and event.ending.truncated
-                    over = collector.paid(event.features, reward, said, truncated) or over
-                if not over:
-                    asked.append((row, event.features))
-                elif not next_episode(row):
-                    batch.leave(row)
-                    next_task(row)
-            yield from done
-            done.clear()
-            _decide(batch, collectors, asked)
+                    episode.paid(event.features, reward, said, truncated)
+                if event.error is None and event.ending is None:
+                    asked.append((event.row, event.features))
+            for index in sorted(touched):
+                if collectors[index].done:
+                    yield index, collectors.pop(index).result()
+            left = [
+                row
+                for row, (index, episode) in going.items()
+                if index in touched and not (index in collectors and collectors[index].counts(episode))
+            ]
+            for row in left:
+                batch.leave(row)
+                del going[row]
+            free += sorted(left, reverse=True)
+            _decide(batch, going, collectors, [(row, seen) for row, seen in asked if row in going])
+            begin()
     finally:
-        for row in collectors:
+        for row in going:
             batch.leave(row)
 
 
@@ -121,18 +126,20 @@ def results(fleet: Fleet[EpisodeBatch], tasks: Sequence[AnyTask], members: int) 
 
 def _decide(
     batch: EpisodeBatch,
-    collectors: Mapping[int, tuple[int, Collector[Any]]],
+    going: Mapping[int, tuple[int, Collecting]],
+    collectors: Mapping[int, Collector[Any]],
     asked: Sequence[tuple[int, Array]],
 ) -> None:
     """Decide in all worlds ``asked``, each with what it sees: one call for each network."""
-    groups: dict[int, list[tuple[int, Array]]] = {}
+    groups: dict[int, tuple[Network, list[tuple[int, Array]]]] = {}
     for row, features in asked:
-        groups.setdefault(id(collectors[row][1].network), []).append((row, features))
-    for group in groups.values():
+        network = collectors[going[row][0]].network
+        groups.setdefault(id(network), (network, []))[1].append((row, features))
+    for network, group in groups.values():
         rows = np.array([row for row, _ in group])
-        outputs = collectors[group[0][0]][1].network(np.stack([features for _, features in group]))
+        outputs = network(np.stack([features for _, features in group]))
         actions = [
-            collectors[row][1].action(features, output)
+            going[row][1].action(features, output)
             for (row, features), output in zip(group, outputs, strict=True)
         ]
         batch.decide(rows, np.stack(actions))

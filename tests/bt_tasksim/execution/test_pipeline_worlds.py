@@ -58,6 +58,29 @@ def test_it_is_a_batch_of_one():
         assert all(a.shape == b.shape and np.array_equal(a, b) for a, b in zip(one, other, strict=True))
 
 
+def test_a_batch_may_begin_with_some_of_its_worlds():
+    """And hands that begin somewhere are placed as in a world of one, though all at once."""
+    drawn = {row: SOURCE.scene.sample(row, "training", 1) for row in (0, 2, 3)}
+    assert all(world.hand_start for world in drawn.values())
+    batch = worlds_for(ROBOT, EngineOptions(), 4, 1)
+    expected = {}
+    for row, world in drawn.items():
+        one = PipelineWorlds(ROBOT, build_pipeline(ROBOT, EngineOptions()))
+        assert one.reset(ONE, [world]) == {}
+        expected[row] = observed(one.observe(ONE))
+        one.close()
+    for rows in ([0, 2], [3]):
+        assert batch.reset(np.array(rows), [drawn[row] for row in rows]) == {}
+        found = observed(batch.observe(np.array(rows)))
+        assert all(len(array) == 4 for array in found)
+        for row in rows:
+            assert all(
+                np.array_equal(a[row], b[0], equal_nan=True)
+                for a, b in zip(found, expected[row], strict=True)
+            )
+    batch.close()
+
+
 def test_engines_without_a_batch_have_one_world():
     options = EngineOptions(perception="camera")
     worlds = worlds_for(ROBOT, options, 1, 1)

@@ -111,7 +111,7 @@ def test_two_actors_learn_what_one_process_does_also_after_one_was_killed(named,
     monkeypatch.setenv("ONE_ACTOR_DIES", os.path.abspath("killed"))
     with pytest.warns(BtTasksimWarning, match="an actor on .* ended"):
         learn("p", workers=2, cluster="local", source=named, resume=True)
-    assert Path("killed").read_text() == "2", "half of three environments, side by side"
+    assert Path("killed").read_text() == "4", "half of three environments, two episodes of each side by side"
     assert left("p") == left("alone")
 
 

@@ -331,7 +331,7 @@ def test_what_cannot_be_trained_is_refused_before_it_begins(tmp_path):
 def test_it_learns_what_pays(tmp_path):
     """A signal in time, before the tool has strayed: three centimetres are near enough.
 
-    In one of three trainings at least.
+    In one of three trainings at least; all do that were tried, as long as they go on exploring.
     """
     assert any(learns(tmp_path, seed) for seed in (1, 2, 3))
 
@@ -340,7 +340,8 @@ def learns(tmp_path, seed):
     """Whether a training's return rises."""
     config = TrainConfig(
         n_envs=4, n_steps=64, steps=4 * 64 * 10, epochs=8, minibatch=64, hidden=(16,), learning_rate=3e-3,
-        terminate_bias=0.0, log_std=-0.7, evaluate_every=0, evaluation_draws=0, seed=seed,
+        terminate_bias=-0.3, log_std=-0.7, final_log_std=-0.7, evaluate_every=0, evaluation_draws=0,
+        seed=seed,
     )  # fmt: skip
     scene = dataclasses.replace(SCENE, stages=(CurriculumStage("easy", tolerance=3.0),))
     out = tmp_path / f"p{seed}"

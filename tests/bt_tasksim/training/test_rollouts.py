@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import toys
 from toys import SCENE, Check, Even, Raise, Unprogrammed, alone
 
 from bt_tasksim.core.errors import InputError
@@ -10,7 +11,7 @@ from bt_tasksim.policy.network import Network
 from bt_tasksim.training.collectors import DrawTask, RolloutTask
 from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.episode_batch import EpisodeBatch
-from bt_tasksim.training.rollouts import results
+from bt_tasksim.training.rollouts import in_batch, results
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.nodes.train import Train
 
@@ -29,8 +30,8 @@ def kept(tree=None, worlds=1):
     return make(tree, EpisodeBatch, worlds=worlds)
 
 
-def environment(number, decisions=40, network=UP, std=0.3, stage=None):
-    return RolloutTask(network, np.full(2, std, np.float32), (7, number), decisions, stage)
+def environment(number, decisions=40, network=UP, std=0.3, stage=None, **settings):
+    return RolloutTask(network, np.full(2, std, np.float32), (7, number), decisions, stage, **settings)
 
 
 def as_bytes(found):
@@ -83,6 +84,64 @@ def test_environments_are_the_same_whatever_the_workers_and_their_order(maker):
     back = run(tasks[::-1], 2)
     assert [back[k] for k in range(5)] == [here[4 - k] for k in range(5)]
     assert len({row["features"] for row in here.values()}) == 5, "and no two are alike"
+
+
+@pytest.mark.parametrize("length", [1.0, 20.0, 1000.0])
+def test_how_long_episodes_are_thought_to_be_changes_nothing(maker, length):
+    expected = [as_bytes(alone(maker(), environment(k))) for k in range(2)]
+    tasks = [environment(k, length=length) for k in range(2)]
+    for worlds in (1, 7):
+        found = dict(in_batch(kept(worlds=worlds), tasks))
+        assert [as_bytes(found[k]) for k in range(2)] == expected
+
+
+def test_episodes_of_one_environment_go_on_side_by_side(maker):
+    batch = kept(sequence("s", Train(Raise()), Check()), worlds=8)
+    ((_, found),) = in_batch(batch, [environment(0, decisions=100, length=12.0)])
+    (worlds,) = toys.Worlds.made
+    assert len(found.features) == 100 and max(worlds.sizes) == 8
+    assert len(worlds.sizes) < 60, "of them one after the other there would be more than 100"
+    assert len(batch.waiting) == 0, "those that go on beyond are left"
+
+
+def played(episode, decisions, ends=True):
+    """An episode of so many decisions, in no world; the number is what is seen, decided and paid."""
+    assert episode.begin().stream == "training"
+    episode.began(0)
+    for k in range(decisions):
+        episode.action(np.full(3, k, np.float32), np.zeros(2, np.float32))
+        said = {"is_success": True} if ends and k == decisions - 1 else None
+        episode.paid(np.full(3, k + 1, np.float32), float(k), said, False)
+
+
+def test_an_episode_that_ran_on_is_cut_where_the_environment_ends():
+    collector = environment(0, decisions=10, length=4.0).collector()
+    first, second, third = (collector.next() for _ in range(3))
+    played(second, 9, ends=False)
+    played(third, 3)
+    assert not collector.done and collector.counts(first) and collector.counts(second)
+    assert collector.counts(third) is False, "what it has to come after may yet be enough, and it is over"
+    played(first, 4)
+    assert collector.done
+    found = collector.result()
+    assert found.rewards.tolist() == [0, 1, 2, 3, 0, 1, 2, 3, 4, 5]
+    assert np.flatnonzero(found.starts).tolist() == [0, 4]
+    assert found.cut_at.tolist() == [9] and found.cut.tolist() == [[6.0, 6.0, 6.0]]
+    assert [end.decisions for end in found.ends] == [4]
+
+
+def test_an_episode_that_there_is_not_is_an_error_only_where_it_counts():
+    for decisions, raised in ((8, False), (9, True)):
+        collector = environment(0, decisions=decisions, length=4.0).collector()
+        first, second = collector.next(), collector.next()
+        second.failed(InputError("there is none"))
+        assert not collector.done
+        played(first, 8)
+        if raised:
+            with pytest.raises(InputError, match="there is none"):
+                _ = collector.done
+        else:
+            assert collector.done and len(collector.result().rewards) == 8
 
 
 def test_held_apart_draws_are_judged_without_noise_and_apart(maker):

@@ -155,7 +155,7 @@ def test_an_episode_is_pulled_up_by_no_other(batch_of):
     batch = batch_of(simple(), worlds=4)
     batched(batch, [task(k) for k in range(4)])
     (worlds,) = toys.Worlds.made
-    assert sum(worlds.sizes) / len(worlds.sizes) > 3.5
+    assert sum(worlds.sizes) / len(worlds.sizes) > 3.0, "but for the end"
 
 
 @pytest.mark.parametrize(

@@ -315,20 +315,24 @@ def play(env: Any, decide: Any, seed: int | None = 0) -> tuple[list[float], bool
 def alone(env: Any, task: Any) -> Any:
     """The result of a task of `bt_tasksim.training.collectors`, in an environment of its own."""
     collector = task.collector()
-    try:
-        while (wanted := collector.begin()) is not None:
-            env.stream, env.stage = wanted.stream, wanted.stage
-            draw = {} if wanted.draw is None else {"draw": wanted.draw}
+    while not collector.done:
+        episode = collector.next()
+        wanted = episode.begin()
+        env.stream, env.stage = wanted.stream, wanted.stage
+        draw = {} if wanted.draw is None else {"draw": wanted.draw}
+        try:
             features, info = env.reset(seed=wanted.seed, options=draw)
-            collector.began(info["redrawn"])
-            over = False
-            while not over:
-                action = collector.action(features, collector.network(features))
-                features, reward, terminated, truncated, info = env.step(action)
-                ended = terminated or truncated
-                over = collector.paid(features, reward, info if ended else None, truncated) or ended
-    except InputError as error:
-        collector.failed(error)
+        except InputError as error:
+            episode.failed(error)
+            continue
+        episode.began(info["redrawn"])
+        over = False
+        while not over:
+            action = episode.action(features, collector.network(features))
+            features, reward, terminated, truncated, info = env.step(action)
+            ended = terminated or truncated
+            episode.paid(features, reward, info if ended else None, truncated)
+            over = ended or collector.done
     return collector.result()
 
 
