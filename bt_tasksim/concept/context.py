@@ -19,7 +19,8 @@ from bt_tasksim.core.errors import CommandConflictError, LeafError
 from bt_tasksim.core.facts import FactsTable, WorldFacts
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.plain import shown
-from bt_tasksim.core.poses import Array, array_namespace, host
+from bt_tasksim.core.poses import Array, array_namespace, constant, host
+from bt_tasksim.core.transfer import Index, sent
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.robot.description import RobotDescription
 
@@ -54,8 +55,8 @@ class Written:
     hand: Array | None
 
     def of_world(self, world: int) -> Command:
-        """The command of one world, by its row: a part is None where nobody wrote it."""
-        parts = (None if part is None else part[world] for part in (self.tool, self.hand))
+        """The command of one world, by its row, in NumPy: a part is None where nobody wrote it."""
+        parts = (None if part is None else host(part[world, ...]) for part in (self.tool, self.hand))
         return Command(*(None if part is None or np.isnan(part[0]) else part for part in parts))
 
 
@@ -65,13 +66,17 @@ class Context:
     Args:
         robot: The robot that the tree commands.
         worlds: In how many worlds the tree is ticked.
+        like: An array of the library, type and device in which concepts are computed, and in which
+            observations come and commands go; by default NumPy. Numbers of worlds, clocks, and who wrote what
+            are NumPy's in any case.
     """
 
-    def __init__(self, robot: RobotDescription, worlds: int = 1) -> None:
+    def __init__(self, robot: RobotDescription, worlds: int = 1, like: Array | None = None) -> None:
         self.robot = robot
         self.worlds = worlds
+        self.like: Array = np.empty(0) if like is None else like
         self.rows: Array = np.arange(worlds)
-        self._facts = FactsTable(worlds)
+        self._facts = FactsTable(worlds, self.like)
         self._observation: Observation | None = None
         self.hidden: Callable[[], Hidden | None] = lambda: None
         """Asks for the hidden state ``(N, ...)``; None where nobody knows it."""
@@ -80,7 +85,7 @@ class Context:
         self.refused: dict[int, Refusal] = {}
         """By world."""
         self._held: dict[tuple[str, str], Array] = {}
-        self._parts = {"tool": _Part("tool", worlds), "hand": _Part("hand", worlds)}
+        self._parts = {name: _Part(name, worlds, self.like) for name in ("tool", "hand")}
 
     @property
     def now(self) -> float:
@@ -133,7 +138,7 @@ class Context:
                 middle of a tick.
         """
         self._observation = observation
-        self.times = observation.time
+        self.times = host(observation.time)
         rows = self.rows if rows is None else rows
         for part in self._parts.values():
             part.clear(rows)
@@ -202,20 +207,20 @@ class Context:
 
         Args:
             rows: Which ``(k,)``, ascending.
-            elapsed: Seconds ``(k,)`` since the concept became active.
+            elapsed: Seconds ``(k,)`` since the concept became active, in NumPy.
         """
-        observation, facts = self.observation, self.world
+        observation, facts, (since,) = self.observation, self.world, sent([elapsed], self.like)
         if len(rows) == self.worlds:
-            return Seen(observation, facts, self.robot, elapsed)
-        picked: Observation = Rows(observation, lambda values: values[rows])  # type: ignore[assignment]
-        return Seen(picked, self._facts.taken(rows), self.robot, elapsed)
+            return Seen(observation, facts, self.robot, since)
+        picked: Observation = Rows(observation, Index(rows).of)  # type: ignore[assignment]
+        return Seen(picked, self._facts.taken(rows), self.robot, since)
 
 
 class _Part:
     """One part of the command: the targets of all worlds, and which leaf wrote each."""
 
-    def __init__(self, name: str, worlds: int) -> None:
-        self._name, self._worlds = name, worlds
+    def __init__(self, name: str, worlds: int, like: Array) -> None:
+        self._name, self._worlds, self._like = name, worlds, like
         self._leaves: list[Behaviour] = []
         self._by: Array = np.full(worlds, NOBODY)
         self._values: Array | None = None
@@ -226,8 +231,7 @@ class _Part:
         if len(rows) == self._worlds:
             self._leaves, self._by, self._values = [], np.full(self._worlds, NOBODY), None
             return
-        self._values = array_namespace(self._values).asarray(self._values, copy=True)
-        self._values[rows], self._by[rows] = np.nan, NOBODY
+        self._forget(rows)
 
     def writer(self, world: int) -> Behaviour | None:
         number = int(self._by[world])
@@ -246,7 +250,7 @@ class _Part:
                 self._values = xp.full(shape, np.nan, dtype=values.dtype, device=values.device)
             width = max(self._values.shape[-1], values.shape[-1])
             self._values, values = _widened(self._values, width), _widened(values, width)
-            self._values[rows] = values
+            Index(rows).put(self._values, values)
         if leaf not in self._leaves:
             self._leaves.append(leaf)
         self._by[rows] = self._leaves.index(leaf)
@@ -255,8 +259,12 @@ class _Part:
         if leaf not in self._leaves or self._values is None:
             return
         mine = rows[self._by[rows] == self._leaves.index(leaf)]
+        self._forget(mine)
+
+    def _forget(self, rows: Array) -> None:
         self._values = array_namespace(self._values).asarray(self._values, copy=True)
-        self._values[mine], self._by[mine] = np.nan, NOBODY
+        Index(rows).put(self._values, np.nan)
+        self._by[rows] = NOBODY
 
     def checked(self) -> Array | None:
         if self._values is None:
@@ -266,14 +274,15 @@ class _Part:
         for world in np.flatnonzero(host(~finite) & (self._by != NOBODY)).tolist():
             leaf = self._leaves[int(self._by[world])]
             raise LeafError(
-                f"leaf '{leaf.name}' commands a {self._name} target that is not finite: {self._values[world]}"
+                f"leaf '{leaf.name}' commands a {self._name} target that is not finite: "
+                f"{host(self._values[world, ...])}"
             )
         return self._values
 
     def _shaped(self, values: Array, worlds: int, leaf: Behaviour) -> Array:
         """Targets as an array ``(k, n)``."""
         try:
-            found = values if hasattr(values, "ndim") else np.asarray(values, float)
+            found = values if hasattr(values, "ndim") else constant(values, self._like)
             shape = tuple(found.shape)
         except (TypeError, ValueError):
             found, shape = values, ()
@@ -318,6 +327,6 @@ def one_world(bundle: _T) -> _T:
 
 
 def only_world(bundle: _T, world: int) -> _T:
-    """One world of an observation ``(N, ...)``, or of a hidden state, as that of a batch of one."""
-    found: _T = Rows(bundle, lambda values: values[world : world + 1])  # type: ignore[assignment]
+    """One world of an observation ``(N, ...)``, or of a hidden state, as that of a batch of one, in NumPy."""
+    found: _T = Rows(bundle, lambda values: host(values[world : world + 1, ...]))  # type: ignore[assignment]
     return found

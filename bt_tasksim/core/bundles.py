@@ -12,6 +12,7 @@ from typing import Any
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.transfer import Index
 
 
 def parts(bundle: Any) -> dict[str, Any] | None:
@@ -46,7 +47,7 @@ def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
 
 def taken(bundle: Any, rows: Array) -> Any:
     """The worlds ``rows (k,)`` of a bundle."""
-    return mapped(lambda values: values[rows], bundle)
+    return mapped(Index(rows).of, bundle)
 
 
 def merged(whole: Any, rows: Array, new: Any, worlds: int) -> Any:
@@ -63,26 +64,27 @@ def merged(whole: Any, rows: Array, new: Any, worlds: int) -> Any:
     """
     if len(rows) == worlds:
         return new
+    index = Index(rows)
     if whole is None:
-        return mapped(lambda values: _spread(values, rows, worlds), new)
-    return mapped(lambda before, values: _replaced(before, rows, values), whole, new)
+        return mapped(lambda values: _spread(values, index, worlds), new)
+    return mapped(lambda before, values: _replaced(before, index, values), whole, new)
 
 
-def _spread(values: Array, rows: Array, worlds: int) -> Array:
+def _spread(values: Array, index: Index, worlds: int) -> Array:
     xp = array_namespace(values)
     out = xp.zeros((worlds, *values.shape[1:]), dtype=values.dtype, device=values.device)
-    out[rows] = values
+    index.put(out, values)
     return out
 
 
-def _replaced(before: Array, rows: Array, values: Array) -> Array:
+def _replaced(before: Array, index: Index, values: Array) -> Array:
     if before.shape[1:] != values.shape[1:]:
         raise InputError(
             f"the memories of unlike worlds do not fit together: {tuple(before.shape[1:])} and "
             f"{tuple(values.shape[1:])}; pad what is of unlike length"
         )
     out = array_namespace(before).asarray(before, copy=True)
-    out[rows] = values
+    index.put(out, values)
     return out
 
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError, nearest
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.core.transfer import Index, sent
 from bt_tasksim.core.world import ObjectModel, PlaceModel, WorldModel
 
 _T = TypeVar("_T", bound="FactArrays")
@@ -192,6 +193,12 @@ class WorldFacts:
             self.obstacle_facts.map(change),
         )
 
+    def sent(self, like: Array) -> WorldFacts:
+        """The same facts in the library and on the device of an array, see `bt_tasksim.core.transfer.sent`."""
+        bundles = (self.object_facts, self.place_facts, self.obstacle_facts)
+        there = iter(sent([getattr(bundle, f.name) for bundle in bundles for f in fields(bundle)], like))
+        return self.map(lambda _: next(there))
+
     def replaced(self, rows: Array, other: WorldFacts) -> WorldFacts:
         """The same facts, with those of other worlds, of the same columns, at ``rows (k,)``.
 
@@ -200,12 +207,14 @@ class WorldFacts:
         """
         _check_alike(self, other)
 
+        index = Index(rows)
+
         def bundle(kind: str) -> Any:
             mine, others = getattr(self, kind), getattr(other, kind)
             return type(mine)(
                 **{
                     f.name: _with_rows(
-                        getattr(mine, f.name), rows, getattr(others, f.name), _FILLING.get(f.name, 0)
+                        getattr(mine, f.name), index, getattr(others, f.name), _FILLING.get(f.name, 0)
                     )
                     for f in fields(mine)
                 }
@@ -379,9 +388,11 @@ class FactsTable:
 
     Args:
         worlds: How many there are.
+        like: An array of the library, type and device of the facts; by default NumPy.
     """
 
-    def __init__(self, worlds: int) -> None:
+    def __init__(self, worlds: int, like: Array | None = None) -> None:
+        self._like: Array = np.empty(0) if like is None else like
         self._models: list[WorldModel | None] = [None] * worlds
         self._facts: WorldFacts | None = None
         self._stale: set[int] = set()
@@ -409,11 +420,12 @@ class FactsTable:
             rows, known = sorted(self._stale), self._facts
             begun = [model for model in self._models if model is not None]
             if known is None or _names(begun) != (set(known.columns), set(known.place_columns)):
-                self._facts = WorldFacts.of([begun[0] if model is None else model for model in self._models])
+                models = [begun[0] if model is None else model for model in self._models]
+                self._facts = WorldFacts.of(models).sent(self._like)
             else:
                 fresh = [model for row in rows if (model := self._models[row]) is not None]
                 anew = WorldFacts.of(fresh, list(known.columns), list(known.place_columns))
-                self._facts = known.replaced(np.array(rows), anew)
+                self._facts = known.replaced(np.array(rows), anew.sent(self._like))
             self._stale.clear()
         return self._facts
 
@@ -425,7 +437,7 @@ class FactsTable:
             assert facts is not None, "worlds have begun"
             if len(self._taken) > 64:
                 self._taken.clear()
-            self._taken[key] = facts.map(lambda values: values[rows])
+            self._taken[key] = facts.map(Index(rows).of)
         return self._taken[key]
 
 
@@ -474,17 +486,19 @@ def _concatenated(arrays: Sequence[Array], filling: Any) -> Array:
     return np.concatenate(arrays)
 
 
-def _with_rows(array: Array, rows: Array, values: Array, filling: Any) -> Array:
+def _with_rows(array: Array, index: Index, values: Array, filling: Any) -> Array:
     """An array ``(N, ...)`` with other rows ``(k, ...)``; what is shorter is filled up."""
+    xp = array_namespace(array)
     most = tuple(max(n, m) for n, m in zip(array.shape[1:], values.shape[1:], strict=True))
-    out = array.copy() if most == array.shape[1:] else _filled(array, most, filling)
-    out[rows] = values if most == values.shape[1:] else _filled(values, most, filling)
+    out = xp.asarray(array, copy=True) if most == tuple(array.shape[1:]) else _filled(array, most, filling)
+    index.put(out, values if most == tuple(values.shape[1:]) else _filled(values, most, filling))
     return out
 
 
 def _filled(array: Array, most: tuple[int, ...], filling: Any) -> Array:
     """An array ``(n, ...)`` as ``(n, *most)``."""
-    out = np.full((array.shape[0], *most), filling, array.dtype)
+    xp = array_namespace(array)
+    out = xp.asarray(xp.broadcast_to(constant(filling, array), (array.shape[0], *most)), copy=True)
     out[(slice(None), *(slice(0, n) for n in array.shape[1:]))] = array
     return out
 
