@@ -34,7 +34,7 @@ from bt_tasksim.core.outcomes import (
     Statement,
 )
 from bt_tasksim.core.poses import Array, array_namespace, host
-from bt_tasksim.core.transfer import Index
+from bt_tasksim.core.transfer import Index, fetched
 from bt_tasksim.policy.policy import Action
 
 LOST_TICKS = 3
@@ -160,7 +160,7 @@ class Activation:
         command, after = model.carry_out(motion, judged.seen, judged.memory)
         context.write(command, judged.rows, self._leaf)
         if after is not judged.memory:
-            self.memory = merged(self.memory, judged.rows, after, context.worlds)
+            self.memory = merged(self.memory, context.index(judged.rows), after, context.worlds)
         return statuses
 
     def going_on(self, rows: Array) -> Judged:
@@ -194,7 +194,7 @@ class Activation:
                 return
             begins, positions, seen = begins[can], positions[can], seen.at(can)
         try:
-            self.memory = merged(self.memory, begins, model.begin(seen), context.worlds)
+            self.memory = merged(self.memory, context.index(begins), model.begin(seen), context.worlds)
         except NoWayError:
             self._begin_each(begins, positions, seen, statuses)
 
@@ -213,20 +213,20 @@ class Activation:
         on = rows[going]
         memory = self.memory
         if memory is not None and len(on) < self._context.worlds:
-            memory = taken(memory, on)
+            memory = taken(memory, self._context.index(on))
         return Judged(statuses, going, on, self.seen(on), memory)
 
     def _kept(self, rows: Array, judged: Judged) -> Judged:
         """Those of them in which no limit is exceeded and no goal lost."""
         model, context, seen = self._model, self._context, judged.seen
-        broken = host(model.violated(seen, judged.memory))
+        held = {goal: context.reached(goal, model.actor, judged.rows) for goal in model.maintains}
+        asked = [goal for goal, worlds in held.items() if worlds.any()]
+        maintained = (model.maintained(goal, seen, judged.memory) for goal in asked)
+        broken, *keeps = fetched([model.violated(seen, judged.memory), *maintained])
         lost = np.zeros(len(judged.rows), bool)
         missing = np.zeros(len(judged.rows), bool)
-        for goal in model.maintains:
-            held = context.reached(goal, model.actor, judged.rows)
-            if not held.any():
-                continue
-            gone = held & ~host(model.maintained(goal, seen, judged.memory)) & ~missing & ~broken
+        for goal, kept in zip(asked, keeps, strict=True):
+            gone = held[goal] & ~kept & ~missing & ~broken
             missing |= gone
             over = gone & (self._lost[judged.rows] + 1 >= LOST_TICKS)
             for k in np.flatnonzero(over).tolist():

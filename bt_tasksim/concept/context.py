@@ -20,12 +20,14 @@ from bt_tasksim.core.facts import FactsTable, WorldFacts
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.plain import shown
 from bt_tasksim.core.poses import Array, array_namespace, constant, host
-from bt_tasksim.core.transfer import Index, sent
+from bt_tasksim.core.transfer import Index, fetched, sent
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.robot.description import RobotDescription
 
 NO_EPISODE = "no episode has begun: a tree with concepts is ticked by a Runner"
 NOBODY = -1
+OFTEN = 64
+"""Sets of worlds that a context keeps in mind."""
 _T = TypeVar("_T", Observation, Hidden)
 
 
@@ -86,6 +88,7 @@ class Context:
         """By world."""
         self._held: dict[tuple[str, str], Array] = {}
         self._parts = {name: _Part(name, worlds, self.like) for name in ("tool", "hand")}
+        self._indices: dict[bytes, Index] = {}
 
     @property
     def now(self) -> float:
@@ -154,9 +157,9 @@ class Context:
             LeafError: A part is not a row of numbers of its length; says where the leaf's class makes it.
         """
         if command.tool is not None:
-            self._parts["tool"].write(command.tool, rows, leaf)
+            self._parts["tool"].write(command.tool, self.index(rows), leaf)
         if command.hand is not None:
-            self._parts["hand"].write(command.hand, rows, leaf)
+            self._parts["hand"].write(command.hand, self.index(rows), leaf)
 
     def tool_writer(self, world: int = 0) -> Behaviour | None:
         """The leaf that has commanded the tool in this tick, in one world."""
@@ -178,7 +181,10 @@ class Context:
         Raises:
             LeafError: A part is not finite; names the leaf that wrote it.
         """
-        return Written(self._parts["tool"].checked(), self._parts["hand"].checked())
+        parts = {name: part for name, part in self._parts.items() if part.values is not None}
+        for part, finite in zip(parts.values(), fetched([p.finite() for p in parts.values()]), strict=True):
+            part.check(finite)
+        return Written(*(part.values for part in self._parts.values()))
 
     @property
     def command(self) -> Command:
@@ -212,8 +218,20 @@ class Context:
         observation, facts, (since,) = self.observation, self.world, sent([elapsed], self.like)
         if len(rows) == self.worlds:
             return Seen(observation, facts, self.robot, since)
-        picked: Observation = Rows(observation, Index(rows).of)  # type: ignore[assignment]
-        return Seen(picked, self._facts.taken(rows), self.robot, since)
+        index = self.index(rows)
+        picked: Observation = Rows(observation, index.of)  # type: ignore[assignment]
+        return Seen(picked, self._facts.taken(index), self.robot, since)
+
+    def index(self, rows: Array) -> Index:
+        """What picks some worlds ``(k,)``; numbers that are asked for often go to a device once."""
+        if isinstance(self.like, np.ndarray):
+            return Index(rows)
+        key = rows.tobytes()
+        if key not in self._indices:
+            if len(self._indices) >= OFTEN:
+                self._indices.clear()
+            self._indices[key] = Index(rows)
+        return self._indices[key]
 
 
 class _Part:
@@ -223,13 +241,13 @@ class _Part:
         self._name, self._worlds, self._like = name, worlds, like
         self._leaves: list[Behaviour] = []
         self._by: Array = np.full(worlds, NOBODY)
-        self._values: Array | None = None
+        self.values: Array = None
 
     def clear(self, rows: Array) -> None:
-        if self._values is None:
+        if self.values is None:
             return
         if len(rows) == self._worlds:
-            self._leaves, self._by, self._values = [], np.full(self._worlds, NOBODY), None
+            self._leaves, self._by, self.values = [], np.full(self._worlds, NOBODY), None
             return
         self._forget(rows)
 
@@ -237,47 +255,47 @@ class _Part:
         number = int(self._by[world])
         return None if number == NOBODY else self._leaves[number]
 
-    def write(self, values: Array, rows: Array, leaf: Behaviour) -> None:
+    def write(self, values: Array, index: Index, leaf: Behaviour) -> None:
+        rows = index.rows
         before = self._by[rows]
-        if self._values is not None and (before != NOBODY).any():
+        if self.values is not None and (before != NOBODY).any():
             raise _conflict(self._name, self._leaves[int(before[before != NOBODY][0])], leaf)
         values = self._shaped(values, len(rows), leaf)
         if len(rows) == self._worlds:
-            self._values = values
+            self.values = values
         else:
-            if self._values is None:
+            if self.values is None:
                 xp, shape = array_namespace(values), (self._worlds, values.shape[-1])
-                self._values = xp.full(shape, np.nan, dtype=values.dtype, device=values.device)
-            width = max(self._values.shape[-1], values.shape[-1])
-            self._values, values = _widened(self._values, width), _widened(values, width)
-            Index(rows).put(self._values, values)
+                self.values = xp.full(shape, np.nan, dtype=values.dtype, device=values.device)
+            width = max(self.values.shape[-1], values.shape[-1])
+            self.values, values = _widened(self.values, width), _widened(values, width)
+            index.put(self.values, values)
         if leaf not in self._leaves:
             self._leaves.append(leaf)
         self._by[rows] = self._leaves.index(leaf)
 
     def withdraw(self, leaf: Behaviour, rows: Array) -> None:
-        if leaf not in self._leaves or self._values is None:
+        if leaf not in self._leaves or self.values is None:
             return
         mine = rows[self._by[rows] == self._leaves.index(leaf)]
         self._forget(mine)
 
     def _forget(self, rows: Array) -> None:
-        self._values = array_namespace(self._values).asarray(self._values, copy=True)
-        Index(rows).put(self._values, np.nan)
+        self.values = array_namespace(self.values).asarray(self.values, copy=True)
+        Index(rows).put(self.values, np.nan)
         self._by[rows] = NOBODY
 
-    def checked(self) -> Array | None:
-        if self._values is None:
-            return None
-        xp = array_namespace(self._values)
-        finite = xp.all(xp.isfinite(self._values), axis=-1)
-        for world in np.flatnonzero(host(~finite) & (self._by != NOBODY)).tolist():
+    def finite(self) -> Array:
+        xp = array_namespace(self.values)
+        return xp.all(xp.isfinite(self.values), axis=-1)
+
+    def check(self, finite: np.ndarray) -> None:
+        for world in np.flatnonzero(~finite & (self._by != NOBODY)).tolist():
             leaf = self._leaves[int(self._by[world])]
             raise LeafError(
                 f"leaf '{leaf.name}' commands a {self._name} target that is not finite: "
-                f"{host(self._values[world, ...])}"
+                f"{host(self.values[world, ...])}"
             )
-        return self._values
 
     def _shaped(self, values: Array, worlds: int, leaf: Behaviour) -> Array:
         """Targets as an array ``(k, n)``."""

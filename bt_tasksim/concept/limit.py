@@ -37,7 +37,9 @@ class Limit(NamedTuple):
 
     def on_host(self) -> Limit:
         """The same, with all numbers in NumPy: to be asked before many worlds are."""
-        value, limit, counts = (host(x) if getattr(x, "ndim", 0) else x for x in (self.value, self.limit, self.counts))
+        value, limit, counts = (
+            host(x) if getattr(x, "ndim", 0) else x for x in (self.value, self.limit, self.counts)
+        )
         return self._replace(value=value, limit=limit, counts=counts)
 
     def at(self, world: int) -> Outcome:

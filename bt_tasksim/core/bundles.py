@@ -45,12 +45,12 @@ def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
     return type(first)(**made)
 
 
-def taken(bundle: Any, rows: Array) -> Any:
+def taken(bundle: Any, rows: Array | Index) -> Any:
     """The worlds ``rows (k,)`` of a bundle."""
-    return mapped(Index(rows).of, bundle)
+    return mapped(_index(rows).of, bundle)
 
 
-def merged(whole: Any, rows: Array, new: Any, worlds: int) -> Any:
+def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
     """A bundle of ``worlds`` worlds in which those at ``rows (k,)`` are ``new``; nothing given is changed.
 
     Args:
@@ -64,10 +64,14 @@ def merged(whole: Any, rows: Array, new: Any, worlds: int) -> Any:
     """
     if len(rows) == worlds:
         return new
-    index = Index(rows)
+    index = _index(rows)
     if whole is None:
         return mapped(lambda values: _spread(values, index, worlds), new)
     return mapped(lambda before, values: _replaced(before, index, values), whole, new)
+
+
+def _index(rows: Array | Index) -> Index:
+    return rows if isinstance(rows, Index) else Index(rows)
 
 
 def _spread(values: Array, index: Index, worlds: int) -> Array:

@@ -194,7 +194,7 @@ class WorldFacts:
         )
 
     def sent(self, like: Array) -> WorldFacts:
-        """The same facts in the library and on the device of an array, see `bt_tasksim.core.transfer.sent`."""
+        """The same facts in the library and on the device of an array."""
         bundles = (self.object_facts, self.place_facts, self.obstacle_facts)
         there = iter(sent([getattr(bundle, f.name) for bundle in bundles for f in fields(bundle)], like))
         return self.map(lambda _: next(there))
@@ -429,15 +429,15 @@ class FactsTable:
             self._stale.clear()
         return self._facts
 
-    def taken(self, rows: Array) -> WorldFacts:
-        """The facts of some worlds ``rows (k,)``."""
-        key = rows.tobytes() if isinstance(rows, np.ndarray) else bytes(np.asarray(rows))
+    def taken(self, index: Index) -> WorldFacts:
+        """The facts of some worlds."""
+        key = index.rows.tobytes()
         if key not in self._taken:
             facts = self.facts
             assert facts is not None, "worlds have begun"
             if len(self._taken) > 64:
                 self._taken.clear()
-            self._taken[key] = facts.map(Index(rows).of)
+            self._taken[key] = facts.map(index.of)
         return self._taken[key]
 
 

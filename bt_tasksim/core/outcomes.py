@@ -118,7 +118,7 @@ class Statement:
 
     def on_host(self) -> Self:
         """The same, with its numbers in NumPy, wherever they are: to be asked before many worlds are."""
-        numbers = {name: host(v) if getattr(v, "ndim", 0) else v for name, v in self.numbers.items()}
+        numbers: Any = {n: host(v) if getattr(v, "ndim", 0) else v for n, v in self.numbers.items()}
         return replace(self, numbers=numbers, detail=None if self.detail is None else self.detail.on_host())
 
     def at(self, world: int) -> Self:

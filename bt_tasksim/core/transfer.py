@@ -27,6 +27,9 @@ class Index:
         self.rows = rows
         self._there: Array = None
 
+    def __len__(self) -> int:
+        return len(self.rows)
+
     def on(self, values: Array) -> Array:
         """The numbers ``(k,)`` where these values are, all of which are on one device."""
         if isinstance(values, np.ndarray):
