@@ -1,4 +1,4 @@
-"""What goes between host and device, counted on a machine without one: torch on the CPU, its calls watched."""
+"""What goes between host and device, counted without a device: torch on the CPU, its calls watched."""
 
 from __future__ import annotations
 
