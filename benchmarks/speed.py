@@ -1,16 +1,18 @@
-"""How fast: `make bench`, or ``bt-tasksim bench``. Ratios within one run, medians over rounds.
+"""How fast: `make bench`, or ``bt-tasksim bench``. Ratios within one run, medians over rounds in turns.
 
-1. Control steps per second of ``pick_and_place`` against ManiSkill's ``PickCube-v1`` (one process, state
-   observations, ``pd_joint_delta_pos``, random actions), both with 100 Hz physics and 20 Hz control: once
-   whole episodes with their resets, once without the resets.
-2. Time outside physics for one control step, by part.
-3. A tick without the concepts' own functions, over a tick of a plain py_trees tree of the same shape.
-4. ``bt-tasksim --help``.
+1. Control steps per second of ``pick_and_place``, whole episodes with their resets, in one world and in
+   batches, as ``bt-tasksim evaluate`` runs them, against ManiSkill's ``PickCube-v1`` (one process, state
+   observations, ``pd_joint_delta_pos``, random actions), both with 100 Hz physics and 20 Hz control; on two
+   cores in two processes each, ManiSkill in the better way of one process and ``SubprocVecEnv``.
+2. Time outside physics for one control step of a single world, by part.
+3. ``bt-tasksim --help``.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -21,33 +23,31 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-import py_trees
-from py_trees.common import Status
 
-from benchmarks.peer_maniskill import environment, rates
-from bt_tasksim.concept.leaf import ONE, ConceptNode
-from bt_tasksim.concept.model import ConceptModel
+from benchmarks.batch import episodes
+from benchmarks.peer_maniskill import Peer
+from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.core.files import write_text
-from bt_tasksim.core.world import Command
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
-from bt_tasksim.policy.policy import Action
 from bt_tasksim.trees.load import load_source
 
 PURE = ("initial_state", "begin", "violated", "maintained", "carry_out", "explain")
 """The concepts' own functions that a tick calls, besides the policy's."""
-BARS = {"steps_ratio": 3.0, "outside_us": 250.0, "tick_ratio": 1.5, "help_s": 0.5}
+CASES = ((1, 1), (64, 1), (256, 1), (64, 2))
+"""Worlds of a batch, and processes with a batch each."""
+BARS = {"256_1": 4.3, "64_2": 7.0}
+"""At least so many times ManiSkill's control steps per second, by case."""
+OUTSIDE_US = 1200.0
+HELP_S = 0.5
 
 
 def main(quick: bool = False, json_path: Path | None = None) -> int:
     """Measure, print the tables, and write the numbers as JSON if asked."""
-    rounds = 3 if quick else 7
-    found: dict[str, Any] = {}
-    found |= throughput(rounds, episodes=3 if quick else 6)
+    found: dict[str, Any] = throughput(quick)
     found |= outside_physics(episodes=5 if quick else 20)
-    found |= tick_overhead(2000 if quick else 10000)
-    found |= help_time(rounds)
+    found |= help_time(3 if quick else 7)
     _print(found)
     if json_path is not None:
         write_text(json_path, json.dumps(found, indent=2) + "\n")
@@ -55,60 +55,18 @@ def main(quick: bool = False, json_path: Path | None = None) -> int:
     return 0
 
 
-def throughput(rounds: int, episodes: int) -> dict[str, Any]:
-    """Control steps per second of both, in turns; the ratio is the median over the rounds."""
-    runner = _runner("pick_and_place")
-    peer, why = _maniskill()
-    runner.run(0)
-    # Every control step counts, also those in which things come to rest before the outcome is judged.
-    counted: list[None] = []
-    engine: Any = runner.pipeline.physics
-    step = engine.step
-    engine.step = lambda target: (counted.append(None), step(target))[1]
-    begins: list[float] = []
-    begin = runner.begin
-
-    def timed_begin(*arguments: Any) -> Any:
-        started = time.perf_counter()
-        out = begin(*arguments)
-        begins.append(time.perf_counter() - started)
-        return out
-
-    runner.begin = timed_begin  # type: ignore[method-assign]
-    ours: list[tuple[float, float]] = []
-    theirs: list[tuple[float, float]] = []
-    for k in range(rounds):
-        counted.clear()
-        begins.clear()
-        started = time.perf_counter()
-        for seed in range(episodes):
-            runner.run(1 + k * episodes + seed)
-        total = time.perf_counter() - started
-        ours.append((len(counted) / total, len(counted) / (total - sum(begins))))
-        if peer is not None:
-            theirs.append(rates(peer, 150))
-    out: dict[str, Any] = {
-        "steps_per_s": statistics.median(a for a, _ in ours),
-        "steps_alone_per_s": statistics.median(a for _, a in ours),
-    }
-    if theirs:
-        out["maniskill_steps_per_s"] = statistics.median(a for a, _ in theirs)
-        out["maniskill_steps_alone_per_s"] = statistics.median(a for _, a in theirs)
-        pairs = list(zip(ours, theirs, strict=True))
-        out["steps_ratio"] = statistics.median(a[0] / b[0] for a, b in pairs)
-        out["steps_alone_ratio"] = statistics.median(a[1] / b[1] for a, b in pairs)
-    else:
-        out["maniskill_missing"] = why
-    return out
-
-
-def _maniskill() -> tuple[Any, str]:
+def throughput(quick: bool) -> dict[str, Any]:
+    """Control steps per second of both by case, such as ``256_1``, and the median ratios."""
+    peer, out = Peer(), {}
     try:
-        env = environment()
-        env.reset(seed=0)
-    except Exception as error:  # any reason it does not start here
-        return None, f"{type(error).__name__}: {error}"
-    return env, ""
+        for worlds, processes in CASES:
+            if processes > (os.cpu_count() or 1) or (quick and (worlds > 64 or processes > 1)):
+                continue
+            options = argparse.Namespace(threads=1, processes=processes, quick=quick)
+            out[f"{worlds}_{processes}"] = episodes.measured(worlds, options, peer, apart=False)
+    finally:
+        peer.close()
+    return {"episodes": out, "maniskill_missing": peer.missing}
 
 
 def outside_physics(episodes: int, robot: str = "panda") -> dict[str, Any]:
@@ -191,91 +149,6 @@ class _Clock:
         return {name: np.array([row.get(name, 0.0) for row in rows]) for name in names}
 
 
-class _Idle(ConceptModel):
-    """A concept whose own functions cost next to nothing."""
-
-    def command(self, action: Any, seen: Any, memory: Any) -> Command:
-        """A command made beforehand."""
-        return _COMMAND
-
-    def done(self, seen: Any, memory: Any) -> Any:
-        """Never."""
-        return _ACTION.terminate
-
-
-class _Decided:
-    name = "decided"
-
-    def act(self, model: Any, seen: Any, memory: Any) -> Action:
-        return _ACTION
-
-
-_COMMAND = Command(np.array([[0.4, 0.0, 0.3, 0.0, 1.0, 0.0, 0.0]]), np.array([[0.0]]))
-_ACTION = Action(np.zeros((1, 0)), np.array([False]))
-
-
-class _Noop(py_trees.behaviour.Behaviour):  # type: ignore[misc]
-    def update(self) -> Status:
-        return Status.RUNNING
-
-
-def tick_overhead(n: int) -> dict[str, Any]:
-    """A tick of five concepts in a sequence, less their own functions, over one of five no-op leaves."""
-    from bt_tasksim.trees import sequence
-
-    runner = _runner("pick_and_place")
-    runner.begin(0)
-    context = runner.context
-    plain = py_trees.composites.Sequence("plain", memory=True, children=[_Noop(str(i)) for i in range(5)])
-    leaves = [_Idle(name=str(i)) for i in range(5)]
-    tree = sequence("ours", *leaves)
-    for node in tree.iterate():
-        node.setup(context=context)
-    policy = _Decided()
-    for leaf in leaves:
-        leaf.use(policy)
-    observation, first = context.observation, leaves[0]
-
-    def tick(root: Any) -> None:
-        for _ in root.tick():
-            pass
-
-    def ours() -> None:
-        context.advance(observation)
-        tick(tree)
-
-    ours()
-    seen, motion = context.seen(ONE, np.zeros(1)), _ACTION.motion
-
-    def functions() -> None:
-        first.model.violated(seen, None)
-        policy.act(first.model, seen, None)
-        first.model.carry_out(motion, seen, None)
-
-    def turn() -> tuple[float, ...]:
-        return tuple(
-            _best(call, n // 10)
-            for call in (ours, lambda: context.advance(observation), functions, lambda: tick(plain))
-        )
-
-    turns = np.array([turn() for _ in range(10)])
-    own = turns[:, 0] - turns[:, 1] - turns[:, 2]
-    return {
-        "tick_us": float(1e6 * np.median(own)),
-        "py_trees_tick_us": float(1e6 * np.median(turns[:, 3])),
-        "tick_ratio": float(np.median(own / turns[:, 3])),
-    }
-
-
-def _best(call: Callable[[], None], n: int) -> float:
-    times = []
-    for _ in range(n):
-        started = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - started)
-    return statistics.median(times)
-
-
 def help_time(rounds: int) -> dict[str, Any]:
     """Seconds of ``bt-tasksim --help`` in a process of its own, and what it must not import."""
     command = [sys.executable, "-m", "bt_tasksim.cli", "--help"]
@@ -300,29 +173,30 @@ def _runner(scenario: str, robot: str = "panda") -> Runner:
 
 def _print(found: dict[str, Any]) -> None:
     def row(label: str, value: float, unit: str, digits: int = 0, bar: str = "") -> None:
-        print(f"{label:40}{value:10.{digits}f} {unit:18}{f'(bar: {bar})' if bar else ''}".rstrip())
+        print(f"{label:52}{value:10.{digits}f} {unit:16}{f'(bar: {bar})' if bar else ''}".rstrip())
 
-    row("pick_and_place, episodes with resets", found["steps_per_s"], "control steps/s")
-    if "steps_ratio" in found:
-        row("ManiSkill PickCube-v1, the same", found["maniskill_steps_per_s"], "control steps/s")
-        row("ratio", found["steps_ratio"], "", 2, f"at least {BARS['steps_ratio']:g}")
-        row("pick_and_place, without resets", found["steps_alone_per_s"], "control steps/s")
-        row("ManiSkill PickCube-v1, the same", found["maniskill_steps_alone_per_s"], "control steps/s")
-        row("ratio", found["steps_alone_ratio"], "", 2)
-    else:
-        print(f"ManiSkill PickCube-v1 did not start: {found['maniskill_missing']}")
+    if found["maniskill_missing"]:
+        print(f"ManiSkill's PickCube-v1 does not start: {found['maniskill_missing']}")
+    for case, rates in found["episodes"].items():
+        row(f"pick_and_place, {described(case)}", rates["steps_per_s"], "control steps/s")
+        if "ratio" in rates:
+            row("ManiSkill's PickCube-v1", rates["peer_steps_per_s"], "control steps/s")
+            row("ratio", rates["ratio"], "", 2, f"at least {BARS[case]:g}" if case in BARS else "")
     print()
     for part, value in found["parts_us"].items():
-        row(f"outside physics: {part}", value, "us")
-    row("outside physics, together", found["outside_us"], "us", 0, f"at most {BARS['outside_us']:g}")
-    row("physics", found["physics_us"], "us")
+        row(f"one world, outside physics: {part}", value, "us")
+    row("one world, outside physics, together", found["outside_us"], "us", 0, f"at most {OUTSIDE_US:g}")
+    row("one world, physics", found["physics_us"], "us")
     print()
-    row("tick without concept functions", found["tick_us"], "us", 2)
-    row("tick of plain py_trees", found["py_trees_tick_us"], "us", 2)
-    row("ratio", found["tick_ratio"], "", 2, f"at most {BARS['tick_ratio']:g}")
-    print()
-    row("bt-tasksim --help", found["help_s"], "s", 3, f"under {BARS['help_s']:g}")
+    row("bt-tasksim --help", found["help_s"], "s", 3, f"under {HELP_S:g}")
     print(f"it imports {', '.join(found['help_imports']) or 'none of torch, sapien, mani_skill'}")
+
+
+def described(case: str) -> str:
+    """A case in words."""
+    worlds, processes = case.split("_")
+    batch = "one world" if worlds == "1" else f"batches of {worlds}"
+    return f"{batch}, {'one process' if processes == '1' else f'{processes} processes'}"
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from typing import Any
 
 from benchmarks import learned_tables, robot_tables
 from benchmarks.experiments import pages as experiment_tables
+from benchmarks.speed import CASES, described
 from benchmarks.success import RESULTS, SCENARIOS
 from benchmarks.success import ROWS as MEASURED
 from bt_tasksim.core.files import write_text
@@ -153,27 +154,26 @@ def commands(results: dict[str, Any]) -> str:
 
 def speed(results: dict[str, Any]) -> str:
     """The table of `bt-tasksim bench`."""
-    found = results.get("speed")
-    parts = {f"outside: {k}": v for k, v in (found or {}).get("parts_us", {}).items()}
-    found = {**found, **parts} if found else None
-    rows = [
-        ("pick_and_place, control steps per second, episodes with resets", "steps_per_s", 0, ""),
-        ("ManiSkill PickCube-v1, the same", "maniskill_steps_per_s", 0, ""),
-        ("ratio of the two", "steps_ratio", 2, ""),
-        ("pick_and_place, control steps per second, without resets", "steps_alone_per_s", 0, ""),
-        ("ManiSkill PickCube-v1, the same", "maniskill_steps_alone_per_s", 0, ""),
-        ("ratio of the two", "steps_alone_ratio", 2, ""),
-        *((f"time of a control step, {part}", part, 0, "us") for part in parts),
-        ("time of a control step, outside physics together", "outside_us", 0, "us"),
-        ("time of a control step, in physics", "physics_us", 0, "us"),
-        ("tick without concept functions, over a plain py_trees tick", "tick_ratio", 2, ""),
-        ("`bt-tasksim --help`", "help_s", 3, "s"),
+    found = results.get("speed") or {}
+    lines = [
+        "| `pick_and_place`, whole episodes with resets | control steps per second | ManiSkill's | ratio |",
+        "|---|---|---|---|",
     ]
-    lines = ["| measured | |", "|---|---|"]
-    for label, key, digits, unit in rows:
-        value = f"{found[key]:.{digits}f} {unit}".strip() if found and key in found else NOT_YET
-        lines.append(f"| {label} | {value} |")
-    return "\n".join(lines)
+    for case in CASES:
+        rates = found.get("episodes", {}).get("{}_{}".format(*case), {})
+        ours, theirs, ratio = (rates.get(name) for name in ("steps_per_s", "peer_steps_per_s", "ratio"))
+        lines.append(
+            f"| {described('{}_{}'.format(*case))} | {NOT_YET if ours is None else f'{ours:.0f}'} "
+            f"| {'' if theirs is None else f'{theirs:.0f}'} | {'' if ratio is None else f'{ratio:.2f}'} |"
+        )
+    lines += ["", "| one world, time of a control step | |", "|---|---|"]
+    rows = [(f"outside physics: {part}", value) for part, value in found.get("parts_us", {}).items()]
+    rows += [("outside physics together", found.get("outside_us")), ("physics", found.get("physics_us"))]
+    lines += [f"| {label} | {NOT_YET if value is None else f'{value:.0f} us'} |" for label, value in rows]
+    seconds = found.get("help_s")
+    return "\n".join(
+        [*lines, f"| `bt-tasksim --help` | {NOT_YET if seconds is None else f'{seconds:.3f} s'} |"]
+    )
 
 
 def remote(results: dict[str, Any]) -> str:

@@ -306,7 +306,7 @@ class Grasp(ConceptModel[GraspMemory]):
         xp = array_namespace(gap)
         pushed = poses.norm(seen.object(self.target)[:, :3] - memory.start[:, :3])
         apart = 0.3 * xp.astype(~seen.opposed(), gap.dtype)
-        return xp.mean(gap, axis=-1) / 0.1 + apart + pushed / 0.05
+        return poses.mean(gap) / 0.1 + apart + pushed / 0.05
 
     def sufficient_cost(self, known: Known, memory: GraspMemory) -> Array:
         """1 unless the hand presses on the object."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from bt_tasksim.concept.functions import zeros
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import poses
 from bt_tasksim.core.facts import ObjectFacts, PlaceFacts, take_rows
@@ -105,7 +106,7 @@ def _approach(seen: Seen, target: str, given: tuple[float, float, float] | None)
     """Unit vectors ``(N, 3)`` along which the tool comes."""
     pose = seen.object(target)
     if given is not None:
-        return 0.0 * pose[:, :3] + constant(given, pose)
+        return zeros(pose, 3) + constant(given, pose)
     stands = resting_place(seen, target)
     xp = array_namespace(pose)
     return xp.where(stands.found[:, None], stands.place.access, constant(DOWN, pose))

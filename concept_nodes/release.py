@@ -110,7 +110,7 @@ class Release(ConceptModel[ReleaseMemory]):
     def necessary_cost(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """Share of the fingertips that still touch something."""
         xp = array_namespace(seen.tool)
-        return xp.mean(xp.astype(seen.contacts, seen.tool.dtype), axis=-1)
+        return poses.mean(xp.astype(seen.contacts, seen.tool.dtype))
 
     def sufficient_cost(self, known: Known, memory: ReleaseMemory) -> Array:
         """1 while the hand still presses on the object."""

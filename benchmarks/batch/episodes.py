@@ -2,14 +2,19 @@
 
 ManiSkill's ``PickCube-v1`` is measured in turns with them, in a process of its own. Every control step of
 every world counts, those included in which things come to rest, and so does what it takes to begin an
-episode. With one thread a step's time is split into PhysX's own steps, the beginning of episodes (draws,
-scenes), and all the rest, which is what is outside physics. With ``--processes 2`` each has a batch of its
-own, and ManiSkill is measured at its best on as many: one process, or several (``SubprocVecEnv``).
+episode. A round is an evaluation, two episodes a world from the first step to the last. Then worlds go on
+for ever, each with the next seed when its episode has ended, so that they are at all leaves of the tree at
+once (`mixed`), which costs more: the time of a step is split there into PhysX's own steps, the rest of
+stepping (drives, the overlaps that are looked for between the steps, rolling resistance), the beginning of
+episodes (draws, scenes), and what is outside physics: reading states, observations, the tree, concepts and
+kinematics. With ``--processes 2`` each has a batch of its own, and ManiSkill is measured at its best on as
+many: one process, or several (``SubprocVecEnv``).
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -28,7 +33,14 @@ OUTSIDE_US = {1: 1200.0, 64: 110.0, 256: 70.0}
 """At most so many microseconds a control step and world are outside physics, by worlds."""
 RATIO = {1: 4.3, 2: 7.0}
 """At least so many times ManiSkill's control steps per second, by cores."""
-PEER_STEPS = 300
+COLUMNS = (
+    ("mixed_per_s", 8),
+    ("physics_us", 10),
+    ("stepping_us", 10),
+    ("beginning_us", 11),
+    ("outside_us", 10),
+)
+PEER_STEPS = 1000
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -44,20 +56,22 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     out: dict[str, Any] = {"threads": threads, "processes": processes, "maniskill_missing": peer.missing}
     bar = RATIO.get(max(threads, processes))
     print(f"\nepisodes of pick_and_place, {processes} process(es) of {threads} thread(s)")
-    print("us a control step and world, with one thread; bars of outside are for a machine 1.5 to 2 times")
-    print("as fast as the one on which docs/batches.md was measured")
     print(
-        f"{'worlds':>8}{'steps/s':>10}{'ratio':>8}{'physics':>10}{'beginning':>11}{'outside':>10}{'bar':>7}"
+        "us a control step and world, with one thread; the bars of what is outside are for a machine on which"
+    )
+    print("the code before batches took 180 to 211 us, see docs/batches.md")
+    print(
+        f"{'worlds':>8}{'steps/s':>10}{'ratio':>8}{'mixed':>8}{'physics':>10}{'stepping':>10}{'beginning':>11}"
+        f"{'outside':>10}{'bar':>7}"
     )
     try:
         for worlds in WORLDS:
-            found = out[str(worlds)] = _measured(worlds, options, peer)
+            found = out[str(worlds)] = measured(worlds, options, peer)
             ratio = f"{found['ratio']:8.2f}" if "ratio" in found else f"{'':>8}"
             print(
                 f"{worlds:8}{found['steps_per_s']:10.0f}{ratio}"
                 + "".join(
-                    f"{found[name]:{width}.1f}" if name in found else " " * width
-                    for name, width in (("physics_us", 10), ("beginning_us", 11), ("outside_us", 10))
+                    f"{found[name]:{width}.0f}" if name in found else " " * width for name, width in COLUMNS
                 )
                 + f"{OUTSIDE_US[worlds]:7.0f}",
                 flush=True,
@@ -72,7 +86,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
 
 
 class Episodes:
-    """A batch of worlds, and what comes next in it.
+    """A batch of worlds in which episodes run.
 
     Args:
         worlds: How many.
@@ -81,39 +95,73 @@ class Episodes:
 
     def __init__(self, worlds: int, threads: int) -> None:
         source = load_source("pick_and_place")
-        self.threads = threads
         self.runner = BatchRunner(source.build, source.scene, worlds=worlds, threads=threads)
-        list(self.runner.run(range(10**6, 10**6 + min(worlds, 4))))  # whatever is made but once
+        self._for_ever: Iterator[Any] | None = None
+
+    def whole(self, seeds: range) -> int:
+        """Run all episodes of these seeds; how many control steps they had."""
+        before = self.runner.control_steps
+        for _ in self.runner.run(seeds):
+            pass
+        return self.runner.control_steps - before
+
+    def go_on(self, steps: int) -> int:
+        """Go on by so many control steps at least: a world takes the next seed when its episode has ended."""
+        if self._for_ever is None:
+            self._for_ever = self.runner.run(itertools.count())
+        before = self.runner.control_steps
+        while self.runner.control_steps < before + steps:
+            next(self._for_ever)
+        return self.runner.control_steps - before
 
 
-def play(kept: Episodes, shares: Sequence[range], /) -> Iterator[tuple[int, dict[str, float]]]:
-    """Shares of the episodes of a round: what they took."""
+def whole(kept: Episodes, shares: Sequence[range], /) -> Iterator[tuple[int, int]]:
+    """Episodes of some seeds: their control steps."""
     for index, seeds in enumerate(shares):
-        yield index, _round(kept.runner, seeds, kept.threads)
+        yield index, kept.whole(seeds)
 
 
-def _measured(worlds: int, options: argparse.Namespace, peer: Peer) -> dict[str, float]:
-    """Medians over rounds, in each of which every world has two episodes."""
+def go_on(kept: Episodes, shares: Sequence[int], /) -> Iterator[tuple[int, int]]:
+    """Go on by so many control steps; how many they were."""
+    for index, steps in enumerate(shares):
+        yield index, kept.go_on(steps)
+
+
+def split(kept: Episodes, shares: Sequence[int], /) -> Iterator[tuple[int, dict[str, float]]]:
+    """The same, and where the time went."""
+    for index, steps in enumerate(shares):
+        yield index, _split(kept, steps)
+
+
+def measured(worlds: int, options: argparse.Namespace, peer: Peer, apart: bool = True) -> dict[str, float]:
+    """Medians over rounds, both sides in turns; ``apart``: and then where the time goes."""
     processes, threads = options.processes, options.threads
-    episodes, rows = max(2 * worlds, 4), []
+    episodes, steps, rows = max(2 * worlds, 8), 150 * max(worlds, 16), []
     with Workers(partial(Episodes, worlds, threads), processes, "spawn") as fleet:
-        list(fleet.spread(play, [range(2)] * processes))  # each has begun
+        list(fleet.spread(whole, [range(2)] * processes))  # whatever is made but once
         for k in range(2 if options.quick else 5):
             first = k * processes * episodes
-            shares = [range(first + n * episodes, first + (n + 1) * episodes) for n in range(processes)]
-            started = time.perf_counter()
-            found = [row for _, row in fleet.spread(play, shares)]
-            rows.append(_together(found, time.perf_counter() - started))
+            seeds = [range(first + n * episodes, first + (n + 1) * episodes) for n in range(processes)]
+            rows.append({"steps_per_s": _rate(fleet.spread(whole, seeds))})
             if not peer.missing:
                 best = max(rate(PEER_STEPS) for rate in _ways(peer, max(threads, processes)))
                 rows[-1] |= {"peer_steps_per_s": best, "ratio": rows[-1]["steps_per_s"] / best}
-    return {name: statistics.median(row[name] for row in rows) for name in rows[0]}
+        found = {name: statistics.median(row[name] for row in rows) for name in rows[0]}
+        list(
+            fleet.spread(go_on, [2 * steps] * processes)
+        )  # the worlds' episodes begin at unlike times by now
+        rates = [_rate(fleet.spread(go_on, [steps] * processes)) for _ in range(1 if options.quick else 3)]
+        found["mixed_per_s"] = statistics.median(rates)
+        if threads > 1:  # PhysX's steps overlap: only the whole is told
+            return found
+        parts = [part for _, part in fleet.spread(split, [steps] * processes)]
+    return found | {name: statistics.fmean(part[name] for part in parts) for name in parts[0]}
 
 
-def _together(found: Sequence[dict[str, float]], seconds: float) -> dict[str, float]:
-    """What processes did side by side in so many seconds."""
-    out = {name: statistics.fmean(row[name] for row in found) for name in found[0] if name != "steps"}
-    return out | {"steps_per_s": sum(row["steps"] for row in found) / seconds}
+def _rate(found: Iterator[tuple[int, int]]) -> float:
+    """Control steps per second of what the processes do together."""
+    started = time.perf_counter()
+    return sum(steps for _, steps in found) / (time.perf_counter() - started)
 
 
 def _ways(peer: Peer, cores: int) -> list[Callable[[int], float]]:
@@ -124,18 +172,14 @@ def _ways(peer: Peer, cores: int) -> list[Callable[[int], float]]:
     return ways
 
 
-def _round(runner: BatchRunner, seeds: range, threads: int) -> dict[str, float]:
-    """One round; with several threads PhysX's steps overlap, and only the whole is told."""
-    before = runner.control_steps
-    if threads > 1:
-        for _ in runner.run(seeds):
-            pass
-        return {"steps": runner.control_steps - before}
+def _split(kept: Episodes, steps: int) -> dict[str, float]:
+    """Microseconds a control step and world of each part; timing them takes some of its own."""
     use_software_driver()
     from sapien import physx
 
-    spent = {"physics": 0.0, "beginning": 0.0}
-    step, begin = physx.PhysxCpuSystem.step, runner.worlds.reset
+    from bt_tasksim.engines.physics.sapien_stepping import SapienWorld
+
+    spent = dict.fromkeys(("physics", "stepping", "beginning"), 0.0)
 
     def timed(call: Callable[..., Any], part: str) -> Callable[..., Any]:
         def inner(*arguments: Any) -> Any:
@@ -147,17 +191,19 @@ def _round(runner: BatchRunner, seeds: range, threads: int) -> dict[str, float]:
 
         return inner
 
-    started = time.perf_counter()
+    worlds, started = kept.runner.worlds, time.perf_counter()
     with (
-        mock.patch.object(physx.PhysxCpuSystem, "step", timed(step, "physics")),
-        mock.patch.object(runner.worlds, "reset", timed(begin, "beginning")),
+        mock.patch.object(physx.PhysxCpuSystem, "step", timed(physx.PhysxCpuSystem.step, "physics")),
+        mock.patch.object(SapienWorld, "drive_to", timed(SapienWorld.drive_to, "stepping")),
+        mock.patch.object(SapienWorld, "advance", timed(SapienWorld.advance, "stepping")),
+        mock.patch.object(worlds, "reset", timed(worlds.reset, "beginning")),
     ):
-        for _ in runner.run(seeds):
-            pass
-    total, steps = time.perf_counter() - started, runner.control_steps - before
+        steps = kept.go_on(steps)
+    total = time.perf_counter() - started
     parts = {
         "physics_us": spent["physics"],
+        "stepping_us": spent["stepping"] - spent["physics"],
         "beginning_us": spent["beginning"],
-        "outside_us": total - spent["beginning"] - spent["physics"],
+        "outside_us": total - spent["beginning"] - spent["stepping"],
     }
-    return {"steps": steps, **{name: 1e6 * value / steps for name, value in parts.items()}}
+    return {name: 1e6 * value / steps for name, value in parts.items()}

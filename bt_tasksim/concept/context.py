@@ -156,10 +156,11 @@ class Context:
             CommandConflictError: Another leaf has written the same part in this tick.
             LeafError: A part is not a row of numbers of its length; says where the leaf's class makes it.
         """
+        size = self.times.dtype.itemsize
         if command.tool is not None:
-            self._parts["tool"].write(command.tool, self.index(rows), leaf)
+            self._parts["tool"].write(command.tool, self.index(rows), leaf, size)
         if command.hand is not None:
-            self._parts["hand"].write(command.hand, self.index(rows), leaf)
+            self._parts["hand"].write(command.hand, self.index(rows), leaf, size)
 
     def tool_writer(self, world: int = 0) -> Behaviour | None:
         """The leaf that has commanded the tool in this tick, in one world."""
@@ -255,12 +256,13 @@ class _Part:
         number = int(self._by[world])
         return None if number == NOBODY else self._leaves[number]
 
-    def write(self, values: Array, index: Index, leaf: Behaviour) -> None:
+    def write(self, values: Array, index: Index, leaf: Behaviour, size: int) -> None:
+        """Write targets as floats of so many bytes: those of one world may not round another's."""
         rows = index.rows
         before = self._by[rows]
         if self.values is not None and (before != NOBODY).any():
             raise _conflict(self._name, self._leaves[int(before[before != NOBODY][0])], leaf)
-        values = self._shaped(values, len(rows), leaf)
+        values = _floats(self._shaped(values, len(rows), leaf), size)
         if len(rows) == self._worlds:
             self.values = values
         else:
@@ -313,6 +315,13 @@ class _Part:
         raise LeafError(
             f"leaf '{leaf.name}'{where} commands {self._name}={shown(repr(values))}: {WANTED[self._name]}"
         )
+
+
+def _floats(values: Array, size: int) -> Array:
+    """Numbers as floats of so many bytes."""
+    xp = array_namespace(values)
+    kind = xp.float64 if size == 8 else xp.float32
+    return values if values.dtype == kind else xp.astype(values, kind)
 
 
 def _widened(values: Array, width: int) -> Array:

@@ -31,9 +31,14 @@ def parts(bundle: Any) -> dict[str, Any] | None:
 def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
     """A bundle like the first one, whose arrays are made by ``function`` from those of all of them."""
     first = bundles[0]
-    inner = parts(first)
+    if hasattr(first, "dtype"):
+        return function(*bundles)
+    named = isinstance(first, tuple) and hasattr(first, "_fields")
+    if named and all(type(b) is type(first) for b in bundles):
+        return type(first)(*(mapped(function, *each) for each in zip(*bundles, strict=True)))
     if first is None or isinstance(first, str):
         return first
+    inner = parts(first)
     if inner is None:
         return function(*bundles)
     others = [parts(b) or {} for b in bundles]
@@ -60,8 +65,11 @@ def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
         worlds: How many there are in all.
 
     Raises:
-        InputError: The worlds do not fit together, since their arrays have unlike shapes.
+        InputError: The worlds do not fit together, since their parts are of unlike kinds, or their arrays of
+            unlike types or shapes.
     """
+    if whole is not None:
+        _check_alike(whole, new)
     if len(rows) == worlds:
         return new
     index = _index(rows)
@@ -72,6 +80,34 @@ def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
 
 def _index(rows: Array | Index) -> Index:
     return rows if isinstance(rows, Index) else Index(rows)
+
+
+def _check_alike(before: Any, now: Any, name: str = "") -> None:
+    """Check that a bundle is made as it was before: an array of other numbers would be cut, a text kept.
+
+    Raises:
+        InputError: It is not.
+    """
+    kind, kept = getattr(now, "dtype", None), getattr(before, "dtype", None)
+    if kind is not None and kept is not None and kind == kept:
+        return
+    inner = None if kind is not None else parts(now)
+    old = None if inner is None or kept is not None else parts(before)
+    if inner is not None and old is not None and inner.keys() == old.keys():
+        for part, value in inner.items():
+            _check_alike(old[part], value, f"{name}.{part}" if name else part)
+    elif inner is not None or kind is not None or kept is not None or before != now:
+        raise InputError(
+            f"a memory is of one kind in all worlds and at all ticks, but {name or 'it'} is {_kind(before)} "
+            f"at first and {_kind(now)} then: make it the same in begin and in advance"
+        )
+
+
+def _kind(value: Any) -> str:
+    if hasattr(value, "dtype"):
+        return f"an array of {value.dtype}"
+    inner = parts(value)
+    return repr(value) if inner is None else f"a {type(value).__name__} of {', '.join(inner) or 'nothing'}"
 
 
 def _spread(values: Array, index: Index, worlds: int) -> Array:

@@ -27,8 +27,18 @@ class FactArrays:
     """A bundle of arrays with the same leading dimensions."""
 
     def map(self: _T, change: Callable[[Array], Array]) -> _T:
-        """The same facts, each array changed."""
-        return type(self)(**{f.name: change(getattr(self, f.name)) for f in fields(self)})
+        """The same facts, each array changed when somebody first looks at it: few of them are."""
+        made = object.__new__(type(self))
+        made.__dict__["_made_of"] = (self, change)
+        return made
+
+    def __getattr__(self, name: str) -> Any:
+        """A field of facts that `map` has made."""
+        if name not in type(self).__dataclass_fields__ or "_made_of" not in self.__dict__:
+            raise AttributeError(f"{type(self).__name__} has no '{name}'")
+        source, change = self.__dict__["_made_of"]
+        found = self.__dict__[name] = change(getattr(source, name))
+        return found
 
 
 @dataclass(frozen=True)

@@ -120,10 +120,15 @@ def clip(x: Array, low: Any, high: Any) -> Array:
 
 
 def apply(matrices: Array, vectors: Array) -> Array:
-    """Matrices ``(..., m, n)`` times vectors ``(..., n)``; batch dimensions broadcast."""
-    return array_namespace(matrices, vectors).matmul(_packed(matrices, 2), _packed(vectors, 1)[..., None])[
-        ..., 0
-    ]
+    """Matrices ``(..., m, n)`` times vectors ``(..., n)``; batch dimensions broadcast.
+
+    NumPy multiplies each row of a batch for itself. Other libraries make one product of all rows where the
+    matrix is common to them, in which a row's last bits depend on how many there are: there the products are
+    added up in order.
+    """
+    if isinstance(vectors, np.ndarray):
+        return np.matmul(_packed(matrices, 2), _packed(vectors, 1)[..., None])[..., 0]
+    return total(matrices * vectors[..., None, :])
 
 
 def quat_multiply(a: Array, b: Array) -> Array:
@@ -143,11 +148,23 @@ def norm(v: Array) -> Array:
 
 def dot(a: Array, b: Array) -> Array:
     """Inner product ``(...)`` of vectors ``(..., n)``."""
-    products = a * b
-    total = products[..., 0]
-    for k in range(1, products.shape[-1]):
-        total = total + products[..., k]
-    return total
+    return total(a * b)
+
+
+def total(values: Array) -> Array:
+    """Sum ``(...)`` over the last axis, from the first number on.
+
+    A library's own order depends on how long an axis is and how it lies.
+    """
+    out = values[..., 0]
+    for k in range(1, values.shape[-1]):
+        out = out + values[..., k]
+    return out
+
+
+def mean(values: Array) -> Array:
+    """Mean ``(...)`` over the last axis, added up as `total` does."""
+    return total(values) / values.shape[-1]
 
 
 def composed(a: list[float], b: list[float]) -> list[float]:

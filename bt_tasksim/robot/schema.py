@@ -40,7 +40,7 @@ Policy = Literal["stop", "clip"]
 class DriveEntry(Model):
     """PD drives of a group of joints."""
 
-    stiffness: NotNegative
+    stiffness: Positive
     """N/m or Nm/rad."""
     damping: NotNegative
     """N s/m or Nm s/rad."""

@@ -7,8 +7,6 @@ A world is built in `sapien_world` and `sapien_robot` and goes on in `sapien_ste
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
-from itertools import chain
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Hidden, WorldState
 from bt_tasksim.engines.base import EngineSetup
+from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import RobotBuilder
 from bt_tasksim.engines.physics.sapien_stepping import SapienWorld
 from bt_tasksim.engines.physics.sapien_world import build_world
@@ -60,6 +59,7 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
         super().__init__(robot, worlds, threads)
         self._builder = RobotBuilder(robot)
         self._tip_points = np.array([tip.point for tip in robot.tips])
+        self._readings = SapienReadings(worlds, len(robot.tips))
         self._lever, self._to_tool = np.zeros((worlds, 3)), np.zeros((worlds, 1, 4))
 
     def _build(self, row: int, configuration: ActorConfiguration, start: Array) -> SapienWorld:
@@ -67,27 +67,32 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             world = build_world(configuration, self.robot.solver_iterations)
             robot = self._builder.build(world, start)
         self._lever[row], self._to_tool[row] = robot.lever, robot.to_tool
-        return SapienWorld(world, robot, configuration, len(self.robot.tips))
+        return SapienWorld(world, robot, configuration, len(self.robot.tips), self._readings, row)
+
+    def _widen(self, objects: int, fixtures: int) -> None:
+        """See `ThreadedBatch`."""
+        super()._widen(objects, fixtures)
+        for world in self.simulated:
+            if world is not None:
+                articulation = world.robot.articulation
+                self._readings.fit(articulation.dof, len(articulation.get_links()), *self._most)
+                return
 
     def _read(self, rows: Array, worlds: list[SapienWorld], layout: Layout) -> tuple[WorldState, Hidden]:
         """See `ThreadedBatch`."""
-        k, readings, robot = len(rows), [world.reading for world in worlds], worlds[0].robot
-        q = np.concatenate([r.position for r in readings]).reshape(k, -1)[:, robot.index].astype(float)
-        v = np.concatenate([r.velocity for r in readings]).reshape(k, -1)[:, robot.index].astype(float)
-        frames = _poses(pose for r in readings for pose in r.frames).reshape(k, -1, 7)
-        tool = poses.multiply(frames[:, 0], robot.tool_pose)
-        incoming = np.concatenate([r.incoming for r in readings]).reshape(k, -1, 6)[:, robot.wrist]
-        time = np.array([r.time for r in readings])
-        objects = layout.padded(_poses(pose for r in readings for pose in r.objects), 7)
-        velocities = layout.padded(np.array([v for r in readings for v in r.velocities], np.float32), 6)
-        touches = [r.touch for r in readings]
+        read, robot = self._readings, worlds[0].robot
+        q, v = read.position[rows][:, robot.index], read.velocity[rows][:, robot.index]
+        frames = read.frames[rows]
+        time, tool = read.time[rows], poses.multiply(frames[:, 0], robot.tool_pose)
+        objects = read.objects[rows]
+        velocities = np.concatenate([read.linear[rows], read.angular[rows]], axis=-1)
         state = WorldState(
             time=time,
             joint_position=q,
             joint_velocity=v,
             joint_effort=self._effort(rows, q, v),
-            tip_force=np.array([touch.tip_force for touch in touches]).reshape(k, -1, 3),
-            wrench=external_wrench(incoming.astype(float), self._lever[rows], self._to_tool[rows]),
+            tip_force=read.tip_force[rows],
+            wrench=external_wrench(read.incoming[rows, robot.wrist], self._lever[rows], self._to_tool[rows]),
             tool_pose=tool,
             tips=poses.transform(frames[:, 1:], self._tip_points),
             objects=objects,
@@ -97,18 +102,13 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             time=time,
             objects=objects,
             velocities=velocities,
-            hand_force=layout.padded([force for touch in touches for force in touch.hand_force]),
-            hand_distance=layout.padded([far for touch in touches for far in touch.hand_distance]),
-            support=layout.support([touch.support for touch in touches]),
-            penetration=np.array([r.penetration for r in readings]),
+            hand_force=read.hand_force[rows],
+            hand_distance=read.hand_distance[rows],
+            support=read.support[rows],
+            penetration=read.penetration[rows],
             tool_pose=tool,
         )
         return state, hidden
-
-
-def _poses(found: Iterable[tuple[float, ...]]) -> Array:
-    """Poses ``(n, 7)`` of tuples of numbers, quicker than NumPy itself makes them of nested ones."""
-    return np.fromiter(chain.from_iterable(found), float).reshape(-1, 7)
 
 
 @register("engine/physics", "sapien")

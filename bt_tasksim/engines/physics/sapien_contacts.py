@@ -20,6 +20,7 @@ TOUCH_DISTANCE = 0.002
 SUPPORT_DISTANCE = 5e-4
 """Metres of separation within which two bodies touch."""
 _UNKNOWN = ("none", 0)
+_LYING = ("object", "fixture")
 
 
 class Touch(NamedTuple):
@@ -159,15 +160,17 @@ def resist_rolling(world: World, step: float, hand_force: list[float]) -> None:
         hand_force: Force of the robot on each object, N.
     """
     loads: list[list[list[float]]] = [[] for _ in world.objects]
-    rate = 1.0 / step
+    rate, known = 1.0 / step, world.bodies
     for contact in world.system.get_contacts():
-        kinds = [world.bodies.get(body, _UNKNOWN) for body in contact.bodies]
-        if all(kind in ("object", "fixture") for kind, _ in kinds):
+        first, second = contact.bodies
+        (kind_a, i), (kind_b, j) = known.get(first, _UNKNOWN), known.get(second, _UNKNOWN)
+        if (kind_a == "object" and kind_b in _LYING) or (kind_b == "object" and kind_a in _LYING):
             impulses = [point.impulse.tolist() for point in contact.points]
             force = [rate * sum(values) for values in zip(*impulses, strict=True)]
-            for kind, k in kinds:
-                if kind == "object":
-                    loads[k].append(force)
+            if kind_a == "object":
+                loads[i].append(force)
+            if kind_b == "object":
+                loads[j].append(force)
     for k, body in enumerate(world.objects):
         spin = body.angular_velocity.tolist()
         damping = DAMPING

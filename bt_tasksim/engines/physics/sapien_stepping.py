@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
+from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import Robot
 from bt_tasksim.engines.physics.sapien_world import DAMPING, World, floats
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -20,32 +18,6 @@ WATCHED = 4
 overlaps are looked for at every step; at other times at the period's end."""
 
 
-class SapienReading(NamedTuple):
-    """What PhysX says of a world at one instant, as it says it: plain numbers cost least here.
-
-    Attributes:
-        time: Seconds since the episode began.
-        position: Of all joints of the articulation, in its own order.
-        velocity: The same.
-        incoming: Forces ``(n_links, 6)`` and torques that each link's parent exerts on it.
-        frames: Poses of `Robot.frames`.
-        objects: Poses of the objects.
-        velocities: Linear and angular ones ``(3,)`` of one object after the other.
-        touch: What touches what.
-        penetration: The deepest overlap so far, metres.
-    """
-
-    time: float
-    position: Array
-    velocity: Array
-    incoming: Array
-    frames: list[tuple[float, ...]]
-    objects: list[tuple[float, ...]]
-    velocities: list[Array]
-    touch: Touch
-    penetration: float
-
-
 class SapienWorld:
     """A world of SAPIEN, see `bt_tasksim.engines.physics.threaded.SimulatedWorld`.
 
@@ -54,16 +26,23 @@ class SapienWorld:
         robot: The robot in it.
         configuration: What was drawn.
         n_tips: Number of fingertips.
+        readings: Where its readings are written.
+        row: In which row.
 
     Attributes:
         world: The world.
         robot: The robot in it.
-        reading: What was read last.
     """
 
-    reading: SapienReading
-
-    def __init__(self, world: World, robot: Robot, configuration: ActorConfiguration, n_tips: int) -> None:
+    def __init__(
+        self,
+        world: World,
+        robot: Robot,
+        configuration: ActorConfiguration,
+        n_tips: int,
+        readings: SapienReadings,
+        row: int,
+    ) -> None:
         self.world, self.robot = world, robot
         self.n_objects, self.n_fixtures = len(configuration.objects), len(configuration.fixtures)
         self._dt = self._last_dt = 1.0 / configuration.physics_frequency
@@ -73,7 +52,16 @@ class SapienWorld:
         self._watch = WATCHED
         self._reader = ContactReader(world, n_tips)
         self._touch = self._reader.nothing
+        self._readings, self._row = readings, row
+        self._written: Touch | None = None
         disturbance, names = configuration.disturbance, [actor.name for actor in configuration.objects]
+        articulation = robot.articulation
+        self._joints = (
+            articulation.get_qpos,
+            articulation.get_qvel,
+            articulation.get_link_incoming_joint_forces,
+        )
+        self._frames = [link.get_entity_pose for link in robot.frames]
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
 
@@ -126,24 +114,34 @@ class SapienWorld:
 
     def read(self) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
-        articulation, bodies = self.robot.articulation, self.world.objects
+        out, row, bodies = self._readings, self._row, self.world.objects
         slept, self._asleep = self._asleep, all(body.is_sleeping for body in bodies)
         still = slept and self._asleep
         self._feel(still)
+        if self._touch is not self._written:
+            self._write_touch()
+        position, velocity, incoming = self._joints
+        out.time[row], out.penetration[row] = self._time, self._reader.penetration
+        out.position[row], out.velocity[row], out.incoming[row] = position(), velocity(), incoming()
+        out.frames[row] = [floats(pose()) for pose in self._frames]
         if not still:
-            self._objects = [floats(body.entity_pose) for body in bodies]
-            self._velocities = [v for body in bodies for v in (body.linear_velocity, body.angular_velocity)]
-        self.reading = SapienReading(
-            self._time,
-            articulation.get_qpos(),
-            articulation.get_qvel(),
-            articulation.get_link_incoming_joint_forces(),
-            [floats(link.entity_pose) for link in self.robot.frames],
-            self._objects,
-            self._velocities,
-            self._touch,
-            self._reader.penetration,
-        )
+            for k, body in enumerate(bodies):
+                out.objects[row, k] = floats(body.entity_pose)
+                out.linear[row, k], out.angular[row, k] = body.linear_velocity, body.angular_velocity
+
+    def _write_touch(self) -> None:
+        out, row, n, now, before = self._readings, self._row, self.n_objects, self._touch, self._written
+        if before is None:
+            out.clear(row)
+        out.tip_force[row] = now.tip_force
+        out.hand_force[row, :n], out.hand_distance[row, :n] = now.hand_force, now.hand_distance
+        if before is None or now.support != before.support:
+            support = out.support[row]
+            support[:] = False
+            gap = len(support) - n  # objects that other worlds have stand before the fixtures
+            for i, j in now.support:
+                support[i, j if j < n else j + gap] = True
+        self._written = now
 
     def _feel(self, asleep: bool = False) -> None:
         """Read what touches what; look closely for some time where that has changed."""

@@ -318,3 +318,12 @@ def test_worlds_in_the_middle_of_a_tick_keep_what_was_written(three):
 def test_a_single_world_has_an_axis_of_its_own():
     bundle = one_world(SimpleNamespace(tool_pose=np.arange(7.0), time=np.float64(2.0)))
     assert bundle.tool_pose.shape == (1, 7) and bundle.time.tolist() == [2.0]
+
+
+@pytest.mark.parametrize("first", [np.array([[1]]), np.array([[0.7]], np.float32)])
+def test_whole_numbers_and_short_ones_of_one_world_change_no_other(three, first):
+    context, a, b = three
+    context.write(Command(hand=first), rows(0), a)
+    context.write(Command(hand=np.array([[1.0 / 3.0]])), rows(2), b)
+    hand = context.written.hand
+    assert hand[0, 0] == first[0, 0] and np.isnan(hand[1, 0]) and hand[2, 0] == 1.0 / 3.0

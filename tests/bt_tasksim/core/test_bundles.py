@@ -105,3 +105,19 @@ def test_rows_are_taken_when_they_are_first_looked_at_and_then_kept():
         _ = rows.third
     with pytest.raises(AttributeError):
         _ = rows.__nothing__
+
+
+@pytest.mark.parametrize("rows", [[0], [0, 1]])
+@pytest.mark.parametrize(
+    ("before", "now", "named"),
+    [
+        (Pair(np.zeros(2, int), None), Pair(np.full(2, 1.5), None), "first is an array of int64"),
+        (Pair(np.zeros(2), None), Pair(np.zeros(2), np.zeros(2)), "second is None"),
+        (Pair(np.zeros(2), "left"), Pair(np.zeros(2), "right"), "second is 'left'"),
+        (np.zeros(2), Pair(np.zeros(2), None), "it is an array"),
+        (Pair({"a": np.zeros(2)}, None), Pair({"b": np.zeros(2)}, None), "first is a dict of a"),
+    ],
+)
+def test_a_memory_is_of_one_kind_however_many_worlds_come_at_once(rows, before, now, named):
+    with pytest.raises(InputError, match=named):
+        merged(before, np.array(rows), taken(now, np.array(rows)), 2)

@@ -129,3 +129,13 @@ def test_it_needs_no_torch():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[3.]"
+
+
+@pytest.mark.parametrize("library", ["numpy", "torch"])
+def test_what_a_row_comes_to_does_not_depend_on_the_others(library):
+    features = np.random.default_rng(0).normal(size=(257, 5)).astype(np.float32)
+    if library == "torch":
+        features = pytest.importorskip("torch").as_tensor(features)
+    whole = network()(features)
+    for k in (0, 1, 100, 256):
+        assert (network()(features[k : k + 1])[0] == whole[k]).all()

@@ -152,7 +152,18 @@ def test_a_wrong_address_is_refused_by_the_command(capsys):
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)]
 )
 def test_a_command_that_is_ended_loses_nothing_and_leaves_nothing(tmp_path, whole, number, code):
-    words = ["evaluate", "pick_and_throw", "--noise", "hard", "--seed", "40", "--episodes", "32", "--json"]
+    episodes = 96 if number == signal.SIGKILL else 2000  # more than it can do before it is told to end
+    words = [
+        "evaluate",
+        "pick_and_throw",
+        "--noise",
+        "hard",
+        "--seed",
+        "40",
+        "--episodes",
+        str(episodes),
+        "--json",
+    ]
     slow = ["--cluster", "local", "--workers", "1", "--batch", "1"]  # one episode after the other
     command = [sys.executable, "-m", "bt_tasksim.cli", *words, "e.json", *slow]
     first = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -170,9 +181,10 @@ def test_a_command_that_is_ended_loses_nothing_and_leaves_nothing(tmp_path, whol
     _, left = psutil.wait_procs(begun, timeout=30.0)
     assert [p for p in left if p.status() != psutil.STATUS_ZOMBIE] == []
     path = str(tmp_path / "e.json")
-    assert 2 <= len(read_kept(path, identity()).outcomes) < 32
+    assert 2 <= len(read_kept(path, identity()).outcomes) < episodes
     if number != signal.SIGKILL:
         return
     assert main([*words, path, "--resume"]) == 0
     content = json.loads(Path(path).read_text())
-    assert timeless(EpisodeOutcome.from_data(o) for o in content["outcomes"]) == timeless(whole.outcomes)
+    found = timeless(EpisodeOutcome.from_data(o) for o in content["outcomes"])
+    assert len(found) == episodes and found[: len(SEEDS)] == timeless(whole.outcomes)
