@@ -8,7 +8,7 @@ grasp axes, of which objects have unlike many, are padded, with masks.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -205,9 +205,16 @@ class WorldFacts:
 
     def sent(self, like: Array) -> WorldFacts:
         """The same facts in the library and on the device of an array."""
+        if isinstance(like, np.ndarray):
+            return self
         bundles = (self.object_facts, self.place_facts, self.obstacle_facts)
-        there = iter(sent([getattr(bundle, f.name) for bundle in bundles for f in fields(bundle)], like))
-        return self.map(lambda _: next(there))
+        named = [(bundle, f.name) for bundle in bundles for f in fields(bundle)]
+        there = iter(sent([getattr(*part) for part in named], like))
+        made: dict[str, Any] = {
+            name: type(bundle)(**{f.name: next(there) for f in fields(bundle)})
+            for name, bundle in zip(("object_facts", "place_facts", "obstacle_facts"), bundles, strict=True)
+        }
+        return replace(self, **made)
 
     def replaced(self, rows: Array, other: WorldFacts) -> WorldFacts:
         """The same facts, with those of other worlds, of the same columns, at ``rows (k,)``.
