@@ -29,8 +29,9 @@ from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.facts import ObjectFacts, take_rows
-from bt_tasksim.core.poses import Array, array_namespace, constant, host
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
+from bt_tasksim.core.transfer import fetched
 from bt_tasksim.core.world import Obstacle
 from bt_tasksim.planning.reference_motion import plan
 from bt_tasksim.planning.ways import Carried, clear_path
@@ -153,12 +154,12 @@ class Bring(Carry):
         middle, turns = _by_neutral(seen, tool_goal)
         held, exits = poses.inverse(grip), self._exits(seen)
         arrays = (seen.tool, tool_goal, middle, held, extent, *exits)
-        start, goal, middle, held, extent, out, into = (host(values) for values in arrays)
-        ways = []
+        start, goal, middle, held, extent, out, into = fetched(arrays)
+        ways, obstacles = [], obstacles_of(seen)
         for k in range(goal.shape[0]):
             carried = Carried(seen.robot.envelope, tuple(extent[k].tolist()), held[k])
             turn = middle[k] if bool(turns[k]) else None
-            ways.append(_way(start[k], goal[k], turn, carried, obstacles_of(seen, k), (out[k], into[k])))
+            ways.append(_way(start[k], goal[k], turn, carried, obstacles[k], (out[k], into[k])))
         most = max(len(way) for way in ways)
         padded = np.array([[*way, *[way[-1]] * (most - len(way))] for way in ways])
         return [constant(padded[:, k], tool_goal) for k in range(most)]
@@ -176,11 +177,14 @@ class Bring(Carry):
         return out, xp.where(goal.container[:, None], nothing, goal.clearance[:, None] * goal.exit)
 
 
-def obstacles_of(seen: Seen, world: int) -> list[Obstacle]:
-    """What is to be kept clear of in one world, by its row."""
+def obstacles_of(seen: Seen) -> list[list[Obstacle]]:
+    """What is to be kept clear of in each world."""
     boxes = seen.world.obstacle_facts
-    there, pose, size = (host(values[world, ...]) for values in (boxes.present, boxes.pose, boxes.size))
-    return [Obstacle(pose[k], tuple(size[k].tolist()), "") for k in np.flatnonzero(there).tolist()]
+    there, pose, size = fetched([boxes.present, boxes.pose, boxes.size])
+    return [
+        [Obstacle(at[k], tuple(full[k].tolist()), "") for k in np.flatnonzero(has).tolist()]
+        for has, at, full in zip(there, pose, size, strict=True)
+    ]
 
 
 def _way(

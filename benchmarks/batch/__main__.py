@@ -12,13 +12,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.batch import device, episodes, executor, kinematics, physics, same_bits, same_ticks
+from benchmarks.batch import device, episodes, executor, kinematics, laws, physics, same_bits, same_ticks
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.files import write_text
 
 SECTIONS = {
     "executor": executor,
     "kinematics": kinematics,
+    "laws": laws,
     "physics": physics,
     "episodes": episodes,
     "device": device,
@@ -36,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--device",
         default="cpu",
         metavar="D",
-        help="what torch (section executor) and MuJoCo Warp (section device) run on: cpu, cuda, cuda:N",
+        help="what torch (sections executor, laws) and MuJoCo Warp (device) run on: cpu, cuda, cuda:N",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
     for section in SECTIONS.values():

@@ -21,7 +21,7 @@ import numpy as np
 
 from bt_tasksim.engines.base import engine_class
 from bt_tasksim.execution.batch_runner import BatchRunner
-from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.pipelines import LAWS, EngineOptions
 from bt_tasksim.execution.runner import LONGEST
 from bt_tasksim.trees.load import load_source
 
@@ -34,6 +34,9 @@ SLICES = 3
 def options(parser: argparse.ArgumentParser) -> None:
     """What the section takes."""
     parser.add_argument("--worlds", type=_positive, metavar="N", help="how many, in the section device")
+    parser.add_argument(
+        "--laws", choices=LAWS, default="auto", help="what concepts and joints are computed with (device)"
+    )
 
 
 def measure(options: argparse.Namespace) -> dict[str, Any]:
@@ -42,7 +45,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     kind = options.device.partition(":")[0]
     worlds = options.worlds or (WORLDS[kind] // 2 if options.quick and kind == "cpu" else WORLDS[kind])
     source = load_source("pick_and_place")
-    engines = EngineOptions(engines="mujoco_warp", device=options.device)
+    engines = EngineOptions(engines="mujoco_warp", device=options.device, laws=options.laws)
     runner = BatchRunner(source.build, source.scene, engines, worlds, threads=_threads(), longest=1.0)
     for _ in runner.run(range(worlds)):  # kernels are compiled, graphs captured
         pass

@@ -4,6 +4,9 @@
 how near to done its policy says it is. One tick is two steps: `Activation.judge` says in which worlds the
 concept can go on, and `Activation.act` carries out what was decided there. A leaf of py_trees has one for a
 single world, a batch of trees one for all of its worlds.
+
+What is seen, remembered, decided and commanded is where the context has it, on a device if need be. Which
+worlds go on, statuses, clocks and counts are NumPy's.
 """
 
 from __future__ import annotations
@@ -31,6 +34,7 @@ from bt_tasksim.core.outcomes import (
     Statement,
 )
 from bt_tasksim.core.poses import Array, array_namespace, host
+from bt_tasksim.core.transfer import Index, fetched
 from bt_tasksim.policy.policy import Action
 
 LOST_TICKS = 3
@@ -135,7 +139,7 @@ class Activation:
         nearer = self._nearer[judged.rows] + host(action.terminate)
         self._nearer[judged.rows] = nearer
         done = nearer >= 1.0
-        late = ~done & (host(judged.seen.elapsed) > model.timeout)
+        late = ~done & (self.elapsed(judged.rows) > model.timeout)
         ended = done | late
         if ended.any():
             positions = np.flatnonzero(ended)
@@ -148,15 +152,15 @@ class Activation:
                 context.reach(goal, model.actor, finished)
             self._say_end(ends, done[positions])
             positions = np.flatnonzero(~ended)
-            judged, motion = judged.at(positions), action.motion[positions]
             if not len(positions):
                 return statuses
+            judged, motion = judged.at(positions), Index(positions).of(action.motion)
         else:
             motion = action.motion
         command, after = model.carry_out(motion, judged.seen, judged.memory)
         context.write(command, judged.rows, self._leaf)
         if after is not judged.memory:
-            self.memory = merged(self.memory, judged.rows, after, context.worlds)
+            self.memory = merged(self.memory, context.index(judged.rows), after, context.worlds)
         return statuses
 
     def going_on(self, rows: Array) -> Judged:
@@ -181,6 +185,7 @@ class Activation:
         unmet = sequence_of(model.initial_state(seen), type(model).__name__)
         cannot = host(any_of(seen.tool, unmet))
         if cannot.any():
+            unmet = [possible.on_host() for possible in unmet]
             for k in np.flatnonzero(cannot).tolist():
                 why = first_of(unmet, k)
                 self._fail(statuses, int(positions[k]), int(begins[k]), CANNOT_START(why))
@@ -189,7 +194,7 @@ class Activation:
                 return
             begins, positions, seen = begins[can], positions[can], seen.at(can)
         try:
-            self.memory = merged(self.memory, begins, model.begin(seen), context.worlds)
+            self.memory = merged(self.memory, context.index(begins), model.begin(seen), context.worlds)
         except NoWayError:
             self._begin_each(begins, positions, seen, statuses)
 
@@ -208,20 +213,20 @@ class Activation:
         on = rows[going]
         memory = self.memory
         if memory is not None and len(on) < self._context.worlds:
-            memory = taken(memory, on)
+            memory = taken(memory, self._context.index(on))
         return Judged(statuses, going, on, self.seen(on), memory)
 
     def _kept(self, rows: Array, judged: Judged) -> Judged:
         """Those of them in which no limit is exceeded and no goal lost."""
         model, context, seen = self._model, self._context, judged.seen
-        broken = host(model.violated(seen, judged.memory))
+        held = {goal: context.reached(goal, model.actor, judged.rows) for goal in model.maintains}
+        asked = [goal for goal, worlds in held.items() if worlds.any()]
+        maintained = (model.maintained(goal, seen, judged.memory) for goal in asked)
+        broken, *keeps = fetched([model.violated(seen, judged.memory), *maintained])
         lost = np.zeros(len(judged.rows), bool)
         missing = np.zeros(len(judged.rows), bool)
-        for goal in model.maintains:
-            held = context.reached(goal, model.actor, judged.rows)
-            if not held.any():
-                continue
-            gone = held & ~host(model.maintained(goal, seen, judged.memory)) & ~missing & ~broken
+        for goal, kept in zip(asked, keeps, strict=True):
+            gone = held[goal] & ~kept & ~missing & ~broken
             missing |= gone
             over = gone & (self._lost[judged.rows] + 1 >= LOST_TICKS)
             for k in np.flatnonzero(over).tolist():
@@ -232,7 +237,7 @@ class Activation:
             lost |= over
         self._lost[judged.rows] = np.where(missing, self._lost[judged.rows] + 1, 0)
         if broken.any():
-            limits = model.limits(seen, judged.memory)
+            limits = [limit.on_host() for limit in model.limits(seen, judged.memory)]
             for k in np.flatnonzero(broken).tolist():
                 measured = self._measured(judged, k)
                 exceeded = first_of(limits, k)
@@ -252,7 +257,8 @@ class Activation:
     def _say_end(self, ends: Judged, done: Array) -> None:
         """How it ended where it was done, or late."""
         said = as_statement(self._model.explain(ends.seen, ends.memory))
-        elapsed = host(ends.seen.elapsed).tolist()
+        said = None if said is None else said.on_host()
+        elapsed = self.elapsed(ends.rows).tolist()
         for k, row in enumerate(ends.rows.tolist()):
             measured = None if said is None else said.at(k)
             if done[k]:

@@ -12,7 +12,8 @@ from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.batch_leaf import FAILURE, PENDING, RUNNING, SUCCESS, BatchLeaf
 from bt_tasksim.core.outcomes import Outcome
-from bt_tasksim.core.poses import Array, host
+from bt_tasksim.core.poses import Array, array_namespace, host
+from bt_tasksim.core.transfer import Index
 from bt_tasksim.policy.policy import Action
 
 
@@ -28,8 +29,10 @@ class ConceptInBatch(BatchLeaf):
     def __init__(self, leaf: ConceptNode, context: Context) -> None:
         self.leaf, self._context = leaf, context
         self.activation = Activation(leaf, leaf.model, context)
-        self._motion: Array = np.zeros((context.worlds, leaf.model.actions))
-        self._terminate: Array = np.zeros(context.worlds)
+        like, worlds = context.like, context.worlds
+        xp = array_namespace(like)
+        self._motion: Array = xp.zeros((worlds, leaf.model.actions), dtype=like.dtype, device=like.device)
+        self._terminate: Array = xp.zeros((worlds,), dtype=like.dtype, device=like.device)
         self._due: Judged | None = None
 
     def tick(self, rows: Array, fresh: Array) -> Array:
@@ -58,13 +61,18 @@ class ConceptInBatch(BatchLeaf):
         return due._replace(statuses=np.full(k, RUNNING, np.int8), going=np.arange(k))
 
     def decide(self, rows: Array, action: Action) -> None:
-        """Say what is to be done in worlds ``rows (k,)`` whose ticks are PENDING before this leaf."""
-        self._motion[rows], self._terminate[rows] = action.motion, action.terminate
+        """Say what is to be done in worlds ``rows (k,)`` whose ticks are PENDING before this leaf.
+
+        The action may be NumPy's wherever concepts are computed.
+        """
+        xp, index = array_namespace(self._motion), Index(rows)
+        for whole, new in ((self._motion, action.motion), (self._terminate, action.terminate)):
+            index.put(whole, xp.asarray(new, dtype=whole.dtype, device=whole.device))
 
     def resume(self, rows: Array) -> Array:
         """See `BatchLeaf.resume`."""
-        judged = self.waiting(rows)
-        action = Action(self._motion[rows], self._terminate[rows])
+        judged, index = self.waiting(rows), Index(rows)
+        action = Action(index.of(self._motion), index.of(self._terminate))
         return self.activation.act(judged, self.leaf.amended(action, judged.memory))
 
     def stop(self, rows: Array) -> None:

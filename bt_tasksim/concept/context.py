@@ -19,12 +19,15 @@ from bt_tasksim.core.errors import CommandConflictError, LeafError
 from bt_tasksim.core.facts import FactsTable, WorldFacts
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.plain import shown
-from bt_tasksim.core.poses import Array, array_namespace, host
+from bt_tasksim.core.poses import Array, array_namespace, constant, host
+from bt_tasksim.core.transfer import Index, fetched, sent
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.robot.description import RobotDescription
 
 NO_EPISODE = "no episode has begun: a tree with concepts is ticked by a Runner"
 NOBODY = -1
+OFTEN = 64
+"""Sets of worlds that a context keeps in mind."""
 _T = TypeVar("_T", Observation, Hidden)
 
 
@@ -54,8 +57,8 @@ class Written:
     hand: Array | None
 
     def of_world(self, world: int) -> Command:
-        """The command of one world, by its row: a part is None where nobody wrote it."""
-        parts = (None if part is None else part[world] for part in (self.tool, self.hand))
+        """The command of one world, by its row, in NumPy: a part is None where nobody wrote it."""
+        parts = (None if part is None else host(part[world, ...]) for part in (self.tool, self.hand))
         return Command(*(None if part is None or np.isnan(part[0]) else part for part in parts))
 
 
@@ -65,13 +68,17 @@ class Context:
     Args:
         robot: The robot that the tree commands.
         worlds: In how many worlds the tree is ticked.
+        like: An array of the library, type and device in which concepts are computed, and in which
+            observations come and commands go; by default NumPy. Numbers of worlds, clocks, and who wrote what
+            are NumPy's in any case.
     """
 
-    def __init__(self, robot: RobotDescription, worlds: int = 1) -> None:
+    def __init__(self, robot: RobotDescription, worlds: int = 1, like: Array | None = None) -> None:
         self.robot = robot
         self.worlds = worlds
+        self.like: Array = np.empty(0) if like is None else like
         self.rows: Array = np.arange(worlds)
-        self._facts = FactsTable(worlds)
+        self._facts = FactsTable(worlds, self.like)
         self._looked: Observation | None = None
         self._observation: Observation | None = None
         self.ask_hidden: Callable[[Array | None], Hidden | None] = lambda rows: None
@@ -82,7 +89,8 @@ class Context:
         self.refused: dict[int, Refusal] = {}
         """By world."""
         self._held: dict[tuple[str, str], Array] = {}
-        self._parts = {"tool": _Part("tool", worlds), "hand": _Part("hand", worlds)}
+        self._parts = {name: _Part(name, worlds, self.like) for name in ("tool", "hand")}
+        self._indices: dict[bytes, Index] = {}
 
     @property
     def now(self) -> float:
@@ -156,7 +164,7 @@ class Context:
                 middle of a tick.
         """
         self._looked, self._observation = observation, None
-        self.times = observation.time
+        self.times = host(observation.time)
         rows = self.rows if rows is None else rows
         for part in self._parts.values():
             part.clear(rows)
@@ -173,9 +181,9 @@ class Context:
         """
         size = self.times.dtype.itemsize
         if command.tool is not None:
-            self._parts["tool"].write(command.tool, rows, leaf, size)
+            self._parts["tool"].write(command.tool, self.index(rows), leaf, size)
         if command.hand is not None:
-            self._parts["hand"].write(command.hand, rows, leaf, size)
+            self._parts["hand"].write(command.hand, self.index(rows), leaf, size)
 
     def tool_writer(self, world: int = 0) -> Behaviour | None:
         """The leaf that has commanded the tool in this tick, in one world."""
@@ -197,7 +205,10 @@ class Context:
         Raises:
             LeafError: A part is not finite; names the leaf that wrote it.
         """
-        return Written(self._parts["tool"].checked(), self._parts["hand"].checked())
+        parts = {name: part for name, part in self._parts.items() if part.values is not None}
+        for part, finite in zip(parts.values(), fetched([p.finite() for p in parts.values()]), strict=True):
+            part.check(finite)
+        return Written(*(part.values for part in self._parts.values()))
 
     @property
     def command(self) -> Command:
@@ -226,79 +237,95 @@ class Context:
 
         Args:
             rows: Which ``(k,)``, ascending.
-            elapsed: Seconds ``(k,)`` since the concept became active.
+            elapsed: Seconds ``(k,)`` since the concept became active, in NumPy.
         """
-        observation, facts = self.observation, self.world
+        observation, facts, (since,) = self.observation, self.world, sent([elapsed], self.like)
         if len(rows) == self.worlds:
-            return Seen(observation, facts, self.robot, elapsed)
-        picked: Observation = Rows(observation, lambda values: values[rows])  # type: ignore[assignment]
-        return Seen(picked, self._facts.taken(rows), self.robot, elapsed)
+            return Seen(observation, facts, self.robot, since)
+        index = self.index(rows)
+        picked: Observation = Rows(observation, index.of)  # type: ignore[assignment]
+        return Seen(picked, self._facts.taken(index), self.robot, since)
+
+    def index(self, rows: Array) -> Index:
+        """What picks some worlds ``(k,)``; numbers that are asked for often go to a device once."""
+        if isinstance(self.like, np.ndarray):
+            return Index(rows)
+        key = rows.tobytes()
+        if key not in self._indices:
+            if len(self._indices) >= OFTEN:
+                self._indices.clear()
+            self._indices[key] = Index(rows)
+        return self._indices[key]
 
 
 class _Part:
     """One part of the command: the targets of all worlds, and which leaf wrote each."""
 
-    def __init__(self, name: str, worlds: int) -> None:
-        self._name, self._worlds = name, worlds
+    def __init__(self, name: str, worlds: int, like: Array) -> None:
+        self._name, self._worlds, self._like = name, worlds, like
         self._leaves: list[Behaviour] = []
         self._by: Array = np.full(worlds, NOBODY)
-        self._values: Array | None = None
+        self.values: Array = None
 
     def clear(self, rows: Array) -> None:
-        if self._values is None:
+        if self.values is None:
             return
         if len(rows) == self._worlds:
-            self._leaves, self._by, self._values = [], np.full(self._worlds, NOBODY), None
+            self._leaves, self._by, self.values = [], np.full(self._worlds, NOBODY), None
             return
-        self._values = array_namespace(self._values).asarray(self._values, copy=True)
-        self._values[rows], self._by[rows] = np.nan, NOBODY
+        self._forget(rows)
 
     def writer(self, world: int) -> Behaviour | None:
         number = int(self._by[world])
         return None if number == NOBODY else self._leaves[number]
 
-    def write(self, values: Array, rows: Array, leaf: Behaviour, size: int) -> None:
+    def write(self, values: Array, index: Index, leaf: Behaviour, size: int) -> None:
         """Write targets as floats of so many bytes: those of one world may not round another's."""
+        rows = index.rows
         before = self._by[rows]
-        if self._values is not None and (before != NOBODY).any():
+        if self.values is not None and (before != NOBODY).any():
             raise _conflict(self._name, self._leaves[int(before[before != NOBODY][0])], leaf)
         values = _floats(self._shaped(values, len(rows), leaf), size)
         if len(rows) == self._worlds:
-            self._values = values
+            self.values = values
         else:
-            if self._values is None:
+            if self.values is None:
                 xp, shape = array_namespace(values), (self._worlds, values.shape[-1])
-                self._values = xp.full(shape, np.nan, dtype=values.dtype, device=values.device)
-            width = max(self._values.shape[-1], values.shape[-1])
-            self._values, values = _widened(self._values, width), _widened(values, width)
-            self._values[rows] = values
+                self.values = xp.full(shape, np.nan, dtype=values.dtype, device=values.device)
+            width = max(self.values.shape[-1], values.shape[-1])
+            self.values, values = _widened(self.values, width), _widened(values, width)
+            index.put(self.values, values)
         if leaf not in self._leaves:
             self._leaves.append(leaf)
         self._by[rows] = self._leaves.index(leaf)
 
     def withdraw(self, leaf: Behaviour, rows: Array) -> None:
-        if leaf not in self._leaves or self._values is None:
+        if leaf not in self._leaves or self.values is None:
             return
         mine = rows[self._by[rows] == self._leaves.index(leaf)]
-        self._values = array_namespace(self._values).asarray(self._values, copy=True)
-        self._values[mine], self._by[mine] = np.nan, NOBODY
+        self._forget(mine)
 
-    def checked(self) -> Array | None:
-        if self._values is None:
-            return None
-        xp = array_namespace(self._values)
-        finite = xp.all(xp.isfinite(self._values), axis=-1)
-        for world in np.flatnonzero(host(~finite) & (self._by != NOBODY)).tolist():
+    def _forget(self, rows: Array) -> None:
+        self.values = array_namespace(self.values).asarray(self.values, copy=True)
+        Index(rows).put(self.values, np.nan)
+        self._by[rows] = NOBODY
+
+    def finite(self) -> Array:
+        xp = array_namespace(self.values)
+        return xp.all(xp.isfinite(self.values), axis=-1)
+
+    def check(self, finite: np.ndarray) -> None:
+        for world in np.flatnonzero(~finite & (self._by != NOBODY)).tolist():
             leaf = self._leaves[int(self._by[world])]
             raise LeafError(
-                f"leaf '{leaf.name}' commands a {self._name} target that is not finite: {self._values[world]}"
+                f"leaf '{leaf.name}' commands a {self._name} target that is not finite: "
+                f"{host(self.values[world, ...])}"
             )
-        return self._values
 
     def _shaped(self, values: Array, worlds: int, leaf: Behaviour) -> Array:
         """Targets as an array ``(k, n)``."""
         try:
-            found = values if hasattr(values, "ndim") else np.asarray(values, float)
+            found = values if hasattr(values, "ndim") else constant(values, self._like)
             shape = tuple(found.shape)
         except (TypeError, ValueError):
             found, shape = values, ()
@@ -350,6 +377,6 @@ def one_world(bundle: _T) -> _T:
 
 
 def only_world(bundle: _T, world: int) -> _T:
-    """One world of an observation ``(N, ...)``, or of a hidden state, as that of a batch of one."""
-    found: _T = Rows(bundle, lambda values: values[world : world + 1])  # type: ignore[assignment]
+    """One world of an observation ``(N, ...)``, or of a hidden state, as that of a batch of one, in NumPy."""
+    found: _T = Rows(bundle, lambda values: host(values[world : world + 1, ...]))  # type: ignore[assignment]
     return found

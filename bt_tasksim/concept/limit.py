@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from bt_tasksim.core.outcomes import Outcome, Reason
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, host
 
 NO_NAMES: Mapping[str, str] = MappingProxyType({})
 
@@ -34,6 +34,13 @@ class Limit(NamedTuple):
     def applies(self) -> Array:
         """Boolean ``(N,)``: it is exceeded."""
         return (self.value > self.limit) & self.counts
+
+    def on_host(self) -> Limit:
+        """The same, with all numbers in NumPy: to be asked before many worlds are."""
+        value, limit, counts = (
+            host(x) if getattr(x, "ndim", 0) else x for x in (self.value, self.limit, self.counts)
+        )
+        return self._replace(value=value, limit=limit, counts=counts)
 
     def at(self, world: int) -> Outcome:
         """The reason with its numbers in one world, by its row.

@@ -9,6 +9,7 @@ from bt_tasksim.core.bundles import Rows
 from bt_tasksim.core.facts import ObjectFacts, PlaceFacts, WorldFacts
 from bt_tasksim.core.observables import observable
 from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import Hidden, Observation
 from bt_tasksim.robot.description import RobotDescription
 
@@ -40,8 +41,9 @@ class Seen:
         Args:
             rows: Their numbers ``(k,)``, ascending.
         """
-        picked: Observation = Rows(self.observation, lambda values: values[rows])  # type: ignore[assignment]
-        return Seen(picked, self.world.map(lambda values: values[rows]), self.robot, self.elapsed[rows])
+        index = Index(rows)
+        picked: Observation = Rows(self.observation, index.of)  # type: ignore[assignment]
+        return Seen(picked, self.world.map(index.of), self.robot, index.of(self.elapsed))
 
     def observable(self, name: str) -> Array:
         """An observable by its name, computed when it is first asked for.

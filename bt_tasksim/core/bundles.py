@@ -12,6 +12,7 @@ from typing import Any
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.transfer import Index
 
 
 def parts(bundle: Any) -> dict[str, Any] | None:
@@ -49,12 +50,12 @@ def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
     return type(first)(**made)
 
 
-def taken(bundle: Any, rows: Array) -> Any:
+def taken(bundle: Any, rows: Array | Index) -> Any:
     """The worlds ``rows (k,)`` of a bundle."""
-    return mapped(lambda values: values[rows], bundle)
+    return mapped(_index(rows).of, bundle)
 
 
-def merged(whole: Any, rows: Array, new: Any, worlds: int) -> Any:
+def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
     """A bundle of ``worlds`` worlds in which those at ``rows (k,)`` are ``new``; nothing given is changed.
 
     Args:
@@ -71,9 +72,14 @@ def merged(whole: Any, rows: Array, new: Any, worlds: int) -> Any:
         _check_alike(whole, new)
     if len(rows) == worlds:
         return new
+    index = _index(rows)
     if whole is None:
-        return mapped(lambda values: _spread(values, rows, worlds), new)
-    return mapped(lambda before, values: _replaced(before, rows, values), whole, new)
+        return mapped(lambda values: _spread(values, index, worlds), new)
+    return mapped(lambda before, values: _replaced(before, index, values), whole, new)
+
+
+def _index(rows: Array | Index) -> Index:
+    return rows if isinstance(rows, Index) else Index(rows)
 
 
 def _check_alike(before: Any, now: Any, name: str = "") -> None:
@@ -104,21 +110,21 @@ def _kind(value: Any) -> str:
     return repr(value) if inner is None else f"a {type(value).__name__} of {', '.join(inner) or 'nothing'}"
 
 
-def _spread(values: Array, rows: Array, worlds: int) -> Array:
+def _spread(values: Array, index: Index, worlds: int) -> Array:
     xp = array_namespace(values)
     out = xp.zeros((worlds, *values.shape[1:]), dtype=values.dtype, device=values.device)
-    out[rows] = values
+    index.put(out, values)
     return out
 
 
-def _replaced(before: Array, rows: Array, values: Array) -> Array:
+def _replaced(before: Array, index: Index, values: Array) -> Array:
     if before.shape[1:] != values.shape[1:]:
         raise InputError(
             f"the memories of unlike worlds do not fit together: {tuple(before.shape[1:])} and "
             f"{tuple(values.shape[1:])}; pad what is of unlike length"
         )
     out = array_namespace(before).asarray(before, copy=True)
-    out[rows] = values
+    index.put(out, values)
     return out
 
 

@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import Hidden, Observation, WorldModel
 
 OF_OBJECTS = ("objects", "velocities", "hand_force", "hand_distance")
@@ -87,26 +88,32 @@ def _support(values: Array, own: Array) -> Array:
     return xp.permute_dims(_picked(touched, np.concatenate([bodies, fixtures], axis=1)), (0, 2, 1))
 
 
-def _picked(values: Array, index: Array) -> Array:
+def _picked(values: Array, index: np.ndarray) -> Array:
     """Of ``values (N, w, ...)`` the entries ``index (N, n)`` of each; NaN or False where there is none."""
-    xp, inner = array_namespace(values), values.shape[2:]
+    xp, (worlds, width), inner = array_namespace(values), values.shape[:2], values.shape[2:]
     nothing = False if values.dtype == xp.bool else np.nan
     out = xp.full((*index.shape, *inner), nothing, dtype=values.dtype, device=values.device)
-    rows, columns = np.nonzero((index != ABSENT) & (index < values.shape[1]))
-    out[rows, columns] = values[rows, index[rows, columns]]
-    return out
+    there = (index != ABSENT) & (index < width)
+    if not there.any():
+        return out
+    numbers = np.arange(worlds)[:, None] * width + np.where(there, index, 0)
+    picked = Index(numbers.reshape(-1)).of(xp.reshape(values, (worlds * width, *inner)))
+    known = xp.reshape(xp.asarray(there, device=values.device), (*index.shape, *(1,) * len(inner)))
+    return xp.where(known, xp.reshape(picked, out.shape), out)
 
 
-def with_rows(array: Array, rows: Array, values: Array, filling: Any) -> Array:
+def with_rows(array: Array, index: Index, values: Array, filling: Any) -> Array:
     """An array ``(N, ...)`` with other rows ``(k, ...)``; what is shorter is filled up."""
+    xp = array_namespace(array)
     most = tuple(max(n, m) for n, m in zip(array.shape[1:], values.shape[1:], strict=True))
-    out = array.copy() if most == array.shape[1:] else filled(array, most, filling)
-    out[rows] = values if most == values.shape[1:] else filled(values, most, filling)
+    out = xp.asarray(array, copy=True) if most == tuple(array.shape[1:]) else filled(array, most, filling)
+    index.put(out, values if most == tuple(values.shape[1:]) else filled(values, most, filling))
     return out
 
 
 def filled(array: Array, most: tuple[int, ...], filling: Any) -> Array:
     """An array ``(n, ...)`` as ``(n, *most)``."""
-    out = np.full((array.shape[0], *most), filling, array.dtype)
+    xp = array_namespace(array)
+    out = xp.asarray(xp.broadcast_to(constant(filling, array), (array.shape[0], *most)), copy=True)
     out[(slice(None), *(slice(0, n) for n in array.shape[1:]))] = array
     return out

@@ -8,7 +8,7 @@ grasp axes, of which objects have unlike many, are padded, with masks.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,6 +17,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.columns import Order, filled, with_rows
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.transfer import Index, sent
 from bt_tasksim.core.world import Hidden, ObjectModel, Observation, PlaceModel, WorldModel
 
 _T = TypeVar("_T", bound="FactArrays")
@@ -206,6 +207,19 @@ class WorldFacts:
             self.obstacle_facts.map(change),
         )
 
+    def sent(self, like: Array) -> WorldFacts:
+        """The same facts in the library and on the device of an array."""
+        if isinstance(like, np.ndarray):
+            return self
+        bundles = (self.object_facts, self.place_facts, self.obstacle_facts)
+        named = [(bundle, f.name) for bundle in bundles for f in fields(bundle)]
+        there = iter(sent([getattr(*part) for part in named], like))
+        made: dict[str, Any] = {
+            name: type(bundle)(**{f.name: next(there) for f in fields(bundle)})
+            for name, bundle in zip(("object_facts", "place_facts", "obstacle_facts"), bundles, strict=True)
+        }
+        return replace(self, **made)
+
     def replaced(self, rows: Array, other: WorldFacts) -> WorldFacts:
         """The same facts, with those of other worlds, of the same columns, at ``rows (k,)``.
 
@@ -214,12 +228,14 @@ class WorldFacts:
         """
         _check_alike(self, other)
 
+        index = Index(rows)
+
         def bundle(kind: str) -> Any:
             mine, others = getattr(self, kind), getattr(other, kind)
             return type(mine)(
                 **{
                     f.name: with_rows(
-                        getattr(mine, f.name), rows, getattr(others, f.name), _FILLING.get(f.name, 0)
+                        getattr(mine, f.name), index, getattr(others, f.name), _FILLING.get(f.name, 0)
                     )
                     for f in fields(mine)
                 }
@@ -396,9 +412,11 @@ class FactsTable:
 
     Args:
         worlds: How many there are.
+        like: An array of the library, type and device of the facts; by default NumPy.
     """
 
-    def __init__(self, worlds: int) -> None:
+    def __init__(self, worlds: int, like: Array | None = None) -> None:
+        self._like: Array = np.empty(0) if like is None else like
         self._models: list[WorldModel | None] = [None] * worlds
         self._facts: WorldFacts | None = None
         self._order: Order | None = None
@@ -428,12 +446,13 @@ class FactsTable:
             begun = [model for model in self._models if model is not None]
             if known is None or _names(begun) != (set(known.columns), set(known.place_columns)):
                 worlds = [begun[0] if model is None else model for model in self._models]
-                self._facts = WorldFacts.of(worlds)
-                self._order = Order.of(worlds, list(self._facts.columns))
+                made = WorldFacts.of(worlds)
+                self._facts = made.sent(self._like)
+                self._order = Order.of(worlds, list(made.columns))
             else:
                 fresh = [model for row in rows if (model := self._models[row]) is not None]
                 anew = WorldFacts.of(fresh, list(known.columns), list(known.place_columns))
-                self._facts = known.replaced(np.array(rows), anew)
+                self._facts = known.replaced(np.array(rows), anew.sent(self._like))
                 assert self._order is not None, "it is made with the facts"
                 self._order = self._order.replaced(np.array(rows), Order.of(fresh, list(known.columns)))
             self._stale.clear()
@@ -448,15 +467,15 @@ class FactsTable:
         """
         return bundle if self.facts is None or self._order is None else self._order.arranged(bundle, rows)
 
-    def taken(self, rows: Array) -> WorldFacts:
-        """The facts of some worlds ``rows (k,)``."""
-        key = rows.tobytes() if isinstance(rows, np.ndarray) else bytes(np.asarray(rows))
+    def taken(self, index: Index) -> WorldFacts:
+        """The facts of some worlds."""
+        key = index.rows.tobytes()
         if key not in self._taken:
             facts = self.facts
             assert facts is not None, "worlds have begun"
             if len(self._taken) > 64:
                 self._taken.clear()
-            self._taken[key] = facts.map(lambda values: values[rows])
+            self._taken[key] = facts.map(index.of)
         return self._taken[key]
 
 

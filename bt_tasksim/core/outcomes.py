@@ -34,7 +34,7 @@ from bt_tasksim.core.errors import (
     UnreachableError,
 )
 from bt_tasksim.core.markup import html_pairs
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, host
 from bt_tasksim.core.registry import part, register
 from bt_tasksim.core.units import METRES, RADIANS, SECONDS, Measured, Unit, told_apart
 
@@ -115,6 +115,11 @@ class Statement:
     numbers: Mapping[str, float]
     names: Mapping[str, str]
     detail: Statement | None = None
+
+    def on_host(self) -> Self:
+        """The same, with its numbers in NumPy, wherever they are: to be asked before many worlds are."""
+        numbers: Any = {n: host(v) if getattr(v, "ndim", 0) else v for n, v in self.numbers.items()}
+        return replace(self, numbers=numbers, detail=None if self.detail is None else self.detail.on_host())
 
     def at(self, world: int) -> Self:
         """What a statement about a batch says of one world, by its row."""
@@ -252,6 +257,10 @@ class Possible(NamedTuple):
 
     applies: Array
     outcome: Outcome
+
+    def on_host(self) -> Possible:
+        """The same, with all numbers in NumPy: to be asked before many worlds are."""
+        return Possible(host(self.applies), self.outcome.on_host())
 
     def at(self, world: int) -> Outcome:
         """The outcome of one world, by its row."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import array_api_compat
@@ -62,16 +63,46 @@ def _rot(q: list[float], v: Sequence[float]) -> list[float]:
 
 
 def constant(value: Any, like: Array) -> Array:
-    """Plain numbers as an array of the same library, type and device as another one."""
+    """Plain numbers as an array of the same library, type and device as another one; not to be written.
+
+    Few numbers are kept there, so that constants of a law go to a device once.
+    """
     if type(like) is np.ndarray:
         return np.asarray(value, like.dtype)
-    return array_namespace(like).asarray(value, dtype=like.dtype, device=like.device)
+    return _there(value, like, like.dtype)
+
+
+def indices(value: np.ndarray, like: Array) -> Array:
+    """Fixed whole numbers in the library and on the device of another array, see `constant`."""
+    return value if type(like) is np.ndarray else _there(value, like, None)
+
+
+def _there(value: Any, like: Array, dtype: Any) -> Array:
+    xp = array_namespace(like)
+    if isinstance(value, _PLAIN):
+        plain = np.asarray(value)
+        if plain.size <= _FEW:
+            return _kept(xp, plain.tobytes(), plain.dtype.str, plain.shape, dtype, like.device)
+    return xp.asarray(value, dtype=dtype, device=like.device)
+
+
+@lru_cache(maxsize=4096)
+def _kept(xp: Any, data: bytes, kind: str, shape: tuple[int, ...], dtype: Any, device: Any) -> Array:
+    """Numbers on a device."""
+    value = np.frombuffer(data, kind).reshape(shape).copy()
+    return xp.asarray(value, dtype=dtype, device=device)
+
+
+_PLAIN = (bool, int, float, list, tuple, np.ndarray, np.generic)
+_FEW = 64
 
 
 def host(array: Array) -> np.ndarray:
     """An array, or a number, in NumPy's form, wherever it is; what is not NumPy's may be a view."""
     if isinstance(array, np.ndarray):
         return array
+    if array_api_compat.is_torch_array(array):
+        return np.asarray(array.detach().cpu().numpy())
     try:
         return np.asarray(array)
     except (TypeError, RuntimeError, ValueError):  # it is on another device
@@ -348,7 +379,7 @@ def _gathered(q: Array, index: Array, signs: Array) -> Array:
     if isinstance(q, np.ndarray):
         return q.take(index, axis=-1) * signs.astype(q.dtype, copy=False)
     xp = array_namespace(q)
-    flat = xp.take(q, xp.asarray(index.reshape(-1), device=q.device), axis=-1)
+    flat = xp.take(q, indices(index.reshape(-1), q), axis=-1)
     return xp.reshape(flat, (*q.shape[:-1], *index.shape)) * constant(signs, q)
 
 

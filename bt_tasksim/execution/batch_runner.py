@@ -17,9 +17,11 @@ from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING
 from bt_tasksim.core.errors import BtTasksimError, InputError, UnreachableError
 from bt_tasksim.core.outcomes import FAILED, OUT_OF_REACH, TIME_OVER, Outcome
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, constant
+from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import Command, Hidden, WorldModel
 from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.execution.laws import laws_of
 from bt_tasksim.execution.leaf_errors import no_status, set_up
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
@@ -64,6 +66,8 @@ class BatchRunner:
         worlds: How many worlds, N.
         threads: How many threads step them.
         longest: Seconds of an episode after which it is stopped.
+        like: An array of the library, type and device in which concepts, observations and joints are
+            computed; by default what `bt_tasksim.execution.laws.laws_of` says of the options.
 
     Raises:
         InputError: The tree, the scene or the options do not fit, or there are no worlds or threads.
@@ -77,6 +81,7 @@ class BatchRunner:
         worlds: int = 64,
         threads: int = 1,
         longest: float = LONGEST,
+        like: Array | None = None,
     ) -> None:
         if worlds < 1 or threads < 1:
             raise InputError(f"a batch has one world and one thread at least, found {worlds} and {threads}")
@@ -84,8 +89,9 @@ class BatchRunner:
         self._build = build
         self.robot = load_robot(scene.robot)
         self.tree = build()
-        self.worlds = BatchWorlds(self.robot, self.options, worlds, threads)
-        self.context = Context(self.robot, worlds)
+        like = laws_of(self.options) if like is None else like
+        self.worlds = BatchWorlds(self.robot, self.options, worlds, threads, like)
+        self.context = Context(self.robot, worlds, like)
         self.context.ask_hidden = self.worlds.hidden
         set_up(self.tree, context=self.context)
         self._own: dict[int, Context] = {}  # of worlds in which something is ticked by py_trees
@@ -154,7 +160,8 @@ class BatchRunner:
         yield from self._begin(rested, waiting, stream, begun)
         going = np.setdiff1d(np.flatnonzero(self._phase != IDLE), np.array(begun, int))
         if len(going):
-            tool, hand = (None if part is None else part[going] for part in (written.tool, written.hand))
+            index = Index(going)
+            tool, hand = (None if part is None else index.of(part) for part in (written.tool, written.hand))
             writers = {row: self.context.tool_writer(row) for row in going.tolist()}
             unreached = self.worlds.step(tool, hand, going)
             self.control_steps += len(going)
@@ -215,13 +222,14 @@ class BatchRunner:
 
     def _collect(self, rows: Array) -> None:
         """Take over what leaves that py_trees ticks have written."""
+        like = self.context.like
         for row in rows.tolist() if self._own else ():
             own = self._own[row]
             for name, part in vars(own.written).items():
                 if part is not None and not np.isnan(part[0, 0]):
                     leaf = own.writer_of(name)
                     assert leaf is not None, "somebody wrote it"
-                    self.context.write(Command(**{name: part}), np.array([row]), leaf)
+                    self.context.write(Command(**{name: constant(part, like)}), np.array([row]), leaf)
 
     def _ended(self, row: int, episode: _Episode, status: Status) -> None:
         episode.status = status

@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.registry import parts
 from bt_tasksim.engines.base import (
     ROLES,
@@ -31,6 +31,8 @@ from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.scene import WorldSource
 
 _E = TypeVar("_E", bound=Engine)
+LAWS = ("auto", "numpy", "torch")
+"""Libraries that a batch of worlds may compute its laws with; ``auto`` goes by the device."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class EngineOptions:
         connect_timeout: Seconds within which it must be there.
         ros: File with a robot's topics and names; by default the bundled one.
         device: What physics that can choose runs on: ``cpu``, ``cuda`` or ``cuda:N``.
+        laws: What a batch of worlds computes concepts, observations and joints with, see
+            `bt_tasksim.execution.laws`; a single world and training have NumPy.
     """
 
     engines: str = "sapien"
@@ -66,12 +70,17 @@ class EngineOptions:
     connect_timeout: float = 5.0
     ros: str = ""
     device: str = "cpu"
+    laws: str = "auto"
 
     def __post_init__(self) -> None:
         for role in ROLES:
             engine_class(role, self.name_of(role))
         engine_class("physics", self.engines).check_device(self.device)
         noise_model(self.noise)
+        if self.laws not in LAWS:
+            raise InputError(
+                f"unknown laws '{self.laws}'{nearest(self.laws, LAWS)}: there are {', '.join(LAWS)}"
+            )
         for limit in (self.timeout, self.connect_timeout):
             if not 0.0 < limit < 3600.0:
                 raise InputError(f"a time-out is a positive number of seconds below 3600, found {limit:g}")

@@ -15,8 +15,9 @@ import numpy as np
 from bt_tasksim.core.available_memory import available_memory
 from bt_tasksim.core.columns import with_rows
 from bt_tasksim.core.errors import BtTasksimError, InputError
-from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import Command, Hidden, Observation
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.transfer import Index, fetched, sent
+from bt_tasksim.core.world import Command, Hidden, Observation, WorldState
 from bt_tasksim.engines.base import PhysicsEngine, engine_class
 from bt_tasksim.engines.kinematics.batch import BatchKinematics
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
@@ -30,6 +31,7 @@ from bt_tasksim.scene.scene import WorldSource
 WORLD_MEMORY = 3_000_000
 """Bytes that a world takes, of which 1.6 to 2.4 million were measured with one object."""
 FIELDS = tuple(field.name for field in fields(Observation))
+STATE = tuple(field.name for field in fields(WorldState))
 
 
 def why_alone(options: EngineOptions) -> str:
@@ -156,13 +158,23 @@ class BatchWorlds(Worlds):
         options: The engines; see `why_alone` for those that have no batches.
         count: How many worlds.
         threads: How many threads step them.
+        like: An array of the library, type and device of observations and commands, and in which joints are
+            computed; by default NumPy. States of physics come from the host and go there, each in one
+            transfer for a control period.
 
     Raises:
         InputError: An engine has no worlds in batches, or is none for this robot.
         MachineError: An engine cannot start.
     """
 
-    def __init__(self, robot: RobotDescription, options: EngineOptions, count: int, threads: int) -> None:
+    def __init__(
+        self,
+        robot: RobotDescription,
+        options: EngineOptions,
+        count: int,
+        threads: int,
+        like: Array | None = None,
+    ) -> None:
         alone = why_alone(options)
         if alone:
             raise InputError(f"these worlds cannot be run in a batch: {alone}")
@@ -171,11 +183,18 @@ class BatchWorlds(Worlds):
         engine = engine_class("physics", options.engines)
         assert issubclass(engine, PhysicsEngine), "why_alone has seen to it"
         self.physics = engine.batch(robot, options.setup("physics"), count, threads)
-        self.kinematics = BatchKinematics.of(robot, count)
+        self._like: Array = np.empty(0) if like is None else like
+        self.kinematics = BatchKinematics.of(robot, count, self._like)
         self._arm = PinocchioKinematics(robot)
         self._perception = BatchState(robot, count, noise_model(options.noise))
-        self._tool: Array = np.full((count, 7), np.nan)
-        self._hand: Array = np.full((count, 1 + len(robot.synergies)), np.nan)
+        self._tool = self._nobody(7)
+        self._hand = self._nobody(1 + len(robot.synergies))
+
+    def _nobody(self, width: int) -> Array:
+        """Targets ``(N, width)`` before any was written."""
+        like = self._like
+        shape = (self.count, width)
+        return array_namespace(like).full(shape, np.nan, dtype=like.dtype, device=like.device)
 
     def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> dict[int, BtTasksimError]:
         """See `Worlds.reset`."""
@@ -183,7 +202,9 @@ class BatchWorlds(Worlds):
         self.physics.reset(rows, placed)
         self.kinematics.reset(rows, placed)
         self._perception.reset(rows, placed)
-        self._tool[rows], self._hand[rows] = np.nan, np.nan
+        index = Index(np.asarray(rows))
+        index.put(self._tool, np.nan)
+        index.put(self._hand, np.nan)
         return failed | self.errors(rows)
 
     def _placed(
@@ -215,7 +236,8 @@ class BatchWorlds(Worlds):
 
     def observe(self, rows: Array) -> Observation:
         """See `Worlds.observe`."""
-        seen = self._perception.observe(self.physics.state(rows), rows if len(rows) < self.count else None)
+        state = _sent(self.physics.state(rows), self._like)
+        seen = self._perception.observe(state, rows if len(rows) < self.count else None)
         if len(rows) < self.count:
             seen = _merged(self.observation, rows, seen, self.count)
         self.observation = seen
@@ -223,9 +245,10 @@ class BatchWorlds(Worlds):
 
     def step(self, tool: Array | None, hand: Array | None, rows: Array) -> list[Unreached]:
         """See `Worlds.step`."""
-        asked_tool, asked_hand = self._tool[rows], self._hand[rows]
+        xp, index = array_namespace(self._like), Index(rows)
+        asked_tool, asked_hand = index.of(self._tool), index.of(self._hand)
         if tool is not None:
-            asked_tool = np.where(np.isnan(tool), asked_tool, tool)
+            asked_tool = xp.where(xp.isnan(tool), asked_tool, tool)
         if hand is not None:
             asked_hand = _hands(asked_hand, hand)
         state = self.physics.state(rows)
@@ -237,15 +260,19 @@ class BatchWorlds(Worlds):
                 error = failures.error(k)
                 assert error is not None
                 unreached.append(Unreached(int(rows[k]), error))
-            asked_tool[failed], asked_hand[failed] = self._tool[rows[failed]], self._hand[rows[failed]]
-            state = self.physics.state(rows[failed])
-            kept = Command(asked_tool[failed], asked_hand[failed])
-            again, _ = self.kinematics.solve(kept, state, rows[failed])
-            position, velocity = target.position.copy(), target.velocity.copy()
-            position[failed], velocity[failed] = again.position, again.velocity
+            these, last = Index(failed), Index(rows[failed])
+            kept = Command(last.of(self._tool), last.of(self._hand))
+            these.put(asked_tool, kept.tool)
+            these.put(asked_hand, kept.hand)
+            again, _ = self.kinematics.solve(kept, self.physics.state(last.rows), last.rows)
+            position, velocity = (xp.asarray(x, copy=True) for x in (target.position, target.velocity))
+            these.put(position, again.position)
+            these.put(velocity, again.velocity)
             target = replace(target, position=position, velocity=velocity)
-        self._tool[rows], self._hand[rows] = asked_tool, asked_hand
-        self.physics.step(target, rows)
+        index.put(self._tool, asked_tool)
+        index.put(self._hand, asked_hand)
+        position, velocity = fetched([target.position, target.velocity])
+        self.physics.step(replace(target, position=position, velocity=velocity), rows)
         return unreached
 
     def hidden(self, rows: Array | None = None) -> Hidden:
@@ -259,20 +286,33 @@ class BatchWorlds(Worlds):
 
 def _hands(last: Array, hand: Array) -> Array:
     """Hand targets ``(k, 1 + n_synergies)`` with those that are asked anew, which may lack synergies."""
-    out, given = last.copy(), ~np.isnan(hand[:, 0])
-    out[given, : hand.shape[1]] = hand[given]
-    out[given] = np.where(np.isnan(out[given]), 0.0, out[given])
-    return out
+    xp = array_namespace(last, hand)
+    asked = xp.concat([hand, last[:, hand.shape[1] :]], axis=1)
+    asked = xp.where(xp.isnan(asked), xp.zeros_like(asked), asked)
+    return xp.where(xp.isnan(hand[:, :1]), last, asked)
+
+
+def _sent(state: WorldState, like: Array) -> WorldState:
+    """A state in the library and on the device of an array."""
+    known = {name: value for name in STATE if (value := getattr(state, name)) is not None}
+    there = sent(list(known.values()), like)
+    return replace(state, **dict(zip(known, there, strict=True)))
 
 
 def _merged(before: Observation | None, rows: Array, seen: Observation, worlds: int) -> Observation:
     """Observations of all worlds, with some of them seen anew; NaN or False where nothing was seen so far."""
-    out = {}
+    out, index = {}, Index(rows)
     for name in FIELDS:
         new = getattr(seen, name)
-        nothing = False if new.dtype == bool else np.nan
-        old = np.full((worlds, *new.shape[1:]), nothing) if before is None else getattr(before, name)
-        out[name] = with_rows(old, rows, new, nothing)
+        xp = array_namespace(new)
+        nothing = False if new.dtype == xp.bool else np.nan
+        shape = (worlds, *new.shape[1:])
+        old = (
+            xp.full(shape, nothing, dtype=new.dtype, device=new.device)
+            if before is None
+            else getattr(before, name)
+        )
+        out[name] = with_rows(old, index, new, nothing)
     return Observation(**out)
 
 

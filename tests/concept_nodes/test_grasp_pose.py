@@ -157,7 +157,7 @@ def test_where_no_world_has_a_place_nothing_stands_on_one(seen_of):
 def test_obstacles_of_a_world_are_its_own_again(seen_of):
     seen = seen_of(np.arange(N))
     for k in (0, 3, 7, 14):
-        found = obstacles_of(seen, k)
+        found = obstacles_of(seen)[k]
         assert [(o.pose.tolist(), o.size) for o in found] == [
             (o.pose.tolist(), o.size) for o in WORLDS[k].obstacles
         ]

@@ -73,6 +73,14 @@ class EngineFlags:
     device: Annotated[
         str, typer.Option(metavar="D", help="What mujoco_warp runs on: cpu, cuda or cuda:N.")
     ] = "cpu"
+    laws: Annotated[
+        str,
+        typer.Option(
+            metavar="L",
+            help="What a batch of worlds computes concepts and joints with: numpy, or torch on --device; "
+            "auto: torch on cuda.",
+        ),
+    ] = "auto"
     noise: Annotated[
         str, typer.Option(metavar="N", help="Error of the pose estimates: fine, none, original, hard.")
     ] = "fine"
@@ -107,4 +115,5 @@ class EngineFlags:
             timeout=self.timeout,
             connect_timeout=self.connect_timeout,
             device=self.device,
+            laws=self.laws,
         )

@@ -27,8 +27,10 @@ from bt_tasksim.engines.kinematics.rows import (
     every,
     highest,
     put,
+    put_in,
     some,
     taken,
+    taken_of,
     where_true,
 )
 from bt_tasksim.robot.description import RobotDescription
@@ -133,7 +135,7 @@ class BatchKinematics:
         """`reset` of worlds, whose commands come at so many a second ``(k,)``."""
         fresh = self._fresh(np.asarray(rates, float))
         if len(rows) < self.n or np.any(rows != self._all):
-            fresh = _Memory(*(put(old, rows, new) for old, new in zip(self._memory, fresh, strict=True)))
+            fresh = _Memory(*put_in(self._memory, rows, fresh))
         self._memory, self._still = fresh, None
 
     def _fresh(self, rates: np.ndarray) -> _Memory:
@@ -170,7 +172,7 @@ class BatchKinematics:
             rows = None
         memory = self._memory
         if rows is not None:
-            memory = _Memory(*(taken(part, rows) for part in memory))
+            memory = _Memory(*taken_of(memory, rows))
         memory = self._begun(memory, joints)
         memory, moved, failures = self._asked(memory, tool, hand)
         if not moved and rows is None and self._still is not None:
@@ -179,8 +181,7 @@ class BatchKinematics:
         if rows is None:
             self._memory, self._still = memory, target if still else None
         else:
-            old = self._memory
-            self._memory = _Memory(*(put(a, rows, b) for a, b in zip(old, memory, strict=True)))
+            self._memory = _Memory(*put_in(self._memory, rows, memory))
             self._still = None
         return Solution(target, failures)
 
@@ -280,8 +281,9 @@ class BatchKinematics:
                 return arm, seen, self._none(n)
             codes, misses = found.code, np.stack([found.distance, found.angle])
         else:
-            found = self.inverse.near(placements(taken(tool, index)), taken(last, index), taken(seen, index))
-            arm, seen = put(last, index, found.q), put(seen, index, found.seen)
+            asked, begin, chain = taken_of((tool, last, seen), index)
+            found = self.inverse.near(placements(asked), begin, chain)
+            arm, seen = put_in((last, seen), index, (found.q, found.seen))
             codes[index] = found.code
             misses[:, index] = found.distance, found.angle
         failed = np.flatnonzero(codes)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from bt_tasksim.core.poses import Array, array_namespace, clip, constant, host
+from bt_tasksim.core.poses import Array, array_namespace, clip, constant, host, indices
 from bt_tasksim.engines.kinematics.chain import Chain, difference
 from bt_tasksim.engines.kinematics.failures import Reach
 from bt_tasksim.engines.kinematics.linear import solve_symmetric, total
@@ -31,8 +31,10 @@ from bt_tasksim.engines.kinematics.rows import (
     highest,
     joined,
     put,
+    put_in,
     some,
     taken,
+    taken_of,
     where_true,
 )
 from bt_tasksim.robot.description import RobotDescription
@@ -156,7 +158,7 @@ class InverseKinematics:
         if every(solved):
             return found
         hard = where_true(~solved)
-        return _with(found, hard, self._again(taken(goal, hard), taken(last, hard)))
+        return _with(found, hard, self._again(*taken_of((goal, last), hard)))
 
     def _again(self, goal: Array, last: Array) -> Postures:
         """`near` for rows that a few iterations have not brought there."""
@@ -167,10 +169,10 @@ class InverseKinematics:
         left = np.flatnonzero(~((host(reached.worst) <= _TOLERANCE) | missed.little))
         if not len(left):
             return found
-        goal, last = taken(goal, left), taken(last, left)
+        goal, last = taken_of((goal, last), left)
         way = self._missed(self.chain.seen(last), goal)
         swing = _SWING + _SWING_PER_METRE * way.distance + _SWING_PER_RADIAN * way.angle
-        best = _Reached(*(taken(part, left) for part in reached))
+        best = _Reached(*taken_of(reached, left))
         other = self._search(goal, [self._rest], last, best)
         swings = (other.code == Reach.REACHED) & (host(_largest(other.q - last)) > swing)
         other.code[swings] = Reach.SWINGS
@@ -244,7 +246,7 @@ class InverseKinematics:
         xp = array_namespace(goal)
         many = starts.shape[1]
         of = np.tile(left, many)
-        goals, postures = taken(goal, of), taken(posture, of)
+        goals, postures = taken_of((goal, posture), of)
         reached = self._iterate(xp.reshape(starts, (self._n, len(of))), goals, _HARDER, until=until)
         missed = self._missed(reached.seen, goals)
         good = ((host(reached.worst) <= _TOLERANCE) | missed.little).reshape(many, len(left))
@@ -259,14 +261,10 @@ class InverseKinematics:
             if not all_count:
                 settled &= np.cumsum(good, axis=0) == 1
             which = np.flatnonzero(settled.reshape(-1))
-            q, seen = self._settle(
-                taken(reached.q, which),
-                taken(reached.seen, which),
-                taken(goals, which),
-                taken(postures, which),
-                until,
-            )
-            reached = reached._replace(q=put(reached.q, which, q), seen=put(reached.seen, which, seen))
+            here, chain, there, towards = taken_of((reached.q, reached.seen, goals, postures), which)
+            after = self._settle(here, chain, there, towards, until)
+            q, seen = put_in((reached.q, reached.seen), which, after)
+            reached = reached._replace(q=q, seen=seen)
             apart = host(_square(reached.q - postures)).reshape(many, len(left))
             nearest = np.argmin(np.where(settled, apart, np.inf), axis=0)
             column = np.where(good.any(axis=0), nearest, pick) * len(left) + np.arange(len(left))
@@ -291,14 +289,14 @@ class InverseKinematics:
         for _ in range(_SETTLE):
             if time.monotonic() > until:
                 break
-            here, there, towards = taken(q, going), taken(goal, going), taken(posture, going)
-            moved = self._iterate(here, there, _TRACK, _SETTLING * (towards - here), taken(seen, going))
+            here, there, towards, chain = taken_of((q, goal, posture, seen), going)
+            moved = self._iterate(here, there, _TRACK, _SETTLING * (towards - here), chain)
             closer = _square(moved.q - towards) <= _square(here - towards)
             good = host((moved.worst <= _TOLERANCE) & closer)
             if not good.any():
                 break
             kept, index = going[good], np.flatnonzero(good)
-            q, seen = put(q, kept, taken(moved.q, index)), put(seen, kept, taken(moved.seen, index))
+            q, seen = put_in((q, seen), kept, taken_of((moved.q, moved.seen), index))
             far = host(_largest(moved.q - here))
             going = going[good & (far >= 1e-4)]
             if not len(going):
@@ -339,24 +337,22 @@ class InverseKinematics:
                     break
                 if some(done):
                     index, rest = where_true(done), where_true(~done)
-                    ended.append(_Reached(taken(q, index), taken(seen, index), taken(worst, index)))
+                    ended.append(_Reached(*taken_of((q, seen, worst), index)))
                     of.append(rows[index])
                     rows = rows[rest]
-                    q, seen, goal, error = (taken(x, rest) for x in (q, seen, goal, error))
+                    q, seen, goal, error = taken_of((q, seen, goal, error), rest)
             q, stuck = self._moved(q, seen, error, pull)
             pull = None
         ended.append(_Reached(q, seen, worst))
         of.append(rows)
-        if len(ended) == 1:
-            return ended[0]
-        return _Reached(*(joined(parts, of) for parts in zip(*ended, strict=True)))
+        return _Reached(*joined(ended, of))
 
     def _moved(self, q: Array, seen: Array, error: Array, pull: Array | None) -> tuple[Array, Array | None]:
         """Joints one step on, and which rows ``(N,)`` get nowhere any more; those stay as they are."""
         xp = array_namespace(q)
         jacobian = self.chain.jacobian(seen)
         if self._asked is not None:
-            jacobian = xp.take(jacobian, xp.asarray(self._asked, device=q.device), axis=1)
+            jacobian = xp.take(jacobian, indices(self._asked, q), axis=1)
         jacobian = jacobian * self._weights
         error = error * self._weights
         damping = 0.5 * total(error * error) + _DAMPING
@@ -367,9 +363,9 @@ class InverseKinematics:
         past = (kept < self._lower) | (kept > self._upper)
         if some(past):
             index = where_true(either(past))
-            here = taken(q, index)
+            here, turn, way, damp = taken_of((q, jacobian, error, damping), index)
             z = xp.zeros_like(here) if pull is None else taken(pull, index)
-            held = self._saturate(here, taken(jacobian, index), taken(error, index), taken(damping, index), z)
+            held = self._saturate(here, turn, way, damp, z)
             kept = put(kept, index, held)
             if stuck is not None:
                 stuck = put(stuck, index, _largest(held - here) < _STUCK)
@@ -388,7 +384,7 @@ class InverseKinematics:
         """The step's result within the limits: joints that pass one are set on it, the worst first."""
         xp = array_namespace(q)
         free, step = xp.ones_like(q), xp.zeros_like(q)
-        joint = xp.asarray(np.arange(self._n)[:, None], device=q.device)
+        joint = indices(np.arange(self._n)[:, None], q)
         for _ in range(self._n):
             held = step * (1.0 - free)
             left = error - total(jacobian * held[:, None, ...])
@@ -424,7 +420,7 @@ class InverseKinematics:
 
 def _with(found: Postures, rows: np.ndarray, other: Postures) -> Postures:
     """What was found, with other values for some rows."""
-    return Postures(*(put(old, rows, new) for old, new in zip(found, other, strict=True)))
+    return Postures(*put_in(found, rows, other))
 
 
 def _along(jacobian: Array, force: Array) -> Array:

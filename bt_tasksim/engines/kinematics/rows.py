@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from bt_tasksim.core.poses import Array, array_namespace, host
+from bt_tasksim.core.poses import Array, array_namespace, host, indices
+from bt_tasksim.core.transfer import Index
 
 
 def where_true(mask: Array) -> np.ndarray:
@@ -16,25 +17,47 @@ def where_true(mask: Array) -> np.ndarray:
 
 def taken(array: Array, rows: np.ndarray) -> Array:
     """The named rows ``(..., k)`` of an array ``(..., N)``."""
-    if type(array) is np.ndarray:
-        return array.take(rows, axis=-1)
-    xp = array_namespace(array)
-    return xp.take(array, xp.asarray(rows, device=array.device), axis=-1)
+    return _picked(array, Index(rows))
+
+
+def taken_of(arrays: Iterable[Array], rows: np.ndarray) -> list[Array]:
+    """`taken` of several arrays."""
+    index = Index(rows)
+    return [_picked(array, index) for array in arrays]
 
 
 def put(array: Array, rows: np.ndarray, values: Array) -> Array:
     """An array ``(..., N)`` whose named rows are ``values (..., k)``."""
-    source = np.arange(array.shape[-1])
-    source[rows] = array.shape[-1] + np.arange(len(rows))
-    return taken(array_namespace(array, values).concat([array, values], axis=-1), source)
+    return put_in((array,), rows, (values,))[0]
 
 
-def joined(pieces: Sequence[Array], rows: Sequence[np.ndarray]) -> Array:
-    """The array ``(..., N)`` whose rows ``rows[i]`` are ``pieces[i]``; every row is in one piece."""
+def put_in(arrays: Sequence[Array], rows: np.ndarray, values: Sequence[Array]) -> list[Array]:
+    """`put` of several arrays of as many rows."""
+    n = arrays[0].shape[-1]
+    source = np.arange(n)
+    source[rows] = n + np.arange(len(rows))
+    index = Index(source)
+    return [
+        _picked(array_namespace(old, new).concat([old, new], axis=-1), index)
+        for old, new in zip(arrays, values, strict=True)
+    ]
+
+
+def joined(pieces: Sequence[Sequence[Array]], rows: Sequence[np.ndarray]) -> list[Array]:
+    """Arrays ``(..., N)`` whose rows ``rows[i]`` are ``pieces[i]``; every row is in one piece."""
     if len(pieces) == 1:
-        return pieces[0]
-    whole = array_namespace(*pieces).concat(list(pieces), axis=-1)
-    return taken(whole, np.argsort(np.concatenate(rows)))
+        return list(pieces[0])
+    index = Index(np.argsort(np.concatenate(rows)))
+    return [
+        _picked(array_namespace(*parts).concat(list(parts), axis=-1), index)
+        for parts in zip(*pieces, strict=True)
+    ]
+
+
+def _picked(array: Array, index: Index) -> Array:
+    if type(array) is np.ndarray:
+        return array.take(index.rows, axis=-1)
+    return array_namespace(array).take(array, index.on(array), axis=-1)
 
 
 def columns(array: Array) -> Array:
@@ -91,5 +114,4 @@ def chosen(array: Array, index: np.ndarray) -> Array:
     """Entries ``(k, ...)`` of the first axis by their indices."""
     if type(array) is np.ndarray:
         return array.take(index, axis=0)
-    xp = array_namespace(array)
-    return xp.take(array, xp.asarray(index, device=array.device), axis=0)
+    return array_namespace(array).take(array, indices(index, array), axis=0)

@@ -13,6 +13,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant, host
+from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import Observation, WorldState
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -178,7 +179,10 @@ class BatchObservations:
         def moved() -> Array:
             if before is None:
                 return motion(now._replace(time=now.time * np.nan), now)
-            return motion(before if rows is None else Instant(*(rows_of(x, rows) for x in before)), now)
+            if rows is None:
+                return motion(before, now)
+            picked = Index(rows)
+            return motion(Instant(*(_picked(x, picked) for x in before)), now)
 
         return LazyObservation.of(known, lambda: contact_points(surfaces, index, now, tips), moved)
 
@@ -219,7 +223,8 @@ def _merged(before: Instant | None, now: Instant, rows: np.ndarray, n: int) -> I
         before = Instant(*(xp.full((n, *x.shape[1:]), xp.nan, dtype=x.dtype, device=x.device) for x in now))
     most = max(before.objects.shape[1], now.objects.shape[1])
     before, now = (i._replace(objects=widened(i.objects, most)) for i in (before, now))
-    return Instant(*(put_rows(old, rows, new) for old, new in zip(before, now, strict=True)))
+    index = Index(_source(n, rows))
+    return Instant(*(_picked(_both(old, new), index) for old, new in zip(before, now, strict=True)))
 
 
 def widened(objects: Array, most: int) -> Array:
@@ -234,15 +239,27 @@ def widened(objects: Array, most: int) -> Array:
 
 def rows_of(array: Array, rows: np.ndarray) -> Array:
     """The named rows ``(k, ...)`` of an array ``(n, ...)``."""
-    xp = array_namespace(array)
-    return xp.take(array, xp.asarray(rows, device=array.device), axis=0)
+    return _picked(array, Index(rows))
+
+
+def _picked(array: Array, index: Index) -> Array:
+    return array_namespace(array).take(array, index.on(array), axis=0)
 
 
 def put_rows(array: Array, rows: np.ndarray, values: Array) -> Array:
     """An array ``(n, ...)`` whose named rows are ``values (k, ...)``."""
-    source = np.arange(array.shape[0])
-    source[rows] = array.shape[0] + np.arange(len(rows))
-    return rows_of(array_namespace(array).concat([array, values], axis=0), source)
+    return rows_of(_both(array, values), _source(array.shape[0], rows))
+
+
+def _both(array: Array, values: Array) -> Array:
+    return array_namespace(array).concat([array, values], axis=0)
+
+
+def _source(n: int, rows: np.ndarray) -> np.ndarray:
+    """Where each of ``n`` rows comes from once ``rows (k,)`` are behind the ``n`` old ones."""
+    source = np.arange(n)
+    source[rows] = n + np.arange(len(rows))
+    return source
 
 
 class LazyObservation(Observation):

@@ -9,6 +9,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.columns import filled
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.facts import FactArrays, FactsTable, WorldFacts, joined, rotations, take_rows
+from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import ObjectModel, Obstacle, PlaceModel, WorldModel
 from tests.array_libraries import agree
 
@@ -251,10 +252,10 @@ def test_rows_that_begin_anew_are_as_if_all_had_begun_so():
 def test_rows_are_taken_in_any_order_and_not_from_before():
     table, rows = FactsTable(4), np.array([3, 1])
     table.replace(np.arange(4), UNLIKE)
-    assert same(table.taken(rows), WorldFacts.of([UNLIKE[3], UNLIKE[1]], *_names(table.facts)))
-    assert table.taken(rows) is table.taken(rows.copy())
+    assert same(table.taken(Index(rows)), WorldFacts.of([UNLIKE[3], UNLIKE[1]], *_names(table.facts)))
+    assert table.taken(Index(rows)) is table.taken(Index(rows.copy()))
     table.replace(np.array([1]), [UNLIKE[0]])
-    assert same(table.taken(rows), WorldFacts.of([UNLIKE[3], UNLIKE[0]], *_names(table.facts)))
+    assert same(table.taken(Index(rows)), WorldFacts.of([UNLIKE[3], UNLIKE[0]], *_names(table.facts)))
 
 
 def _names(facts):
@@ -266,7 +267,7 @@ def test_many_choices_of_rows_are_not_kept_for_ever():
     table.replace(np.arange(10), [world()] * 10)
     for k in range(1, 1 << 10):
         rows = np.flatnonzero([k >> bit & 1 for bit in range(10)])
-        assert table.taken(rows).worlds == len(rows)
+        assert table.taken(Index(rows)).worlds == len(rows)
     assert len(table._taken) < 100
 
 

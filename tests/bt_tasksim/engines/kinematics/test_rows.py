@@ -20,9 +20,11 @@ def test_rows_are_taken_and_put_and_joined() -> None:
     changed[..., INDEX] = -1.0
     new = np.full((3, 2, 3), -1.0)
     np.testing.assert_array_equal(agree(lambda v, w: of.put(v, INDEX, w), VALUES, new), changed)
-    pieces, where = [VALUES[..., INDEX], VALUES[..., [2, 3]]], [INDEX, np.array([2, 3])]
-    np.testing.assert_array_equal(agree(lambda p: of.joined(p, where), pieces), VALUES)
-    assert agree(lambda p: of.joined(p, where[:1]), pieces[:1]).shape == (3, 2, 3)
+    where = [INDEX, np.array([2, 3])]
+    pieces = [[VALUES[..., rows], VALUES[0][..., rows]] for rows in where]
+    for whole, wanted in zip(agree(lambda p: of.joined(p, where), pieces), (VALUES, VALUES[0]), strict=True):
+        np.testing.assert_array_equal(whole, wanted)
+    assert agree(lambda p: of.joined(p, where[:1]), pieces[:1])[0].shape == (3, 2, 3)
     np.testing.assert_array_equal(agree(of.columns, VALUES[0]), VALUES[0].T)
     np.testing.assert_array_equal(agree(lambda v: of.chosen(v, np.array([2, 0])), VALUES), VALUES[[2, 0]])
 
