@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from bt_tasksim.training.config import TrainConfig
     from bt_tasksim.training.env import EpisodeEnv
     from bt_tasksim.training.ppo import train
+    from bt_tasksim.training.sb3_vector_env import SB3VectorEnv
     from bt_tasksim.training.vector_env import EpisodeVectorEnv
     from bt_tasksim.trees.nodes.train import Train
 
@@ -98,6 +99,7 @@ _HOMES = {
     "bt_tasksim.trees.nodes.train": ("Train",),
     "bt_tasksim.training.env": ("EpisodeEnv",),
     "bt_tasksim.training.ppo": ("train",),
+    "bt_tasksim.training.sb3_vector_env": ("SB3VectorEnv",),
     "bt_tasksim.training.vector_env": ("EpisodeVectorEnv",),
 }
 _MODULES = {
@@ -144,6 +146,7 @@ __all__ = [
     "Result",
     "RobotDescription",
     "Runner",
+    "SB3VectorEnv",
     "Scene",
     "Seconds",
     "Seen",

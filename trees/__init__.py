@@ -67,11 +67,12 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(importlib.import_module(_HOME[name]), name)
     if not name.startswith("_"):
-        from bt_tasksim.trees.vocabulary import helpers
+        from bt_tasksim.trees.vocabulary import helpers, like_helper
 
         helper = helpers().get(name)
         if helper is not None:
             return helper
+        raise AttributeError(f"module 'trees' has no attribute '{name}'{like_helper(name)}")
     raise AttributeError(f"module 'trees' has no attribute '{name}'")
 
 

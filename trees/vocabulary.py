@@ -7,6 +7,7 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.core.errors import nearest
 from bt_tasksim.core.registry import parts
 from bt_tasksim.trees.nodes.base import NodeKind
 
@@ -33,6 +34,19 @@ def helpers() -> dict[str, Callable[..., Behaviour]]:
     """The functions that make such nodes in a tree's file, by their names."""
     found = (kind.helper for kind in node_kinds().values())
     return {helper.__name__: helper for helper in found if helper is not None}
+
+
+def like_helper(name: str) -> str:
+    """Says which of these functions may be meant by a name: that of a node in XML, or of its class.
+
+    Returns:
+        The end of a sentence, see `bt_tasksim.core.errors.nearest`.
+    """
+    plain = name.replace("_", "").casefold()
+    for tag, kind in node_kinds().items():
+        if kind.helper is not None and plain in (tag.casefold(), kind.behaviour.__name__.casefold()):
+            return f"; did you mean '{kind.helper.__name__}'?"
+    return nearest(name, helpers())
 
 
 def kind_of(node: Behaviour) -> NodeKind[Any] | None:

@@ -14,10 +14,11 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.renamed import renamed_arguments
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import LONGEST
-from bt_tasksim.policy.policy import Action, Policy
+from bt_tasksim.policy.policy import Action, Policy, split_action
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.decision import Decision
 from bt_tasksim.training.episode_batch import Draws, EpisodeBatch, Happened
+from bt_tasksim.training.learning_leaves import checked_actions
 from bt_tasksim.training.reward import Reward
 
 CAMERA = "overview"
@@ -102,6 +103,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
 
         Raises:
             InputError: In many draws in a row the tree ended without activating the subtree.
+            ClosedEnvironmentError: It is closed.
         """
         super().reset(seed=seed)
         given = None if options is None else options.get("draw")
@@ -119,7 +121,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             RuntimeError: There is no episode.
         """
         self._check_waiting()
-        self.batch.decide(ONE, np.asarray(action, np.float64)[None])
+        self.batch.act(ONE, split_action(checked_actions(action, *self.batch.action_space.shape)[None]))
         return self._stepped()
 
     def act(self, action: Action) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -141,6 +143,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         self.batch.close()
 
     def _check_waiting(self) -> None:
+        self.batch.check_open()
         if not len(self.batch.waiting):
             raise RuntimeError("step() without an episode: call reset() first")
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
+from gymnasium.error import ClosedEnvironmentError
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.batch_leaves import ConceptInBatch, leaf_in_batch
@@ -32,7 +33,7 @@ from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.decision import Decision
 from bt_tasksim.training.endings import BEGAN_ANEW, FOLLOWER_LATE, TREE_ENDED, Ending, ending_of
 from bt_tasksim.training.judge import Judgement, SignalOutcome
-from bt_tasksim.training.learning_leaves import find_train, shared_layout, spaces_of
+from bt_tasksim.training.learning_leaves import checked_actions, find_train, shared_layout, spaces_of
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.transitions import Transitions
 from bt_tasksim.trees.check import check_tree
@@ -173,6 +174,7 @@ class EpisodeBatch:
         self._transitions: dict[int, Transitions] = {}
         self._happened: list[Happened] = []
         self._over: list[int] = []
+        self._closed = False
 
     # ---- from outside -----------------------------------------------------------------------------------
 
@@ -195,7 +197,12 @@ class EpisodeBatch:
         return self._features.copy()
 
     def begin(self, row: int, draws: Draws) -> None:
-        """Begin an episode in a world, whatever goes on there; `go_on` draws it."""
+        """Begin an episode in a world, whatever goes on there; `go_on` draws it.
+
+        Raises:
+            ClosedEnvironmentError: It is closed.
+        """
+        self.check_open()
         self._drop(np.array([row]))
         self._draws[row], self._redrawn[row], self._phase[row] = draws, 0, DRAWING
 
@@ -214,18 +221,17 @@ class EpisodeBatch:
             InputError: The actions have the wrong shape or are not finite.
             RuntimeError: In one of them no decision is waited for.
         """
-        rows, actions = np.asarray(rows), np.asarray(actions, np.float64)
-        size = self.action_space.shape[0]
-        if actions.shape != (len(rows), size) or not np.isfinite(actions).all():
-            raise InputError(f"an action should be {size} finite numbers, found {actions}")
-        self.act(rows, split_action(actions))
+        rows = np.asarray(rows)
+        self.act(rows, split_action(checked_actions(actions, len(rows), *self.action_space.shape)))
 
     def act(self, rows: Array, action: Action) -> None:
         """`decide` with what a policy decides ``(k, ...)``: a programmed one may exceed an action's bounds.
 
         Raises:
             RuntimeError: In one of the worlds no decision is waited for.
+            ClosedEnvironmentError: It is closed.
         """
+        self.check_open()
         if not (self._phase[rows] == WAITING).all():
             raise RuntimeError("a decision for a world that does not wait for one: begin an episode first")
         leaves = self.batch.waits_at[rows]
@@ -265,10 +271,24 @@ class EpisodeBatch:
 
     def close(self) -> None:
         """Let go of engines; the tree can be run again."""
+        if self._closed:
+            return
+        self._closed = True
         self._drop(np.arange(self.count))
         for leaf in self.learners:
             leaf.under_training = False
         self.worlds.close()
+
+    def check_open(self) -> None:
+        """Refuse what comes after `close`.
+
+        Raises:
+            ClosedEnvironmentError: It is closed.
+        """
+        if self._closed:
+            raise ClosedEnvironmentError(
+                "the environment is closed, and its engines are gone: make a new one"
+            )
 
     # ---- worlds -----------------------------------------------------------------------------------------
 

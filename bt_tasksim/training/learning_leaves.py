@@ -10,6 +10,8 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.plain import shown
+from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.trees.nodes.train import Train, train_nodes
 
@@ -25,6 +27,28 @@ def spaces_of(layout: Mapping[str, int], actions: int) -> tuple[gymnasium.spaces
         gymnasium.spaces.Box(-np.inf, np.inf, (sum(layout.values()),), np.float32),
         gymnasium.spaces.Box(-1.0, 1.0, (actions + 1,), np.float32),
     )
+
+
+def checked_actions(actions: Array, *shape: int) -> Array:
+    """Motions and completion signals as numbers of a shape.
+
+    Args:
+        actions: What somebody gives.
+        shape: ``(k, actions + 1)``, or ``(actions + 1,)`` of a single one.
+
+    Raises:
+        InputError: They have another shape, or are not finite.
+    """
+    wanted = f"actions should be finite numbers of shape {shape}"
+    try:
+        found = np.asarray(actions, np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{wanted}, found {shown(repr(actions))}") from None
+    if found.shape != shape:
+        raise InputError(f"{wanted}, found shape {found.shape}")
+    if not np.isfinite(found).all():
+        raise InputError(f"{wanted}, found {found[~np.isfinite(found)][0]} among them")
+    return found
 
 
 def find_train(tree: Behaviour, name: str | None = None) -> Train:

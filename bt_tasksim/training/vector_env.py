@@ -111,14 +111,15 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
 
         Raises:
             InputError: The seeds are not as many as the worlds, or a world had no episode in many draws.
+            ClosedEnvironmentError: It is closed.
         """
         rows = np.arange(self.num_envs)
         mask = None if options is None else options.get("reset_mask")
         if mask is not None:
             rows = np.flatnonzero(np.asarray(mask, bool))
         self.begin(rows, seed)
-        features, _, _, _, infos = self._all(rows)
-        return features, infos
+        ready = self.wait(rows)
+        return ready.features, self._told(ready)
 
     def step(self, actions: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
         """Give every world its action ``(N, actions + 1)``, and go on to the next decision of each.
@@ -126,10 +127,12 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
         Raises:
             InputError: The actions have the wrong shape or are not finite.
             RuntimeError: There is no episode in one of them.
+            ClosedEnvironmentError: It is closed.
         """
         rows = np.arange(self.num_envs)
         self.send(rows, actions)
-        return self._all(rows)
+        ready = self.wait(rows)
+        return ready.features, ready.rewards, ready.terminated, ready.truncated, self._told(ready)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Let go of engines; the tree can be run again."""
@@ -193,6 +196,30 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
         rows = sorted(found)
         return np.array(rows, int), self._ready([found[row] for row in rows])
 
+    def wait(self, rows: Array) -> Ready:
+        """Go on until worlds ``rows (k,)`` wait for an action, all of which are under way.
+
+        Returns:
+            What is new in all worlds ``(N, ...)``; nothing in those that have not gone on.
+
+        Raises:
+            InputError: In many draws in a row the tree ended without activating the subtree.
+            RuntimeError: One of them was given no action.
+        """
+        rewards, terminated = np.zeros(self.num_envs), np.zeros(self.num_envs, bool)
+        truncated, missing = np.zeros(self.num_envs, bool), set(np.asarray(rows).tolist())
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        while missing:
+            found, ready = self.recv()
+            if not len(found):
+                raise RuntimeError(f"nothing is under way in world {min(missing)}: begin(), or send(), first")
+            rewards[found], terminated[found] = ready.rewards, ready.terminated
+            truncated[found] = ready.truncated
+            for row, info in zip(found.tolist(), ready.infos, strict=True):
+                infos[row] = info
+            missing -= set(found.tolist())
+        return Ready(self.batch.features(), rewards, terminated, truncated, infos)
+
     def _ready(self, events: list[Happened]) -> Ready:
         k = len(events)
         features = np.zeros((k, *self.batch.observation_space.shape), np.float32)
@@ -214,19 +241,12 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
             infos.append(info)
         return Ready(features, rewards, terminated, truncated, infos)
 
-    def _all(self, rows: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
-        """Wait for worlds ``rows``; arrays are of all ``(N, ...)``."""
-        rewards, terminated = np.zeros(self.num_envs), np.zeros(self.num_envs, bool)
-        truncated, missing = np.zeros(self.num_envs, bool), set(rows.tolist())
+    def _told(self, ready: Ready) -> dict[str, Any]:
+        """What is said of all worlds, in gymnasium's form."""
         infos: dict[str, Any] = {}
-        while missing:
-            found, ready = self.recv()
-            rewards[found], terminated[found] = ready.rewards, ready.terminated
-            truncated[found] = ready.truncated
-            for row, info in zip(found.tolist(), ready.infos, strict=True):
-                infos = self._add_info(infos, info, row)
-            missing -= set(found.tolist())
-        return self.batch.features(), rewards, terminated, truncated, infos
+        for row, info in enumerate(ready.infos):
+            infos = self._add_info(infos, info, row)
+        return infos
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         if seed is None:

@@ -165,7 +165,11 @@ def test_every_public_name_is_there():
     for name in trees.__all__:
         assert getattr(trees, name).__doc__
     assert "sequence" in dir(trees)
-    with pytest.raises(AttributeError, match="no attribute 'sequense'"):
+    with pytest.raises(AttributeError, match="no attribute 'Retry'; did you mean 'retry'"):
+        trees.Retry  # noqa: B018  # the class, or its name in XML
+    with pytest.raises(AttributeError, match="no attribute 'RetryUntilSuccessful'; did you mean 'retry'"):
+        trees.RetryUntilSuccessful  # noqa: B018
+    with pytest.raises(AttributeError, match="no attribute 'sequense'; did you mean 'sequence'"):
         _ = trees.sequense
 
 

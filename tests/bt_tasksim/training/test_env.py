@@ -428,7 +428,7 @@ def test_an_action_that_is_none_is_one_sentence(env_of, action):
     leaf = Raise()
     env = env_of(Train(leaf))
     env.reset(seed=0)
-    with pytest.raises(InputError, match="an action should be 2 finite numbers, found"):
+    with pytest.raises(InputError, match=r"should be finite numbers of shape \(2,\), found"):
         env.step(np.array(action))
     assert leaf.log == ["begin"]
     env.step(np.array(UP))

@@ -13,6 +13,7 @@ from gymnasium.utils.env_checker import check_env
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.scene.specs import ObjectSpec
 from bt_tasksim.training.ready_made import grasp_then_pick
+from bt_tasksim.training.vector_env import EpisodeVectorEnv
 from bt_tasksim.trees.scenarios import grasp_then_pick as scenario
 
 pytestmark = pytest.mark.physical
@@ -116,6 +117,19 @@ def test_checkers_pass(env):
     from stable_baselines3.common.env_checker import check_env as check_for_stable_baselines
 
     check_for_stable_baselines(env.unwrapped)
+
+
+def test_many_worlds_by_name_are_one_batch():
+    made = gymnasium.make_vec(NAME, num_envs=2, target=CUP, noise="fine")
+    env = grasp_then_pick("panda", CUP, noise="fine")
+    assert isinstance(made, EpisodeVectorEnv) and made.spec.id == NAME.split(":")[1]
+    features, _ = made.reset(seed=3)
+    assert features[1].tobytes() == env.reset(seed=4)[0].tobytes()
+    made.close()
+    env.close()
+    made = gymnasium.make_vec(NAME, num_envs=1, stage=0)
+    assert made.stage == 0
+    made.close()
 
 
 def test_soft_actor_critic_of_stable_baselines_trains_it(env):

@@ -4,6 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 import toys
+from gymnasium.error import ClosedEnvironmentError
 from py_trees.behaviours import Failure
 from py_trees.common import Status
 from test_rollouts import UP as NETWORK
@@ -18,6 +19,7 @@ from bt_tasksim.training.episode_batch import REDRAWS, EpisodeBatch
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.reward_parts import RewardPart
 from bt_tasksim.training.rollouts import in_batch
+from bt_tasksim.training.sb3_vector_env import SB3VectorEnv
 from bt_tasksim.training.vector_env import EpisodeVectorEnv
 from bt_tasksim.trees import (
     fallback,
@@ -289,9 +291,6 @@ def test_what_is_asked_wrongly_is_one_sentence(vector_of):
     with pytest.raises(RuntimeError, match="begin an episode first"):
         vector.step(np.zeros((2, 2)))
     vector.reset(seed=0)
-    for action in (np.zeros(2), np.zeros((2, 3)), np.full((2, 2), np.nan)):
-        with pytest.raises(InputError, match="an action should be 2 finite numbers, found"):
-            vector.step(action)
     with pytest.raises(InputError, match="there are 2 worlds, and 3 seeds"):
         vector.reset(seed=[1, 2, 3])
     rows, ready = vector.recv()
@@ -339,6 +338,94 @@ def test_after_it_the_tree_can_be_run(vector_of, toy):
     vector.close()
     assert [world.closed for world in vector.batch.worlds.each] == [1, 1]
     assert toy(tree).tick(50) == Status.SUCCESS
+
+
+@pytest.mark.parametrize(
+    ("actions", "found"),
+    [
+        (np.zeros((2, 2)), r"\(3, 2\), found shape \(2, 2\)"),
+        (np.zeros((3, 3)), r"\(3, 2\), found shape \(3, 3\)"),
+        (np.zeros(2), r"\(3, 2\), found shape \(2,\)"),
+        (np.array([UP, [np.nan, 0.0], UP]), "found nan among them"),
+        ([[1.0, 2.0], [1.0]], r"\(3, 2\), found \[\[1"),
+        ("up", "found 'up'"),
+    ],
+)
+def test_wrong_actions_are_refused_and_nothing_has_happened(vector_of, actions, found):
+    vector, other = vector_of(simple(), num_envs=3), vector_of(simple(), num_envs=3)
+    vector.reset(seed=0)
+    other.reset(seed=0)
+    with pytest.raises(InputError, match=found):
+        vector.step(actions)
+    assert vector.step(np.array([UP] * 3))[0].tobytes() == other.step(np.array([UP] * 3))[0].tobytes()
+
+
+def test_a_single_environment_speaks_of_a_single_action(env_of):
+    env = env_of(simple())
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=r"\(2,\), found shape \(3,\)"):
+        env.step(np.zeros(3))
+
+
+def test_once_closed_it_stays_closed(vector_of, env_of):
+    for env, action in ((vector_of(simple(), num_envs=2), np.array([UP, UP])), (env_of(simple()), UP)):
+        env.reset(seed=0)
+        env.close()
+        env.close()
+        with pytest.raises(ClosedEnvironmentError, match="make a new one"):
+            env.reset(seed=0)
+        with pytest.raises(ClosedEnvironmentError, match="make a new one"):
+            env.step(action)
+
+
+def test_nothing_is_waited_for_where_nothing_is_under_way(vector_of):
+    vector = vector_of(simple(), num_envs=2)
+    vector.reset(seed=0)
+    with pytest.raises(RuntimeError, match="under way in world 1"):
+        vector.wait([1])
+
+
+# ---- for stable-baselines3 ---------------------------------------------------------------------------------
+
+
+def test_stable_baselines_has_the_same_episodes(vector_of):
+    vector, wrapped = vector_of(simple(), num_envs=3), SB3VectorEnv(vector_of(simple(), num_envs=3))
+    wrapped.seed(5)
+    assert wrapped.reset().tobytes() == vector.reset(seed=5)[0].tobytes()
+    ends = 0
+    for _ in range(60):
+        actions = np.array([UP, DONE, STILL])
+        features, rewards, terminated, truncated, infos = vector.step(actions)
+        seen, paid, done, said = wrapped.step(actions)
+        assert seen.tobytes() == features.tobytes() and paid.dtype == np.float32
+        assert np.array_equal(paid, rewards.astype(np.float32))
+        assert np.array_equal(done, terminated | truncated)
+        for row in np.flatnonzero(done).tolist():
+            ends += 1
+            assert said[row]["is_success"] == infos["final_info"]["is_success"][row]
+            assert said[row]["terminal_observation"].tobytes() == infos["final_obs"][row].tobytes()
+            assert said[row]["TimeLimit.truncated"] == truncated[row]
+    assert ends >= 60, "one world says at once that it is done"
+    wrapped.close()
+
+
+def test_stable_baselines_asks_the_one_batch(vector_of):
+    wrapped = SB3VectorEnv(vector_of(simple(), num_envs=3))
+    assert wrapped.get_attr("num_envs", [0, 2]) == [3, 3] and wrapped.get_attr("stream", 1) == ["training"]
+    assert wrapped.env_is_wrapped(object) == [False] * 3
+    for refused in (lambda: wrapped.set_attr("stage", 1), lambda: wrapped.env_method("reset")):
+        with pytest.raises(NotImplementedError):
+            refused()
+
+
+def test_ppo_of_stable_baselines_learns_in_many_worlds(vector_of):
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    envs = VecMonitor(SB3VectorEnv(vector_of(simple(), num_envs=4)))
+    model = PPO("MlpPolicy", envs, n_steps=32, batch_size=64, n_epochs=1, device="cpu", seed=0)
+    model.learn(256)
+    assert model.num_timesteps == 256 and len(model.ep_info_buffer) and len(model.ep_success_buffer)
 
 
 # ---- worlds that physics simulates -------------------------------------------------------------------------
