@@ -26,6 +26,8 @@ from bt_tasksim.robot.description import RobotDescription
 
 NO_EPISODE = "no episode has begun: a tree with concepts is ticked by a Runner"
 NOBODY = -1
+TOOL = 7
+"""Numbers of a tool target."""
 OFTEN = 64
 """Sets of worlds that a context keeps in mind."""
 _T = TypeVar("_T", Observation, Hidden)
@@ -78,19 +80,34 @@ class Context:
         self.worlds = worlds
         self.like: Array = np.empty(0) if like is None else like
         self.rows: Array = np.arange(worlds)
-        self._facts = FactsTable(worlds, self.like)
-        self._looked: Observation | None = None
+        self._table = FactsTable(worlds, self.like)
+        self._latest: Observation | None = None
         self._observation: Observation | None = None
         self.ask_hidden: Callable[[Array | None], Hidden | None] = lambda rows: None
         """Asks for the hidden state ``(k, ...)`` of worlds ``rows (k,)``, or of all, the objects of each in
         its own order; None where nobody knows it."""
         self.times: Array = np.zeros(worlds)
         """Seconds ``(N,)`` since each episode began."""
-        self.refused: dict[int, Refusal] = {}
-        """By world."""
+        self._refused: dict[int, Refusal] = {}
         self._held: dict[tuple[str, str], Array] = {}
-        self._parts = {name: _Part(name, worlds, self.like) for name in ("tool", "hand")}
+        most = {"tool": TOOL, "hand": 1 + len(robot.synergies)}
+        self._parts = {name: _Part(name, worlds, self.like, n) for name, n in most.items()}
         self._indices: dict[bytes, Index] = {}
+
+    @property
+    def refused(self) -> dict[int, Refusal]:
+        """What could not be carried out of the last tick's commands, by world."""
+        return self._refused
+
+    @property
+    def looked(self) -> Observation | None:
+        """The observation of this tick ``(N, ...)``, the objects of each world in its own order."""
+        return self._latest
+
+    @property
+    def facts_table(self) -> FactsTable:
+        """What is known beforehand of the worlds, as they begin one by one."""
+        return self._table
 
     @property
     def now(self) -> float:
@@ -104,7 +121,7 @@ class Context:
         Raises:
             RuntimeError: The tree is ticked outside an episode.
         """
-        facts = self._facts.facts
+        facts = self.facts_table.facts
         if facts is None:
             raise RuntimeError(NO_EPISODE)
         return facts
@@ -117,9 +134,9 @@ class Context:
             RuntimeError: The tree is ticked outside an episode.
         """
         if self._observation is None:
-            if self._looked is None:
+            if self._latest is None:
                 raise RuntimeError(NO_EPISODE)
-            self._observation = self._facts.arranged(self._looked)
+            self._observation = self.facts_table.arranged(self._latest)
         return self._observation
 
     def hidden(self, rows: Array | None = None) -> Hidden | None:
@@ -138,7 +155,7 @@ class Context:
             bundle: Of worlds ``(k, ...)``, the objects of each in its own order.
             rows: Which worlds ``(k,)``; by default all.
         """
-        return self._facts.arranged(bundle, rows)
+        return self.facts_table.arranged(bundle, rows)
 
     def begin(self, models: Sequence[WorldModel], rows: Array | None = None) -> None:
         """Begin episodes; `advance` comes next.
@@ -148,7 +165,7 @@ class Context:
             rows: Which worlds ``(k,)``; by default all.
         """
         rows = self.rows if rows is None else rows
-        self._facts.replace(rows, models)
+        self.facts_table.replace(rows, models)
         self._observation = None
         for held in self._held.values():
             held[rows] = False
@@ -163,7 +180,7 @@ class Context:
             rows: The worlds ``(k,)`` that have gone on; by default all. The others are as they were, in the
                 middle of a tick.
         """
-        self._looked, self._observation = observation, None
+        self._latest, self._observation = observation, None
         self.times = host(observation.time)
         rows = self.rows if rows is None else rows
         for part in self._parts.values():
@@ -192,6 +209,14 @@ class Context:
     def writer_of(self, part: str, world: int = 0) -> Behaviour | None:
         """The leaf that has written a part of the command, ``tool`` or ``hand``, in this tick."""
         return self._parts[part].writer(world)
+
+    def written_in(self, world: int) -> Written:
+        """What the leaves have written in this tick in one world ``(1, ...)``, in NumPy.
+
+        Raises:
+            LeafError: A part is not finite; names the leaf that wrote it.
+        """
+        return Written(*(part.of_world(world) for part in self._parts.values()))
 
     def withdraw(self, leaf: Behaviour, rows: Array) -> None:
         """Drop what a leaf has written in this tick: it was interrupted, and others may act instead."""
@@ -244,7 +269,7 @@ class Context:
             return Seen(observation, facts, self.robot, since)
         index = self.index(rows)
         picked: Observation = Rows(observation, index.of)  # type: ignore[assignment]
-        return Seen(picked, self._facts.taken(index), self.robot, since)
+        return Seen(picked, self.facts_table.taken(index), self.robot, since)
 
     def index(self, rows: Array) -> Index:
         """What picks some worlds ``(k,)``; numbers that are asked for often go to a device once."""
@@ -261,9 +286,10 @@ class Context:
 class _Part:
     """One part of the command: the targets of all worlds, and which leaf wrote each."""
 
-    def __init__(self, name: str, worlds: int, like: Array) -> None:
-        self._name, self._worlds, self._like = name, worlds, like
+    def __init__(self, name: str, worlds: int, like: Array, most: int) -> None:
+        self._name, self._worlds, self._like, self._most = name, worlds, like, most
         self._leaves: list[Behaviour] = []
+        self._numbers: dict[int, int] = {}  # of leaves, by identity
         self._by: Array = np.full(worlds, NOBODY)
         self.values: Array = None
 
@@ -271,9 +297,15 @@ class _Part:
         if self.values is None:
             return
         if len(rows) == self._worlds:
-            self._leaves, self._by, self.values = [], np.full(self._worlds, NOBODY), None
+            self._empty()
             return
         self._forget(rows)
+        if (self._by == NOBODY).all():
+            self._empty()
+
+    def _empty(self) -> None:
+        self._leaves, self._numbers = [], {}
+        self._by, self.values = np.full(self._worlds, NOBODY), None
 
     def writer(self, world: int) -> Behaviour | None:
         number = int(self._by[world])
@@ -295,15 +327,18 @@ class _Part:
             width = max(self.values.shape[-1], values.shape[-1])
             self.values, values = _widened(self.values, width), _widened(values, width)
             index.put(self.values, values)
-        if leaf not in self._leaves:
+        if id(leaf) not in self._numbers:
+            self._numbers[id(leaf)] = len(self._leaves)
             self._leaves.append(leaf)
-        self._by[rows] = self._leaves.index(leaf)
+        self._by[rows] = self._numbers[id(leaf)]
 
     def withdraw(self, leaf: Behaviour, rows: Array) -> None:
-        if leaf not in self._leaves or self.values is None:
+        number = self._numbers.get(id(leaf))
+        if number is None or self.values is None:
             return
-        mine = rows[self._by[rows] == self._leaves.index(leaf)]
-        self._forget(mine)
+        mine = rows[self._by[rows] == number]
+        if len(mine):
+            self._forget(mine)
 
     def _forget(self, rows: Array) -> None:
         self.values = array_namespace(self.values).asarray(self.values, copy=True)
@@ -316,28 +351,55 @@ class _Part:
 
     def check(self, finite: np.ndarray) -> None:
         for world in np.flatnonzero(~finite & (self._by != NOBODY)).tolist():
-            leaf = self._leaves[int(self._by[world])]
-            raise LeafError(
-                f"leaf '{leaf.name}' commands a {self._name} target that is not finite: "
-                f"{host(self.values[world, ...])}"
-            )
+            raise self._not_finite(world)
+
+    def _not_finite(self, world: int) -> LeafError:
+        leaf = self._leaves[int(self._by[world])]
+        found = host(self.values[world, ...])
+        return LeafError(f"leaf '{leaf.name}' commands a {self._name} target that is not finite: {found}")
+
+    def of_world(self, world: int) -> Array:
+        """The targets ``(1, n)`` of one world, in NumPy; None where nobody wrote any.
+
+        Raises:
+            LeafError: They are not finite; names the leaf that wrote them.
+        """
+        if self.writer(world) is None:
+            return None
+        found = host(self.values[world : world + 1, ...])
+        if not np.isfinite(found).all():
+            raise self._not_finite(world)
+        return found
 
     def _shaped(self, values: Array, worlds: int, leaf: Behaviour) -> Array:
-        """Targets as an array ``(k, n)``."""
+        """Targets as an array of numbers ``(k, n)``, where concepts are computed."""
+        there = hasattr(values, "ndim") and (
+            not isinstance(values, np.ndarray) or isinstance(self._like, np.ndarray)
+        )
         try:
-            found = values if hasattr(values, "ndim") else constant(values, self._like)
-            shape = tuple(found.shape)
+            found = values if there else constant(values, self._like)
+            shape = tuple(found.shape) if _real(found) else ()
         except (TypeError, ValueError):
             found, shape = values, ()
-        rows_of = len(shape) == 2 and shape[0] == worlds and shape[1] > 0
-        if rows_of and (self._name == "hand" or shape[1] == 7):
+        if len(shape) == 2 and shape[0] == worlds and self._fits(shape[1]):
             return found
         writer = type(getattr(leaf, "model", leaf))
         place = place_of(getattr(writer, "command", writer))
         where = f" ({place})" if place else ""
-        raise LeafError(
-            f"leaf '{leaf.name}'{where} commands {self._name}={shown(repr(values))}: {WANTED[self._name]}"
-        )
+        wanted = WANTED[self._name].format(most=self._most)
+        raise LeafError(f"leaf '{leaf.name}'{where} commands {self._name}={shown(repr(values))}: {wanted}")
+
+    def _fits(self, width: int) -> bool:
+        """Whether a target may have so many numbers."""
+        return width == TOOL if self._name == "tool" else 0 < width <= self._most
+
+
+def _real(values: Array) -> bool:
+    """Whether these are real numbers, whatever their type."""
+    if isinstance(values, np.ndarray):
+        return values.dtype.kind in "fiub"
+    xp = array_namespace(values)
+    return bool(xp.isdtype(values.dtype, ("real floating", "integral", "bool")))
 
 
 def _floats(values: Array, size: int) -> Array:
@@ -359,8 +421,8 @@ def _widened(values: Array, width: int) -> Array:
 
 WANTED = {
     "tool": "a tool target is (worlds, 7): of each world 7 numbers, position, then quaternion w x y z",
-    "hand": "a hand target is (worlds, n): of each world a row of numbers, the closure first: "
-    "hand=closure[..., None]",
+    "hand": "a hand target is (worlds, n): of each world a row of numbers, the closure first and then "
+    "this robot's synergies, {most} at most: hand=closure[..., None]",
 }
 
 

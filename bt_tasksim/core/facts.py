@@ -422,6 +422,7 @@ class FactsTable:
         self._order: Order | None = None
         self._stale: set[int] = set()
         self._taken: dict[bytes, WorldFacts] = {}
+        self._single: dict[int, FactsTable] = {}
 
     def replace(self, rows: Array, models: Sequence[WorldModel]) -> None:
         """Other worlds begin at ``rows (k,)``.
@@ -432,6 +433,7 @@ class FactsTable:
         for row, model in zip(rows.tolist(), models, strict=True):
             self._models[row] = model
             self._stale.add(row)
+            self._single.pop(row, None)
         self._taken.clear()
 
     @property
@@ -466,6 +468,15 @@ class FactsTable:
             rows: Which ``(k,)``; by default all.
         """
         return bundle if self.facts is None or self._order is None else self._order.arranged(bundle, rows)
+
+    def of_world(self, row: int) -> FactsTable:
+        """The facts of one world alone, in NumPy, with columns for its own objects and places only."""
+        if row not in self._single:
+            table, model = FactsTable(1), self._models[row]
+            if model is not None:
+                table.replace(np.zeros(1, int), [model])
+            self._single[row] = table
+        return self._single[row]
 
     def taken(self, index: Index) -> WorldFacts:
         """The facts of some worlds."""

@@ -5,21 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.concept.batch_leaves import leaf_in_batch
-from bt_tasksim.concept.context import Context, Refusal, only_world
+from bt_tasksim.concept.context import Context, Refusal
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.status import STATUSES
+from bt_tasksim.concept.world_context import WorldContext
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING
 from bt_tasksim.core.errors import BtTasksimError, InputError, UnreachableError
 from bt_tasksim.core.outcomes import FAILED, OUT_OF_REACH, TIME_OVER, Outcome
-from bt_tasksim.core.poses import Array, constant
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.transfer import Index
-from bt_tasksim.core.world import Command, Hidden, WorldModel
+from bt_tasksim.core.world import Hidden, WorldModel
 from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.laws import laws_of
 from bt_tasksim.execution.leaf_errors import no_status, set_up
@@ -50,7 +52,6 @@ class _Episode:
     leaf: str = ""
     steps: int = 0
     sim_time: float = 0.0
-    shown: bool = False
 
 
 class BatchRunner:
@@ -94,13 +95,12 @@ class BatchRunner:
         self.context = Context(self.robot, worlds, like)
         self.context.ask_hidden = self.worlds.hidden
         set_up(self.tree, context=self.context)
-        self._own: dict[int, Context] = {}  # of worlds in which something is ticked by py_trees
         self.batch = BatchTree(
             self.tree,
             worlds,
             lambda leaf: leaf_in_batch(leaf, self.context),
             build=build,
-            contexts=self._own_context,
+            contexts=partial(WorldContext, self.context),
         )
         self._episodes: list[_Episode | None] = [None] * worlds
         self._phase = np.full(worlds, IDLE)
@@ -188,9 +188,7 @@ class BatchRunner:
         rows = np.flatnonzero(self._phase == TICKING)
         if not len(rows):
             return
-        self._show(rows)
         status = self.batch.tick(rows, self.context.times[rows])
-        self._collect(rows)
         if self.batch.unknown and (status == INVALID).any():
             raise no_status(self.tree)  # alone, that world says which leaf it is
         for k, row in enumerate(rows.tolist()):
@@ -202,34 +200,6 @@ class BatchRunner:
                 self.batch.reset(np.array([row]))
                 episode.outcome = TIME_OVER(limit=self.longest)
                 self._settle(row, episode)
-
-    def _own_context(self, row: int) -> Context:
-        """The context of one world, for what py_trees ticks in it."""
-        self._own[row] = Context(self.robot)
-        return self._own[row]
-
-    def _show(self, rows: Array) -> None:
-        """Let what py_trees ticks see its worlds."""
-        for row in rows.tolist() if self._own else ():
-            own, episode, seen = self._own[row], self._episodes[row], self.worlds.observation
-            assert episode is not None and seen is not None
-            if not episode.shown:
-                own.begin([episode.world])
-                episode.shown = True
-            own.advance(only_world(seen, row))
-            if row in self.context.refused:
-                own.refused[0] = self.context.refused[row]
-
-    def _collect(self, rows: Array) -> None:
-        """Take over what leaves that py_trees ticks have written."""
-        like = self.context.like
-        for row in rows.tolist() if self._own else ():
-            own = self._own[row]
-            for name, part in vars(own.written).items():
-                if part is not None and not np.isnan(part[0, 0]):
-                    leaf = own.writer_of(name)
-                    assert leaf is not None, "somebody wrote it"
-                    self.context.write(Command(**{name: constant(part, like)}), np.array([row]), leaf)
 
     def _ended(self, row: int, episode: _Episode, status: Status) -> None:
         episode.status = status

@@ -246,9 +246,21 @@ def test_a_target_without_a_row_for_each_of_its_worlds_is_refused(three, command
     assert context.written.of_world(0) == Command()
 
 
+@pytest.mark.parametrize(
+    "hand", [np.array([["much"], ["more"]]), np.zeros((2, 50)), np.zeros((2, 1), complex), [["a"], ["b"]]]
+)
+@pytest.mark.parametrize("where", [(0, 2), (0, 1)])
+def test_a_hand_target_that_is_no_number_or_too_many_is_refused(act, hand, where):
+    context, a = Context(ROBOT, where[1] + 1), act("a")
+    with pytest.raises(LeafError, match=r"leaf 'a' .* commands hand=.* 1 at most"):
+        context.write(Command(hand=hand), rows(*where), a)
+
+
 @pytest.mark.parametrize("first", [0, 1])
-def test_a_hand_with_synergies_in_one_world_and_without_in_another(three, first):
-    context, a, b = three
+def test_a_hand_with_synergies_in_one_world_and_without_in_another(act, first):
+    context, a, b = Context(load_robot("xarm7_ability"), 3), act("a"), act("b")
+    context.begin([world(), world(), world()])
+    context.advance(observed(3))
     writes = [
         (Command(hand=np.array([[0.5]])), rows(0), a),
         (Command(hand=np.array([[0.6, 0.2]])), rows(1), b),

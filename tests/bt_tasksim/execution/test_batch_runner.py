@@ -19,7 +19,7 @@ from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.execution.worlds import most_worlds, why_alone
-from bt_tasksim.trees import retry, sequence, timeout
+from bt_tasksim.trees import parallel, retry, sequence, timeout
 from bt_tasksim.trees.load import load_source
 from tests.unlike_worlds import holding, mixed
 
@@ -231,3 +231,51 @@ def test_behaviours_of_ones_own_see_their_worlds_objects():
 
     alone = {seed: one_by_one(build, scene, (seed,))[seed] for seed in seeds}
     assert in_batch(build, scene, seeds, 3) == alone
+
+
+class Looks(Behaviour):
+    """A behaviour of somebody's own that looks at what only a simulator knows, and at goals."""
+
+    def setup(self, **kwargs):
+        self.context = kwargs["context"]
+
+    def update(self):
+        hidden = self.context.hidden()
+        held = self.context.reached("holding", "target", np.array([0]))
+        self.feedback_message = f"holding: {held}, {hidden.objects.tolist()}, {self.context.command}"
+        return Status.FAILURE
+
+
+def test_behaviours_of_ones_own_know_what_other_leaves_have_reached():
+    scene, seeds = load_source("pick_and_place").scene, (0, 1, 2)
+
+    def build():
+        pick = Counted("own", Pick("target"))
+        return sequence("root", Counted("own", Grasp("target")), pick, Wait(0.1), Looks("looks"))
+
+    alone = {seed: one_by_one(build, scene, (seed,))[seed] for seed in seeds}
+    assert all("holding: [ True]" in found[3] for found in alone.values())
+    assert in_batch(build, scene, seeds, 2) == alone
+
+
+class Drops(Behaviour):
+    """Opens the hand, and is never done."""
+
+    def setup(self, **kwargs):
+        self.context = kwargs["context"]
+
+    def update(self):
+        self.context.write(Command(hand=np.array([[0.0]])), np.array([0]), self)
+        return Status.RUNNING if self.context.now < 3.5 else Status.SUCCESS
+
+
+def test_a_goal_that_is_lost_is_said_alike_at_any_batch():
+    scene, seeds = load_source("pick_and_place").scene, (0, 1)
+
+    def build():
+        both = parallel("both", Bring("target", position=(0.5, 0.0, 0.5)), Counted("own", Drops("drops")))
+        return sequence("root", Counted("own", Grasp("target")), Pick("target"), both)
+
+    alone = {seed: one_by_one(build, scene, (seed,))[seed] for seed in seeds}
+    assert {found[0] for found in alone.values()} == {Status.FAILURE}
+    assert in_batch(build, scene, seeds, 2) == alone
