@@ -23,7 +23,11 @@ def same_tree(a: Behaviour, b: Behaviour) -> bool:
     stack = [(a, b)]
     while stack:
         left, right = stack.pop()
-        if _type(left) is not _type(right) or left.name != right.name or _arguments(left) != _arguments(right):
+        if (
+            _type(left) is not _type(right)
+            or left.name != right.name
+            or _arguments(left) != _arguments(right)
+        ):
             return False
         if len(left.children) != len(right.children):
             return False

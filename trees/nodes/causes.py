@@ -1,4 +1,4 @@
-"""What was tried before the last failure, and why it failed: what a retry and a fallback have to add to it."""
+"""What was tried before the last failure, and why it failed: what retry and fallback have to add to it."""
 
 from __future__ import annotations
 
