@@ -315,6 +315,7 @@ class EpisodeBatch:
         if not begun:
             return begun_rows
         self.batch.reset(begun_rows)
+        self.batch.renew(begun_rows)
         self.context.begin(models, begun_rows)
         failed = self.worlds.reset(begun_rows, drawn)
         for row, why in failed.items():
