@@ -23,12 +23,22 @@ def same_tree(a: Behaviour, b: Behaviour) -> bool:
     stack = [(a, b)]
     while stack:
         left, right = stack.pop()
-        if type(left) is not type(right) or left.name != right.name or _arguments(left) != _arguments(right):
+        if (
+            _type(left) is not _type(right)
+            or left.name != right.name
+            or _arguments(left) != _arguments(right)
+        ):
             return False
         if len(left.children) != len(right.children):
             return False
         stack.extend(zip(left.children, right.children, strict=True))
     return True
+
+
+def _type(node: Behaviour) -> type:
+    """What a node is: py_trees' own class, or ours that stands for it, are one kind."""
+    kind = kind_of(node)
+    return type(node) if kind is None else type(kind)
 
 
 def _arguments(node: Behaviour) -> dict[str, Any]:

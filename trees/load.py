@@ -309,10 +309,15 @@ def _made(build: Any, robot: str | None, path: Path) -> Scene:
     return made
 
 
+def tree_module(tree: str) -> str:
+    """Name of the module that a tree's Python file is loaded as."""
+    return f"_tree_{Path(tree).stem}"
+
+
 def _module(path: Path) -> Any:
     if not path.is_file():
         raise InputError(f"there is no tree file '{path}'")
-    spec = importlib.util.spec_from_file_location(f"_tree_{path.stem}", path)
+    spec = importlib.util.spec_from_file_location(tree_module(str(path)), path)
     assert spec is not None and spec.loader is not None
     folder = str(path.resolve().parent)
     if folder not in sys.path:  # as for a script: it may import what stands beside it

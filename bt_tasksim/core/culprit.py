@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import inspect
 import sys
-import sysconfig
 from pathlib import Path
 from types import FrameType
 
+from bt_tasksim.core.own_code import is_installed, is_own
 from bt_tasksim.core.plugins import loaded
-
-_INSTALLED = tuple({sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")})
 
 
 def users_place(error: BaseException) -> str:
@@ -51,6 +49,6 @@ def _is_the_users(frame: FrameType) -> bool:
 
 
 def _is_a_users(module: str, file: str) -> bool:
-    if module.partition(".")[0] == "bt_tasksim" or file.startswith("<frozen"):
-        return False
-    return not file.startswith(_INSTALLED) or bool({module, str(Path(file).resolve())} & set(loaded()))
+    if is_own(module, file):
+        return True
+    return is_installed(file) and bool({module, str(Path(file).resolve())} & set(loaded()))

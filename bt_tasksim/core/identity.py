@@ -65,6 +65,12 @@ def differences(theirs: Mapping[str, str], ours: Mapping[str, str]) -> str:
     return "; ".join(shown)
 
 
+def differing(then: Mapping[str, str], now: Mapping[str, str]) -> str:
+    """In what two mappings of hashes differ: ``tree and another scene``; empty where they do not."""
+    names = [name for name in {**now, **then} if then.get(name) != now.get(name)]
+    return " and another ".join(names)
+
+
 def _short(name: str, versions: Mapping[str, str]) -> str:
     return f"{'another source of bt-tasksim' if name == 'source' else name} {versions.get(name, 'none')}"
 

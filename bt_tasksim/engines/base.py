@@ -217,6 +217,9 @@ class PhysicsEngine(Engine):
     def own_world(cls, name: str) -> WorldSource | None:
         """The world that an engine of this name brings; None, the default, where it builds any scene.
 
+        What decides it and may change, such as a file's content, it gives in plain data by a method
+        ``content()``: only with the same does an evaluation or a training go on.
+
         Args:
             name: The engine's name, and what follows it after a colon.
 

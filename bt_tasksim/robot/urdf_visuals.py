@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
@@ -60,6 +61,19 @@ def load_collisions(urdf: Path) -> tuple[LinkVisual, ...]:
         InputError: The file is no URDF, or one of its meshes is missing.
     """
     return _parts(urdf, "collision")
+
+
+def mesh_files(urdf: Path) -> tuple[Path, ...]:
+    """All mesh files that a URDF names and that are there.
+
+    Raises:
+        InputError: The file cannot be read as XML.
+    """
+    found = set()
+    for form in read_urdf(urdf).iter("mesh"):
+        with contextlib.suppress(InputError):
+            found.add(_mesh_path(form.get("filename", ""), urdf))
+    return tuple(sorted(found))
 
 
 def read_urdf(urdf: Path) -> ElementTree.Element:

@@ -22,6 +22,7 @@ from safetensors import safe_open
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_bytes
+from bt_tasksim.core.identity import differing
 from bt_tasksim.core.json_text import parse_json
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.renamed import with_present_names
@@ -126,11 +127,10 @@ def check_same(path: Path, facts: Facts, config: TrainConfig, about: Mapping[str
             f"checkpoint '{path}' was written with other settings ({'; '.join(differ)}): resume with the "
             "same, or train anew"
         )
-    others = [name for name in about if facts.about and facts.about.get(name) != about[name]]
-    if others:
+    # An earlier one may not say all of it; what it says must be the same.
+    if others := differing(facts.about, {name: about.get(name, "") for name in facts.about}):
         raise InputError(
-            f"checkpoint '{path}' is of a training with another {' and another '.join(others)}: resume with "
-            "the same, or train anew"
+            f"checkpoint '{path}' is of a training with another {others}: resume with the same, or train anew"
         )
 
 

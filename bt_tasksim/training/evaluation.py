@@ -22,7 +22,7 @@ from bt_tasksim.concept.plugins import load_all
 from bt_tasksim.core.cluster import Cluster
 from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
 from bt_tasksim.core.fleet import Fleet, Here
-from bt_tasksim.core.identity import identity
+from bt_tasksim.core.identity import differing, identity
 from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import outcome_of_error
 from bt_tasksim.core.plugins import loaded
@@ -257,8 +257,8 @@ def _same_player(job: Job, subject: dict[str, str]) -> Player:
     player = Player(job)
     stream = subject["stream of draws"]
     found = _subject(job, player.runner, stream)
-    if others := [name for name in subject if found[name] != subject[name]]:
-        raise InputError(f"another {' and another '.join(others)} is found there: have the same files there")
+    if others := differing(subject, found):
+        raise InputError(f"another {others} is found there: have the same files there")
     return player
 
 
@@ -379,9 +379,9 @@ def _outcome(result: Result) -> EpisodeOutcome:
 
 
 def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
-    from bt_tasksim.training.subject import code_files, evaluation_subject
+    from bt_tasksim.training.subject import evaluation_subject, own_code
 
-    code = code_files(job.tree, job.plugins)
+    code = own_code(runner.tree, job.tree, job.plugins)
     return evaluation_subject(runner.tree, runner.scene, job.options, _policies(runner), code, stream)
 
 

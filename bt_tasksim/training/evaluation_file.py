@@ -21,7 +21,7 @@ from typing import Any
 from bt_tasksim.core.bounded_text import read_bytes
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.files import check_writable, write_bytes, write_text
-from bt_tasksim.core.identity import differences
+from bt_tasksim.core.identity import differences, differing
 from bt_tasksim.core.json_text import parse_json_object
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation, outcomes_hash
 
@@ -156,11 +156,10 @@ class KeptEvaluation:
         Raises:
             InputError: It is one of something else, or of seeds that are not asked for; says which.
         """
-        others = [name for name in subject if self.subject.get(name) != subject[name]]
-        if others:
+        if others := differing(self.subject, subject):
             raise InputError(
-                f"'{self.path}' holds an evaluation with another {' and another '.join(others)}: go on with "
-                "the same, or evaluate anew without --resume"
+                f"'{self.path}' holds an evaluation with another {others}: go on with the same, or evaluate "
+                "anew without --resume"
             )
         asked = set(seeds)
         if beyond := [o.seed for o in self.outcomes if o.seed not in asked]:

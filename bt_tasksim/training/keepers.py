@@ -12,6 +12,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.context import Context
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.identity import differing
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.policy.policy import Policy
 from bt_tasksim.robot.description import load_robot
@@ -20,7 +21,7 @@ from bt_tasksim.training.episode_batch import EpisodeBatch
 from bt_tasksim.training.learning_leaves import find_train
 from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.training.reward import Reward
-from bt_tasksim.training.subject import code_files, evaluation_subject
+from bt_tasksim.training.subject import evaluation_subject, own_code
 from bt_tasksim.trees.nodes.train import concepts_in
 
 
@@ -55,7 +56,7 @@ class Keeping:
             for leaf in concepts_in(tree)
             if leaf not in learners
         }
-        code = code_files(source.tree, source.plugins)
+        code = own_code(tree, source.tree, source.plugins)
         return evaluation_subject(tree, scene, self.options, policies, code, "training")
 
 
@@ -94,9 +95,9 @@ class KeeperElsewhere:
         found = self.source.load(self.keeping.options)
         keeper = self.keeping.keeper(found.build(), found.scene)
         subject = self.keeping.subject(keeper.tree, keeper.scene, self.source)
-        if others := [name for name in self.subject if subject[name] != self.subject[name]]:
+        if others := differing(self.subject, subject):
             raise InputError(
-                f"another {' and another '.join(others)} is found there by the name '{self.source.tree}': "
+                f"another {others} is found there by the name '{self.source.tree}': "
                 "have the same files everywhere"
             )
         return keeper

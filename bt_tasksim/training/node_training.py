@@ -46,7 +46,7 @@ from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.training.on_cluster import actor_memory
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
 from bt_tasksim.training.rollouts import results
-from bt_tasksim.training.subject import training_subject
+from bt_tasksim.training.subject import own_code, training_subject
 from bt_tasksim.trees.nodes.train import Train
 
 if TYPE_CHECKING:
@@ -337,7 +337,10 @@ class NodeTraining:
             leaf.name: [list(shared_layout(self.node, [leaf], robot).items()), leaf.model.actions]
             for leaf in self.node.learners()
         }
-        return training_subject(self.task.tree, self.task.scene, layouts, self.node.name, self.task.options)
+        task, source = self.task, self.task.source
+        named = () if source is None else (source.tree, source.plugins)
+        code = own_code(task.tree, *named)
+        return training_subject(task.tree, task.scene, layouts, self.node.name, task.options, code)
 
     def _kept(self) -> tuple[Path, dict[str, Array], Facts] | None:
         """The checkpoint to go on from, one of this training; nothing is written before it is known to be."""

@@ -4,13 +4,14 @@ import networkx as nx
 import numpy as np
 import pytest
 from draws import successes
-from py_trees.composites import Selector, Sequence
+from py_trees.composites import Sequence
 
 from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place, Release
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.resources import asset
 from bt_tasksim.demos_decomp import decompose_log, open_log
 from bt_tasksim.trees.from_graph import tree_from_graph
+from bt_tasksim.trees.nodes.fallback import Fallback
 
 pytestmark = pytest.mark.physical
 
@@ -66,7 +67,7 @@ def test_alternatives_become_a_fallback_that_tries_the_commoner_way_first():
     found.nodes[names[2]]["share"], found.nodes[names[3]]["share"] = 0.2, 0.8
     found.graph["alternatives"] = [[[names[2]], [names[3]]]]
     tree = tree_from_graph(found)
-    assert [type(getattr(c, "model", c)) for c in tree.children] == [Grasp, Pick, Selector, Release]
+    assert [type(getattr(c, "model", c)) for c in tree.children] == [Grasp, Pick, Fallback, Release]
     ways = tree.children[2]
     assert ways.memory and [way.model.to for way in ways.children] == ["goal", "other"]
 

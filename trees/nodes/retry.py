@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.reporting import outcome_of, speaker
 from bt_tasksim.core.outcomes import Outcome, Statement, register_reason
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
 from bt_tasksim.trees.nodes.batch import FAILURE, NodePlace
+from bt_tasksim.trees.nodes.causes import Cause, batch_cause_of, cause_of, summary
 from bt_tasksim.trees.nodes.pass_through import said_below
 from bt_tasksim.trees.nodes.rounds import BatchRounds, Rounds
 
@@ -25,14 +23,6 @@ ATTEMPT_FAILED = register_reason(
 ENDLESS_ATTEMPT_FAILED = register_reason(
     "endless_attempt_failed", "attempt {attempt} failed{before}", attempt=COUNT
 )
-
-
-class Cause(NamedTuple):
-    """Why an attempt failed: the leaf, the reason it is counted by, and the sentence."""
-
-    leaf: str
-    reason: str
-    sentence: str
 
 
 class Retry(Rounds):
@@ -61,11 +51,10 @@ class Retry(Rounds):
 
     def report_round(self) -> None:
         """Say which attempt failed, and why, and why those before it did."""
-        failed = speaker(self.decorated) or self.decorated
         self.report(self._failed(said_below(self.decorated)))
-        outcome = outcome_of(failed)
-        if outcome is not None:
-            self.causes.append(cause_of(failed.name, outcome))
+        cause = cause_of(self.decorated)
+        if cause is not None:
+            self.causes.append(cause)
 
     def seen_from_here(self, outcome: Outcome) -> Outcome:
         """The last attempt's failure, with the causes of those before it."""
@@ -75,12 +64,6 @@ class Retry(Rounds):
         return attempt_failed(self.rounds, self.attempts, self.causes, why)
 
 
-def cause_of(leaf: str, outcome: Outcome) -> Cause:
-    """Why an attempt failed, by what the leaf said."""
-    cause = outcome.cause
-    return Cause(leaf, cause.reason.name, cause.own_sentence)
-
-
 def attempt_failed(attempt: int, attempts: int, causes: Sequence[Cause], why: Statement | None) -> Outcome:
     """Which attempt failed, and why, and why those before it did."""
     before = causes[: attempt - 1]
@@ -88,19 +71,6 @@ def attempt_failed(attempt: int, attempts: int, causes: Sequence[Cause], why: St
     if attempts > 0:
         return ATTEMPT_FAILED(why, attempt=attempt, attempts=attempts, before=said)
     return ENDLESS_ATTEMPT_FAILED(why, attempt=attempt, before=said)
-
-
-def summary(causes: Sequence[Cause]) -> str:
-    """The causes in a few words: like ones are counted, and the first of them is said."""
-    first: dict[tuple[str, str], Cause] = {}
-    for cause in causes:
-        first.setdefault(cause[:2], cause)
-    often = Counter(cause[:2] for cause in causes)
-    said = [
-        f"{cause.leaf}: {cause.sentence}{f', {often[kind]} times' if often[kind] > 1 else ''}"
-        for kind, cause in first.items()
-    ]
-    return "; ".join(said)
 
 
 def retry(attempts: int, child: Behaviour, *, name: str = "RetryUntilSuccessful") -> Retry:
@@ -160,12 +130,10 @@ class BatchRetry(BatchRounds):
         """Remember which attempt failed, and why."""
         child, reasons = self.place.children[0], self.batch.reasons
         for row in rows.tolist():
-            speaker = reasons.speaker(child, row)
-            failed = child if speaker is None else speaker
             self._why[row] = reasons.said_below(child, row)
-            outcome = reasons.outcome_of(failed, row)
-            if outcome is not None:
-                self._causes.setdefault(row, []).append(cause_of(reasons.name(failed), outcome))
+            cause = batch_cause_of(reasons, child, row)
+            if cause is not None:
+                self._causes.setdefault(row, []).append(cause)
 
     def says(self, row: int) -> Statement | None:
         """Which attempt failed last, and why, and why those before it did."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
 
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.plain import shown
@@ -55,6 +56,10 @@ class EnvironmentWorld:
     def place_names(self) -> Collection[str]:
         """Names of the places in its file."""
         return self.file.places.keys()
+
+    def content(self) -> Mapping[str, Any]:
+        """What its file says, in plain data: where that is the same, so are its worlds."""
+        return self.file.model_dump(mode="json")
 
     def with_robot(self, robot: str) -> EnvironmentWorld:
         """The same with another robot.

@@ -9,6 +9,7 @@ from bt_tasksim import trees
 from bt_tasksim.core.batch_leaf import FAILURE, RUNNING, SUCCESS, BatchLeaf
 from bt_tasksim.core.outcomes import FAILED, TIMED_OUT
 from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.trees.nodes.fallback import ALTERNATIVES_FAILED
 from bt_tasksim.trees.nodes.retry import ATTEMPT_FAILED
 
 
@@ -51,3 +52,20 @@ def test_a_failure_is_told_with_what_was_tried_before_by_world():
     batch.tick(everyone, 0.0)
     batch.tick(everyone, 2.0)
     assert batch.outcome(1) == TIMED_OUT(limit=1.0), "what was before the world began anew is forgotten"
+
+
+def test_a_fallback_tells_by_world_why_the_first_way_failed_too():
+    tree = trees.fallback("root", Running("first"), Running("second"))
+    batch = BatchTree(tree, 4, lambda leaf: Fails())
+    everyone = np.arange(4)
+    for now in (0.0, 0.1, 0.2):
+        found = batch.tick(everyone, now)
+    assert found.tolist() == [RUNNING, FAILURE, RUNNING, FAILURE]
+    for world in (1, 3):
+        outcome = batch.outcome(world)
+        assert outcome.is_a(ALTERNATIVES_FAILED) and outcome.cause == FAILED(text=f"time 1 in world {world}")
+        assert outcome.names["before"] == f"first: time 1 in world {world}"
+    batch.tick(everyone, 0.3)
+    batch.tick(everyone, 0.4)
+    batch.tick(everyone, 0.5)
+    assert batch.outcome(1).names["before"] == "first: time 2 in world 1", "and it counts anew"

@@ -201,7 +201,7 @@ def test_only_the_same_evaluation_goes_on(tmp_path, policy):
     other.write_text("from bt_tasksim.trees.scenarios.pick_and_throw import build, scene\n")
     for job, named in {
         dataclasses.replace(JOB, tree="shelf_to_shelf"): "tree and another scene",
-        dataclasses.replace(JOB, tree=str(other)): "tree",
+        dataclasses.replace(JOB, tree=str(other)): "file other.py",
         dataclasses.replace(JOB, robot="xarm7_ability"): "robot",
         dataclasses.replace(JOB, options=EngineOptions(noise="hard")): "choice of engines",
         dataclasses.replace(JOB, options=EngineOptions(engines="mujoco", noise="none")): "choice of engines",

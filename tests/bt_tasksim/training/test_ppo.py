@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import toys
 from safetensors import safe_open
 from safetensors.numpy import save_file
 from toys import SCENE, Check, Raise, Unprogrammed
@@ -23,6 +24,7 @@ from bt_tasksim.core.locks import LockedError
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.policy.files import CHECKPOINT, load_policy
 from bt_tasksim.scene.scene import CurriculumStage
+from bt_tasksim.training import subject
 from bt_tasksim.training.checkpoint import read_checkpoint, write_checkpoint
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.node_training import NodeTraining
@@ -228,6 +230,15 @@ def test_another_scene_robot_or_noise_is_not_gone_on_with(begun):
         train(tree(), SCENE.with_robot("so100"), out=out, config=TINY, workers=1, resume=True)
     with pytest.raises(InputError, match="with another choice of engines: resume"):
         learn(out, resume=True, options=EngineOptions(noise="none"))
+
+
+def test_other_code_of_the_leaves_is_not_gone_on_with(begun, monkeypatch):
+    out, _ = begun
+    edited = {Path(toys.__file__): "other"}
+    usual = subject.code_hash
+    monkeypatch.setattr(subject, "code_hash", lambda file: edited.get(Path(file)) or usual(file))
+    with pytest.raises(InputError, match="of a training with another module toys: resume"):
+        learn(out, resume=True)
 
 
 def test_every_flipped_byte_of_a_checkpoint_is_noticed(begun):

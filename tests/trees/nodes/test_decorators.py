@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
+from py_trees.composites import Selector
 
 from bt_tasksim import trees
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.reporting import speaker, whole_outcome
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import FAILED, TEXT, TIMED_OUT
+from bt_tasksim.trees.nodes.fallback import ALTERNATIVES_FAILED
 from bt_tasksim.trees.nodes.parallel import CHILDREN_FAILED
 from bt_tasksim.trees.nodes.retry import ATTEMPT_FAILED
+from bt_tasksim.trees.vocabulary import kind_of
 
 STATUS = {"R": Status.RUNNING, "S": Status.SUCCESS, "F": Status.FAILURE}
 LETTER = {status: letter for letter, status in STATUS.items()}
@@ -79,6 +82,39 @@ def test_after_the_last_attempt_every_cause_is_said():
     tree = trees.retry(3, Other("F"))
     ticks(tree, 3)
     assert all(f"leaf {k}: answer {k}" in tree.outcome.names["before"] for k in (1, 2))
+
+
+def test_a_fallback_says_why_what_it_tried_first_has_failed():
+    ways = Scripted("RF", "first"), Scripted("F", "then"), Scripted("RRF", "last")
+    tree = trees.sequence("root", trees.retry(2, trees.fallback("ways", *ways)))
+    while tree.status != Status.FAILURE:
+        tree.tick_once()
+    assert (ways[0].asked, ways[2].asked) == (4, 6), "there were two attempts"
+    found = whole_outcome(speaker(tree))
+    assert found.is_a(ALTERNATIVES_FAILED) and found.is_a(ATTEMPT_FAILED)
+    assert found.cause == FAILED(text="answer 6"), "it is counted by the last one"
+    assert "first: answer 4; then: answer 2" in found.sentence, "and those of the last attempt are said"
+
+
+def test_a_fallback_that_has_not_failed_adds_nothing():
+    tree = trees.sequence(
+        "root", trees.fallback("f", Scripted("F", "a"), Scripted("S", "b")), Scripted("F", "c")
+    )
+    ticks(tree, 1)
+    assert whole_outcome(speaker(tree)) == FAILED(text="answer 1")
+
+
+def test_a_fallback_of_one_child_says_no_more_than_it():
+    tree = trees.fallback("f", Scripted("F"))
+    ticks(tree, 1)
+    assert whole_outcome(speaker(tree)) == FAILED(text="answer 1")
+
+
+def test_py_trees_own_selector_is_a_fallback_too():
+    own = Selector("f", memory=True, children=[Scripted("F"), Scripted("S")])
+    ours = trees.fallback("f", Scripted("F"), Scripted("S"))
+    assert trees.same_tree(own, ours) and kind_of(own).tag == kind_of(ours).tag == "Fallback"
+    assert not trees.same_tree(own, trees.reactive_fallback("f", Scripted("F"), Scripted("S")))
 
 
 def test_one_attempt_says_no_more_than_its_child():
