@@ -11,7 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.concept.context import Context
-from bt_tasksim.concept.reporting import outcome_of, speaker
+from bt_tasksim.concept.reporting import outcome_of
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, RUNNING, SUCCESS, BatchLeaf
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import Outcome
@@ -72,9 +72,18 @@ class WorldByWorld(BatchLeaf):
                 self.copies[row].stop(Status.INVALID)
 
     def outcome(self, row: int) -> Outcome | None:
-        """See `BatchLeaf.outcome`: what the node says that was decided last."""
-        found = speaker(self.copies[row])
-        return None if found is None else outcome_of(found)
+        """See `BatchLeaf.outcome`."""
+        return outcome_of(self.copies[row])
+
+    def behaviour(self, row: int) -> Behaviour:
+        """The behaviour of a world."""
+        return self.copies[row]
+
+    def tip(self, row: int, position: int = 0) -> int | None:
+        """The deepest node below one that was decided last in a world, as so many positions further on."""
+        nodes = self._nodes[row]
+        found = nodes[position].tip()
+        return next((k - position for k, node in enumerate(nodes) if node is found), None)
 
     def renew(self, row: int, copy: Behaviour) -> None:
         """Another copy for a world that begins anew."""
@@ -122,7 +131,15 @@ class BelowUnknown(BatchLeaf):
 
     def outcome(self, row: int) -> Outcome | None:
         """See `BatchLeaf.outcome`."""
-        return outcome_of(self.above.node(row, self.position))
+        return outcome_of(self.behaviour(row))
+
+    def behaviour(self, row: int) -> Behaviour:
+        """The node in a world."""
+        return self.above.node(row, self.position)
+
+    def tip(self, row: int) -> int | None:
+        """See `WorldByWorld.tip`."""
+        return self.above.tip(row, self.position)
 
 
 def _shape(node: Behaviour) -> tuple[str, str, int]:
