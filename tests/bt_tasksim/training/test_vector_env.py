@@ -355,7 +355,7 @@ class Own(ContextLeaf):
         self.ticks += 1
         if self.ticks % 5 == 0:
             return Status.SUCCESS
-        tool = self.context.observation.tool_pose + [0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0]
+        tool = self.context.observation.tool_pose + np.array([0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0])
         self.context.write(Command(tool=tool), ONE, self)
         return Status.RUNNING
 
