@@ -157,10 +157,10 @@ def alone(path: str | Path) -> Iterator[None]:
         InputError: Another process is writing there.
         MachineError: The disk is not writable.
     """
-    path = Path(os.path.abspath(path))
+    named, path = path, Path(os.path.realpath(path))  # one thing may be reached by several names
     with contextlib.ExitStack() as stack:
         try:
-            stack.enter_context(locked(path.with_name(f".{path.name}.writing"), f"writing '{path}'"))
+            stack.enter_context(locked(path.with_name(f".{path.name}.writing"), f"writing '{named}'"))
         except MachineError as error:
             assert isinstance(error.__cause__, OSError)
             if error.__cause__.errno not in _NO_LOCKS:

@@ -190,7 +190,7 @@ class Copies:
         if self._build is None:
             raise InputError(
                 f"'{node.name}' cannot be ticked in a batch: {kind.__name__} has no form for many worlds; "
-                f"run it in one world, or give BatchTree build=..., which makes a tree for each world"
+                f"run it in one world, or give build=..., a function that makes a tree for each world"
             )
         if kind not in self._said:
             self._said.add(kind)

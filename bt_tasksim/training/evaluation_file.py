@@ -11,12 +11,14 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
+import shlex
 import time
 import zlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from bt_tasksim.core.bounded_text import read_bytes
 from bt_tasksim.core.errors import InputError, MachineError
@@ -28,21 +30,26 @@ from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation, 
 LARGEST = 1 << 32
 """Bytes of a file that is gone on from; an episode has about a thousand."""
 
+SUFFIX = ".episodes"
+"""What a journal's name has more than its file's."""
+BEGIN = re.compile(rb'\{"check": "[0-9a-f]{8}", "subject": ')
+"""How a journal begins."""
+
 
 def journal_of(path: str | Path) -> Path:
     """Where the episodes of an evaluation are appended, by its file."""
-    path = Path(path)
-    return path.with_name(f"{path.name}.episodes")
+    path = _real(path)
+    return path.with_name(f"{path.name}{SUFFIX}")
 
 
 def check_ended(path: str | Path) -> None:
     """Check that no evaluation that was killed waits to be gone on from: beginning anew would lose it.
 
     Raises:
-        InputError: One does.
+        InputError: One does, or something that is no journal has its journal's name.
     """
     journal = journal_of(path)
-    if journal.is_file() and journal.stat().st_size > 0:
+    if _check_ours(journal):
         raise InputError(
             f"'{path}' holds an evaluation that did not end: go on with --resume, or remove '{journal}' and "
             "evaluate anew"
@@ -56,7 +63,8 @@ class EvaluationFile:
         path: Where to; what is there stays until the first episode has ended.
 
     Raises:
-        InputError: The folder does not exist, or the path is a folder or a device.
+        InputError: The folder does not exist, the path is a folder or a device, or something that is no
+            journal has its journal's name.
         MachineError: It is not writable.
     """
 
@@ -66,9 +74,10 @@ class EvaluationFile:
     """Of the time, that writings of the whole file take at most: a long one is written less often."""
 
     def __init__(self, path: str | Path) -> None:
-        self.path, self.journal = Path(path), journal_of(path)
+        self.path, self.journal = _real(path), journal_of(path)
         for place in (self.path, self.journal):
             check_writable(place)
+        _check_ours(self.journal)
         self._lines: int | None = None
         self._next_whole = self._next_flush = 0.0
 
@@ -80,8 +89,8 @@ class EvaluationFile:
             seconds: That all of it has taken so far.
             evaluation: Gives what there is, this episode included.
         """
-        # A disk that is full now may not be so at the end, when it counts.
-        with contextlib.suppress(MachineError, OSError):
+        # A disk that is full now may not be so at the end, when it counts; and what is not ours stays.
+        with contextlib.suppress(InputError, MachineError, OSError):
             self._append(outcome, seconds, evaluation)
         began = time.monotonic()
         if began >= self._next_whole:
@@ -98,8 +107,9 @@ class EvaluationFile:
         """
         self._close()
         self._write(evaluation)
-        with contextlib.suppress(OSError):
-            self.journal.unlink()
+        with contextlib.suppress(OSError, InputError):  # what is not ours stays
+            if _check_ours(self.journal):
+                self.journal.unlink()
 
     def _append(self, outcome: EpisodeOutcome, seconds: float, evaluation: Callable[[], Evaluation]) -> None:
         now = time.monotonic()
@@ -111,6 +121,7 @@ class EvaluationFile:
             lines = [_line({"subject": whole.subject, "versions": whole.versions})]
             lines += [_line({"episode": o.to_data()}) for o in whole.outcomes[:-1]]
             lines += [_line({"episode": whole.outcomes[-1].to_data(), "seconds": seconds})]
+            _check_ours(self.journal)
             write_bytes(self.journal, b"".join(lines))
             self._lines = os.open(self.journal, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
             return
@@ -139,16 +150,24 @@ class KeptEvaluation:
     """What the file of an evaluation holds that has not ended.
 
     Attributes:
-        path: The file.
+        path: The file that was read, of the two.
         subject: What was evaluated, as hashes by name.
         outcomes: The episodes that had ended.
         seconds: Time that they took.
+        lost: Lines at the journal's end that are none: a killed process leaves half a one, at most.
     """
 
     path: Path
     subject: Mapping[str, str]
     outcomes: tuple[EpisodeOutcome, ...]
     seconds: float
+    lost: int = 0
+
+    @property
+    def line(self) -> str:
+        """What people read: how many episodes there are."""
+        words = f"going on after {len(self.outcomes)} episodes of '{self.path}'"
+        return words if not self.lost else f"{words}, whose end is torn (lines lost: {self.lost})"
 
     def check(self, subject: Mapping[str, str], seeds: Collection[int]) -> None:
         """Check that an evaluation may go on from it.
@@ -178,11 +197,12 @@ def read_kept(path: str | Path, versions: Mapping[str, str]) -> KeptEvaluation:
         versions: Of this program, see `bt_tasksim.core.identity.identity`.
 
     Raises:
-        InputError: There is none, it is damaged, or it is of another version.
+        InputError: There is none, it is damaged elsewhere than at the journal's end, or it is of another
+            version.
     """
     path, journal = Path(path), journal_of(path)
-    if journal.exists():
-        return _from_journal(path, journal, versions)
+    if _check_ours(journal):
+        return _from_journal(journal, versions)
     if path.exists():
         return _from_file(path, versions)
     raise InputError(f"there is no evaluation in '{path}' to go on from: evaluate without --resume")
@@ -194,44 +214,87 @@ def _from_file(path: Path, versions: Mapping[str, str]) -> KeptEvaluation:
     episodes, seconds = content.get("outcomes"), content.get("seconds")
     if not isinstance(episodes, list) or outcomes_hash(episodes) != content.get("sha256"):
         raise _damaged(path, "its episodes are not what was written")
-    return _kept(path, path, subject, list(enumerate(episodes, start=1)), seconds, "episode")
-
-
-def _from_journal(path: Path, journal: Path, versions: Mapping[str, str]) -> KeptEvaluation:
-    lines = read_bytes(journal, f"'{journal}'", LARGEST).split(b"\n")[:-1]  # what follows is half a line
-    entries = [_entry(journal, number, line) for number, line in enumerate(lines, start=1)]
-    if not entries:
-        raise _damaged(journal, "it is empty")
-    subject = _about(journal, entries[0], versions)
-    seconds = next((entry["seconds"] for entry in entries[::-1] if "seconds" in entry), 0.0)
-    episodes = [(number, entry.get("episode")) for number, entry in enumerate(entries[1:], start=2)]
-    return _kept(path, journal, subject, episodes, seconds, "line")
-
-
-def _kept(
-    path: Path, read: Path, subject: Mapping[str, str], episodes: list[Any], seconds: Any, unit: str
-) -> KeptEvaluation:
     found: dict[int, EpisodeOutcome] = {}
-    for number, data in episodes:
-        try:
-            outcome = EpisodeOutcome.from_data(data)
-            same = outcome.to_data() == data and outcome.seed not in found
-        except (
-            InputError,
-            ArithmeticError,
-            AssertionError,
-            AttributeError,
-            LookupError,
-            TypeError,
-            ValueError,
-        ):
-            same = False
-        if not same:
-            raise _damaged(read, f"{unit} {number} holds no episode")
+    for number, data in enumerate(episodes, start=1):
+        outcome = _episode(data)
+        if outcome is None or outcome.seed in found:
+            raise _damaged(path, f"episode {number} is none")
         found[outcome.seed] = outcome
-    if not isinstance(seconds, int | float) or not 0.0 <= seconds < float("inf"):
-        raise _damaged(read, "it does not say how long it took")
+    if not _is_time(seconds):
+        raise _damaged(path, "it does not say how long it took")
     return KeptEvaluation(path, subject, tuple(found.values()), float(seconds))
+
+
+def _from_journal(journal: Path, versions: Mapping[str, str]) -> KeptEvaluation:
+    *lines, rest = read_bytes(journal, f"'{journal}'", LARGEST).split(b"\n")
+    first = _entry(lines[0]) if lines else None
+    if first is None:
+        whole = journal.with_name(journal.name.removesuffix(SUFFIX))
+        there = f"; '{whole}' holds what had ended a little before" if whole.exists() else ""
+        raise InputError(
+            f"'{journal}' is damaged in line 1, which says what was evaluated: move it away and go on with "
+            f"--resume, or evaluate anew{there}"
+        )
+    subject, seconds = _about(journal, first, versions), 0.0
+    found: dict[int, EpisodeOutcome] = {}
+    bad: list[int] = []
+    last = 1
+    for number, line in enumerate(lines[1:], start=2):
+        entry = _entry(line)
+        outcome = None if entry is None else _episode(entry.get("episode"))
+        if entry is None or outcome is None or outcome.seed in found:
+            bad.append(number)
+            continue
+        found[outcome.seed], last = outcome, number
+        if _is_time(then := entry.get("seconds")):
+            seconds = float(then)
+    if within := [number for number in bad if number < last]:
+        good = len(found)
+        raise InputError(
+            f"'{journal}' is damaged in line {', '.join(map(str, within[:9]))}{', ...' * (len(within) > 9)}, "
+            f"and {good} episodes in it are whole: take these lines out (sed -i "
+            f"'{';'.join(f'{number}d' for number in within)}' {shlex.quote(str(journal))}) and go on with "
+            "--resume, which runs their episodes again"
+        )
+    return KeptEvaluation(journal, subject, tuple(found.values()), seconds, len(bad) + bool(rest))
+
+
+def _real(path: str | Path) -> Path:
+    """Where a path leads: there the file is, and its journal beside it, by whatever name it is reached."""
+    return Path(os.path.realpath(path))
+
+
+def _check_ours(journal: Path) -> bool:
+    """Whether there is a journal.
+
+    Raises:
+        InputError: Something else has its name.
+    """
+    if not os.path.lexists(journal):
+        return False
+    begin = b""
+    if journal.is_file() and not journal.is_symlink():
+        with contextlib.suppress(OSError), open(journal, "rb") as file:
+            begin = file.read(64)
+    if not BEGIN.match(begin):
+        raise InputError(
+            f"'{journal}' is no journal of an evaluation, or its beginning is damaged, and that is where the "
+            "episodes would be appended: move it away, or give --json another name"
+        )
+    return True
+
+
+def _episode(data: Any) -> EpisodeOutcome | None:
+    """An episode from plain data; None where it is none."""
+    try:
+        outcome = EpisodeOutcome.from_data(data)
+        return outcome if outcome.to_data() == data else None
+    except (InputError, ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError):
+        return None
+
+
+def _is_time(seconds: Any) -> TypeGuard[int | float]:
+    return isinstance(seconds, int | float) and 0.0 <= seconds < float("inf")
 
 
 def _about(path: Path, content: Mapping[str, Any], versions: Mapping[str, str]) -> Mapping[str, str]:
@@ -253,15 +316,13 @@ def _line(entry: Mapping[str, Any]) -> bytes:
     return json.dumps({"check": _check(entry), **entry}, allow_nan=False).encode() + b"\n"
 
 
-def _entry(path: Path, number: int, line: bytes) -> dict[str, Any]:
+def _entry(line: bytes) -> dict[str, Any] | None:
+    """What a line says; None where it is not what was written."""
     try:
         entry: dict[str, Any] = parse_json_object(line, "it")
-        check = entry.pop("check", None)
-        if check == _check(entry):
-            return entry
     except InputError:
-        pass
-    raise _damaged(path, f"line {number} is not what was written")
+        return None
+    return entry if entry.pop("check", None) == _check(entry) else None
 
 
 def _check(entry: Mapping[str, Any]) -> str:

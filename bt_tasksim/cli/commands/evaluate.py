@@ -97,6 +97,8 @@ def evaluate(
             if json_ is not None and not resume:
                 check_ended(json_)
             kept = read_kept(json_, identity()) if resume and json_ is not None else None
+            if kept is not None:
+                say(kept.line)
             found = evaluation.evaluate(
                 job,
                 range(seed, seed + episodes),

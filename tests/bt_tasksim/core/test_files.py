@@ -275,6 +275,10 @@ def test_of_two_processes_that_write_to_one_place_the_second_is_refused(tmp_path
     for place in (whole_folder, alone):
         with pytest.raises(InputError, match=r"another process is writing '.*one'"), place(path):
             pass
+    (tmp_path / "other name").symlink_to(path)
+    said = "another process is writing '.*other name'"
+    with pytest.raises(InputError, match=said), alone(tmp_path / "other name"):
+        pass
     first.communicate(b"")
     assert first.returncode == 0
     with whole_folder(path) as inside:

@@ -4,6 +4,8 @@ import dataclasses
 import json
 import math
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -80,6 +82,16 @@ def test_what_an_earlier_one_left_stays_until_an_episode_has_ended(tmp_path):
     same(read_kept(path, VERSIONS).outcomes, evaluation(1).outcomes)
 
 
+def test_a_file_reached_by_another_name_is_the_same_one(tmp_path):
+    (tmp_path / "folder").mkdir()
+    path, link = tmp_path / "folder" / "e.json", tmp_path / "link.json"
+    link.symlink_to(path)
+    killed_after(link, 3)
+    same(read_kept(path, VERSIONS).outcomes, evaluation(3).outcomes)
+    EvaluationFile(link).end(evaluation(4))
+    assert link.is_symlink() and [p.name for p in path.parent.iterdir()] == ["e.json"]
+
+
 @pytest.mark.parametrize("fails", ["fsync", "write"])
 def test_after_a_full_disk_the_journal_is_begun_anew(tmp_path, monkeypatch, fails):
     monkeypatch.setattr(EvaluationFile, "EVERY", 0.0)
@@ -112,7 +124,6 @@ DAMAGE = {
     "bytes": lambda text: "\0\xff\n" + text,
     "nothing": lambda text: "",
     "a list": lambda text: "[1]\n",
-    "twice": lambda text: text + text.split("\n")[-2] + "\n",
     "other kinds": lambda text: '{"outcomes": 3, "subject": {}, "versions": 7}\n',
 }
 
@@ -131,6 +142,63 @@ def test_a_damaged_file_is_one_sentence(tmp_path, damage, ended):
     ) as caught:
         read_kept(path, VERSIONS)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("tail", ['{"check": "0', "half\n", "\0" * 4096, "\0\n\0\n", "last line again"])
+def test_a_torn_end_costs_only_what_is_torn(tmp_path, tail):
+    path = tmp_path / "e.json"
+    killed_after(path, 4)
+    text = journal_of(path).read_text()
+    journal_of(path).write_text(text + (f"{text.splitlines()[-1]}\n" if tail == "last line again" else tail))
+    kept = read_kept(path, VERSIONS)
+    same(kept.outcomes, evaluation(4).outcomes)
+    assert kept.lost and kept.seconds == 1.5 and "4 episodes" in kept.line and "torn" in kept.line
+    journal_of(path).write_text(text)
+    assert not read_kept(path, VERSIONS).lost
+
+
+def test_damage_in_the_middle_is_told_by_its_lines_and_costs_no_others(tmp_path):
+    path = tmp_path / "e'.json"
+    killed_after(path, 6)
+    lines = journal_of(path).read_text().splitlines(keepends=True)
+    lines[2], lines[4] = lines[2].replace("1.08", "1.07"), lines[4][:40] + "\n"
+    journal_of(path).write_text("".join(lines))
+    with pytest.raises(InputError, match="damaged in line 3, 5, and 4 episodes in it are whole") as caught:
+        read_kept(path, VERSIONS)
+    advice = re.search(r"\((sed .*)\) and", str(caught.value))[1]
+    subprocess.run(shlex.split(advice), check=True)
+    assert [o.seed for o in read_kept(path, VERSIONS).outcomes] == [0, 2, 4, 5]
+
+
+@pytest.mark.parametrize("kind", ["file", "empty", "link", "folder"])
+def test_what_is_not_ours_is_never_touched(tmp_path, kind, capsys):
+    path, foreign = tmp_path / "e.json", tmp_path / "e.json.episodes"
+    if kind == "folder":
+        foreign.mkdir()
+    elif kind == "link":
+        (tmp_path / "mine").write_text("mine")
+        foreign.symlink_to(tmp_path / "mine")
+    else:
+        foreign.write_text("mine" * (kind == "file"))
+    words = ["evaluate", "pick_and_throw", "--episodes", "1", "--json", str(path)]
+    for more in ([], ["--resume"]):
+        assert main([*words, *more]) == 2
+        said = capsys.readouterr().err
+        assert "e.json.episodes" in said and said.count("\n") == 1
+    with pytest.raises(InputError):
+        EvaluationFile(path)
+    assert os.path.lexists(foreign) and not path.exists()
+    assert kind == "folder" or foreign.read_text() == "mine" * (kind != "empty")
+
+
+def test_what_comes_to_the_journals_name_later_stays(tmp_path):
+    path = tmp_path / "e.json"
+    keep = EvaluationFile(path)
+    journal_of(path).write_text("mine")
+    keep.add(made(0), 0.1, lambda: evaluation(1))
+    keep.end(evaluation(1))
+    assert journal_of(path).read_text() == "mine"
+    assert json.loads(path.read_text())["episodes"] == 1
 
 
 def test_another_version_is_refused_with_what_differs(tmp_path):
