@@ -166,7 +166,7 @@ class BatchTree:
     def renew(self, rows: Array) -> None:
         """Give worlds that begin anew new copies of what py_trees ticks: such nodes may remember things.
 
-        A single world that has the tree's own nodes keeps them.
+        A single world that has the tree's own nodes keeps them. Each world has a new blackboard.
         """
         for row in rows.tolist() if self.unknown else ():
             for number, copy in self._copies.renewed(row).items():
@@ -351,7 +351,7 @@ class BatchTree:
             leaf = None if children[node] else leaves(self.nodes[node])
             if leaf is None:
                 block = self._status[node : self._ends[node]]
-                leaf = WorldByWorld(copies.of(node, self.nodes[node]), block, self.arrays)
+                leaf = WorldByWorld(copies.of(node, self.nodes[node]), block, self.arrays, copies.boards)
                 for below in range(node + 1, self._ends[node]):
                     self.compiled[below] = BelowUnknown(leaf, below - node)
             self.compiled[node] = leaf

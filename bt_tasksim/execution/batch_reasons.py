@@ -10,10 +10,11 @@ from collections.abc import Mapping, Sequence
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept.reporting import as_statement
+from bt_tasksim.concept.reporting import Reporting, as_statement, outcome_of
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, BatchLeaf
 from bt_tasksim.core.outcomes import FAILED, Outcome, Statement
 from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.world_by_world import BelowUnknown, WorldByWorld
 from bt_tasksim.trees.nodes.batch import BatchNode
 
 
@@ -45,6 +46,9 @@ class BatchReasons:
         """The deepest node that was decided last, at or below a node; None where it is not active."""
         while True:
             found = self._compiled[node]
+            if isinstance(found, WorldByWorld | BelowUnknown):
+                below = found.tip(row)
+                return None if below is None else node + below
             current = found.current(row) if isinstance(found, BatchNode) else None
             if current is None:
                 return node if int(self._status[node][row]) != INVALID else None
@@ -52,6 +56,9 @@ class BatchReasons:
 
     def outcome_of(self, node: int, row: int) -> Outcome | None:
         """What a node says itself; words of one that has failed are `FAILED`."""
+        ticked = self._ticked(node, row)
+        if ticked is not None:
+            return outcome_of(ticked)
         said = self._says(node, row)
         if said is None or isinstance(said, Outcome):
             return said
@@ -61,6 +68,9 @@ class BatchReasons:
     def said_by(self, node: int, row: int) -> Statement | None:
         """What a node says itself."""
         outcome = self.outcome_of(node, row)
+        ticked = self._ticked(node, row)
+        if ticked is not None:
+            return outcome or as_statement(ticked.feedback_message)
         said = self._says(node, row) if outcome is None else None
         return outcome if said is None else as_statement(said.sentence)
 
@@ -79,8 +89,7 @@ class BatchReasons:
             below = ahead.pop()
             if int(self._status[below][row]) == FAILURE and self._has_words(below, row):
                 return below
-            if below in self._compiled and isinstance(self._compiled[below], BatchNode):
-                ahead.extend(self._children[below])
+            ahead.extend(self._children[below])
         return found
 
     def whole_outcome(self, node: int, row: int) -> Outcome | None:
@@ -88,14 +97,25 @@ class BatchReasons:
         outcome = self.outcome_of(node, row)
         while outcome is not None and node in self._parents:
             node = self._parents[node]
-            above = self._compiled[node]
-            outcome = above.adds(row, outcome) if isinstance(above, BatchNode) else outcome
+            above, ticked = self._compiled[node], self._ticked(node, row)
+            if isinstance(above, BatchNode):
+                outcome = above.adds(row, outcome)
+            elif isinstance(ticked, Reporting):
+                outcome = ticked.seen_from_here(outcome)
         return outcome
 
     def _says(self, node: int, row: int) -> Statement | None:
         found = self._compiled[node]
         return found.says(row) if isinstance(found, BatchNode) else found.outcome(row)
 
+    def _ticked(self, node: int, row: int) -> Behaviour | None:
+        """The node itself, where py_trees ticks it in this world."""
+        found = self._compiled[node]
+        return found.behaviour(row) if isinstance(found, WorldByWorld | BelowUnknown) else None
+
     def _has_words(self, node: int, row: int) -> bool:
+        ticked = self._ticked(node, row)
+        if ticked is not None:
+            return bool(ticked.feedback_message)
         said = self._says(node, row)
         return said is not None and bool(said.sentence)

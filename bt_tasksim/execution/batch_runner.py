@@ -23,6 +23,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import Hidden, WorldModel
 from bt_tasksim.execution.batch import BatchTree
+from bt_tasksim.execution.blackboard import WorldBlackboard
 from bt_tasksim.execution.laws import laws_of
 from bt_tasksim.execution.leaf_errors import no_status, set_up
 from bt_tasksim.execution.pipelines import EngineOptions
@@ -89,12 +90,14 @@ class BatchRunner:
         self.scene, self.longest, self.options = scene, longest, options or EngineOptions()
         self._build = build
         self.robot = load_robot(scene.robot)
-        self.tree = build()
+        with WorldBlackboard() as board:
+            self.tree = build()
         like = laws_of(self.options) if like is None else like
         self.worlds = BatchWorlds(self.robot, self.options, worlds, threads, like)
         self.context = Context(self.robot, worlds, like)
         self.context.ask_hidden = self.worlds.hidden
-        set_up(self.tree, context=self.context)
+        with board:
+            set_up(self.tree, context=self.context)
         self.batch = BatchTree(
             self.tree,
             worlds,
@@ -319,12 +322,12 @@ class BatchRunner:
         seeds = [episode.seed for episode in self._episodes if episode is not None]
         self.batch.reset(np.arange(self.context.worlds))
         self._phase[:], self._episodes = IDLE, [None] * self.context.worlds
-        runner = Runner(self._build(), self.scene, self.options, longest=self.longest)
+        runner = Runner(self._build, self.scene, self.options, longest=self.longest)
         try:
             for seed in seeds:
                 try:
                     if self.batch.unknown:
-                        runner.plant(self._build())
+                        runner.plant(self._build)
                     yield seed, runner.run(seed, stream)
                 except InputError:
                     raise

@@ -32,6 +32,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.units import SECONDS
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
+from bt_tasksim.execution.blackboard import WorldBlackboard
 from bt_tasksim.execution.leaf_errors import end_all, no_status, set_up, ticking
 from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
 from bt_tasksim.execution.result import Result
@@ -64,12 +65,17 @@ class Step:
 class Runner:
     """Runs one tree in one scene.
 
+    Each episode has a blackboard of py_trees of its own, which begins with what stands on the process's one.
+
     Args:
-        tree: The tree's root.
+        tree: The tree's root, or what makes it, see `plant`.
         scene: The scene; None for the world that the engines bring.
         options: Which engines; by default those of `EngineOptions`.
         pipeline: A pipeline of one's own, instead of ``options``.
         longest: Seconds of an episode after which it is stopped.
+
+    Attributes:
+        blackboard: The blackboard of the episode that began last.
 
     Raises:
         InputError: The tree, the scene or the options do not fit.
@@ -77,7 +83,7 @@ class Runner:
 
     def __init__(
         self,
-        tree: Behaviour,
+        tree: Behaviour | Callable[[], Behaviour],
         scene: WorldSource | None = None,
         options: EngineOptions | None = None,
         pipeline: EnginePipeline | None = None,
@@ -92,20 +98,33 @@ class Runner:
         self.pipeline = pipeline or build_pipeline(self.robot, self.options)
         self.scene, self.longest = self.pipeline.worlds(scene), longest
         self.context = Context(self.robot)
+        self._planted: WorldBlackboard | None = None
         self.configuration: ActorConfiguration | None = None
         self.plant(tree)
 
-    def plant(self, tree: Behaviour) -> None:
+    def plant(self, tree: Behaviour | Callable[[], Behaviour]) -> None:
         """Run another tree from the next episode on, such as a new one, whose nodes remember nothing.
+
+        Args:
+            tree: The tree's root; or what makes it, which is done on a blackboard of its own then.
 
         Raises:
             InputError: The tree does not fit.
         """
         from bt_tasksim.trees.check import check_tree
 
-        check_tree(tree)
-        self.tree = tree
-        set_up(tree, context=self.context)
+        self.blackboard = WorldBlackboard()
+        if isinstance(tree, Behaviour):
+            self._planted = None
+            check_tree(tree)
+            set_up(tree, context=self.context)
+            self.tree = tree
+            return
+        with self.blackboard:
+            self.tree = tree()
+            check_tree(self.tree)
+            set_up(self.tree, context=self.context)
+        self._planted = self.blackboard
 
     def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:
         """Draw a world, reset the engines and the tree."""
@@ -116,7 +135,9 @@ class Runner:
         """Reset the engines and the tree to a world."""
         self.configuration, self._began = configuration, time.perf_counter()
         world = configuration.world_model([tip.name for tip in self.robot.tips], self.robot.opening)
-        self.tree.stop(Status.INVALID)
+        with self.blackboard:
+            self.tree.stop(Status.INVALID)
+        self.blackboard = WorldBlackboard(self._planted)
         self.context.ask_hidden = self._hidden
         self.context.begin([world])
         self._observed(self.pipeline.reset(configuration, world))
@@ -162,6 +183,16 @@ class Runner:
         However it ends, every node has ended then, and a real robot holds.
         """
         started = time.perf_counter() if started is None else started
+        with self.blackboard:
+            return self._finished(configuration, world, started, record)
+
+    def _finished(
+        self,
+        configuration: ActorConfiguration,
+        world: WorldModel,
+        started: float,
+        record: Callable[[Step], None] | None,
+    ) -> Result:
         pipeline, tree = self.pipeline, self.tree
         try:
             steps, stopped, leaf = self._loop(configuration, record)
@@ -279,6 +310,10 @@ class Runner:
                 ended.
             BtTasksimError: See `ticking`.
         """
+        with self.blackboard:
+            return self._ticked()
+
+    def _ticked(self) -> Command:
         without = [node for node in ticking(self.tree) if node.status == Status.INVALID]
         if self.tree.status == Status.INVALID:
             end_all(self.tree)

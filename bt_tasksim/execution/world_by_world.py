@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,12 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.concept.context import Context
-from bt_tasksim.concept.reporting import outcome_of, speaker
+from bt_tasksim.concept.reporting import outcome_of
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, RUNNING, SUCCESS, BatchLeaf
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.blackboard import WorldBlackboard
 from bt_tasksim.execution.leaf_errors import set_up, ticking
 from bt_tasksim.trees.nodes.batch import Arrays
 from bt_tasksim.trees.walk import nodes_of
@@ -41,14 +42,21 @@ class WorldByWorld(BatchLeaf):
         copies: The behaviour of each world.
         status: ``(nodes, N)`` where the statuses of the behaviour and of those below it are shown.
         arrays: The arrays of the batch.
+        boards: The blackboard of each world, on which it is ticked; they change as worlds begin anew.
 
     Attributes:
         watchers: Who is told of a node below when it ends its tick, by its position in the order of
             `trees.walk`, from the behaviour on.
     """
 
-    def __init__(self, copies: list[Behaviour], status: Array, arrays: Arrays) -> None:
-        self.copies, self.arrays = copies, arrays
+    def __init__(
+        self,
+        copies: list[Behaviour],
+        status: Array,
+        arrays: Arrays,
+        boards: Sequence[WorldBlackboard],
+    ) -> None:
+        self.copies, self.arrays, self._boards = copies, arrays, boards
         self._status = status
         self._nodes = [nodes_of(copy) for copy in copies]
         self.watchers: dict[int, Watcher] = {}
@@ -60,12 +68,22 @@ class WorldByWorld(BatchLeaf):
     def stop(self, rows: Array) -> None:
         """See `BatchLeaf.stop`; called too where it has ended, as py_trees does."""
         for row in rows.tolist():
-            self.copies[row].stop(Status.INVALID)
+            with self._boards[row]:
+                self.copies[row].stop(Status.INVALID)
 
     def outcome(self, row: int) -> Outcome | None:
-        """See `BatchLeaf.outcome`: what the node says that was decided last."""
-        found = speaker(self.copies[row])
-        return None if found is None else outcome_of(found)
+        """See `BatchLeaf.outcome`."""
+        return outcome_of(self.copies[row])
+
+    def behaviour(self, row: int) -> Behaviour:
+        """The behaviour of a world."""
+        return self.copies[row]
+
+    def tip(self, row: int, position: int = 0) -> int | None:
+        """The deepest node below one that was decided last in a world, as so many positions further on."""
+        nodes = self._nodes[row]
+        found = nodes[position].tip()
+        return next((k - position for k, node in enumerate(nodes) if node is found), None)
 
     def renew(self, row: int, copy: Behaviour) -> None:
         """Another copy for a world that begins anew."""
@@ -79,9 +97,10 @@ class WorldByWorld(BatchLeaf):
         """One tick in a world; the behaviour's status."""
         nodes = self._nodes[row]
         watched = {id(nodes[k]): told for k, told in self.watchers.items()}
-        for node in ticking(self.copies[row]):
-            if id(node) in watched:
-                watched[id(node)](np.array([row]), self._codes([CODES[node.status]]))
+        with self._boards[row]:
+            for node in ticking(self.copies[row]):
+                if id(node) in watched:
+                    watched[id(node)](np.array([row]), self._codes([CODES[node.status]]))
         codes = [CODES[node.status] for node in nodes]
         if len(codes) > 1:
             self._status[:, row] = self._codes(codes)
@@ -112,7 +131,15 @@ class BelowUnknown(BatchLeaf):
 
     def outcome(self, row: int) -> Outcome | None:
         """See `BatchLeaf.outcome`."""
-        return outcome_of(self.above.node(row, self.position))
+        return outcome_of(self.behaviour(row))
+
+    def behaviour(self, row: int) -> Behaviour:
+        """The node in a world."""
+        return self.above.node(row, self.position)
+
+    def tip(self, row: int) -> int | None:
+        """See `WorldByWorld.tip`."""
+        return self.above.tip(row, self.position)
 
 
 def _shape(node: Behaviour) -> tuple[str, str, int]:
@@ -128,6 +155,9 @@ class Copies:
         worlds: How many.
         build: Makes one; None: there are none, and a single world has the tree itself, set up by its owner.
         contexts: The context of a world; None: nodes are set up without one.
+
+    Attributes:
+        boards: The blackboard of each world: its tree was made, set up and is ticked on it.
     """
 
     def __init__(
@@ -139,6 +169,7 @@ class Copies:
     ) -> None:
         self._tree, self._worlds, self._build, self._contexts = tree, worlds, build, contexts
         self._nodes: list[list[Behaviour]] = []
+        self.boards = [WorldBlackboard() for _ in range(worlds)]
         self._known: dict[int, Context] = {}
         self._said: set[type[Behaviour]] = set()
         self._used: list[int] = []
@@ -159,7 +190,7 @@ class Copies:
         if self._build is None:
             raise InputError(
                 f"'{node.name}' cannot be ticked in a batch: {kind.__name__} has no form for many worlds; "
-                f"run it in one world, or give BatchTree build=..., which makes a tree for each world"
+                f"run it in one world, or give build=..., a function that makes a tree for each world"
             )
         if kind not in self._said:
             self._said.add(kind)
@@ -167,7 +198,8 @@ class Copies:
                 "%s has no form for many worlds: '%s' is ticked world by world", kind.__name__, node.name
             )
         if not self._nodes:
-            self._nodes = [self._copy(self._build) for _ in range(self._worlds)]
+            for world in range(self._worlds):
+                self._nodes.append(self._copy(self._build, world))
         self._used.append(number)
         found = [nodes[number] for nodes in self._nodes]
         for world, copy in enumerate(found):
@@ -175,16 +207,21 @@ class Copies:
         return found
 
     def renewed(self, world: int) -> dict[int, Behaviour]:
-        """A new copy of one world, whose nodes remember nothing: those that were asked for, by number."""
+        """A new copy of one world, whose nodes remember nothing: those that were asked for, by number.
+
+        Its blackboard is a new one in any case.
+        """
+        self.boards[world] = WorldBlackboard()
         if self._build is None or not self._nodes:
             return {}
-        nodes = self._nodes[world] = self._copy(self._build)
+        nodes = self._nodes[world] = self._copy(self._build, world)
         for number in self._used:
             self._set_up(nodes[number], world)
         return {number: nodes[number] for number in self._used}
 
-    def _copy(self, build: Callable[[], Behaviour]) -> list[Behaviour]:
-        copy = build()
+    def _copy(self, build: Callable[[], Behaviour], world: int) -> list[Behaviour]:
+        with self.boards[world]:
+            copy = build()
         if copy is self._tree or any(copy is nodes[0] for nodes in self._nodes):
             raise InputError("build=... gives the same tree again: it should make a new one at each call")
         nodes, wanted = nodes_of(copy), nodes_of(self._tree)
@@ -200,4 +237,5 @@ class Copies:
             if world not in self._known:
                 self._known[world] = self._contexts(world)
             arguments["context"] = self._known[world]
-        set_up(copy, **arguments)
+        with self.boards[world]:
+            set_up(copy, **arguments)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import gymnasium
@@ -52,6 +52,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         longest: Seconds of an episode, earlier siblings included, after which it is truncated.
         render_mode: ``rgb_array``, or None.
         policies: Policies of other leaves, by the leaf's name: what was trained before.
+        build: Makes one more tree of the same shape: so that what a behaviour of your own remembers ends with
+            its episode. Without it such a behaviour is the tree's own in all episodes.
 
     Raises:
         InputError: See `bt_tasksim.training.episode_batch.EpisodeBatch`: it is one of one world.
@@ -72,11 +74,13 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         longest: float = LONGEST,
         render_mode: str | None = None,
         policies: Mapping[str, Policy] | None = None,
+        build: Callable[[], Behaviour] | None = None,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise InputError(f"render_mode should be 'rgb_array' or None, found {render_mode!r}")
         options = options or EngineOptions(noise="original", rendering=render_mode is not None)
-        self.batch = EpisodeBatch(tree, scene, train, options, reward, longest, policies, worlds=1)
+        about = tree, scene, train, options, reward, longest, policies
+        self.batch = EpisodeBatch(*about, worlds=1, build=build)
         self.tree, self.scene = tree, self.batch.scene
         self.train, self.learners = self.batch.train, self.batch.learners
         self.reward, self.layout = self.batch.reward, self.batch.layout

@@ -7,6 +7,7 @@ still in the middle of a tick, and all others tick and step together.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.concept.batch_leaves import ConceptInBatch, leaf_in_batch
 from bt_tasksim.concept.context import Context, Refusal
 from bt_tasksim.concept.status import STATUSES
+from bt_tasksim.concept.world_context import WorldContext
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING, SUCCESS
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
 from bt_tasksim.core.outcomes import INTERRUPTED, OUT_OF_REACH, TIME_OVER, Outcome, outcome_of_error
@@ -115,12 +117,14 @@ class EpisodeBatch:
         policies: Policies of other leaves, by the leaf's name: what was trained before.
         worlds: How many, N.
         threads: How many threads step them.
+        build: Makes one more tree of the same shape, for what in it has no form for many worlds, see
+            `bt_tasksim.execution.batch.BatchTree`.
 
     Raises:
         InputError: There is no `Train` node, nothing under it can learn, or the leaves that learn differ in
             what they see or do; what is to learn stands below a behaviour that is not known; or there are to
-            be several worlds, and the engines, or something in the tree, have no form for that, or memory has
-            no room for them.
+            be several worlds, and the engines have no form for that, or something in the tree has none and
+            there is no ``build``, or memory has no room for them.
     """
 
     def __init__(
@@ -134,6 +138,7 @@ class EpisodeBatch:
         policies: Mapping[str, Policy] | None = None,
         worlds: int = 8,
         threads: int = 1,
+        build: Callable[[], Behaviour] | None = None,
     ) -> None:
         check_tree(tree)
         options = options or EngineOptions(noise="original")
@@ -151,7 +156,13 @@ class EpisodeBatch:
                 leaf.use(policies[leaf.name])
         self.layout = shared_layout(self.train, self.learners, self.robot)
         self.observation_space, self.action_space = spaces_of(self.layout, self.learners[0].model.actions)
-        self.batch = BatchTree(tree, worlds, lambda leaf: leaf_in_batch(leaf, self.context))
+        self.batch = BatchTree(
+            tree,
+            worlds,
+            lambda leaf: leaf_in_batch(leaf, self.context),
+            build=build,
+            contexts=partial(WorldContext, self.context),
+        )
         self._check_known()
         self.worlds = worlds_for(self.robot, options, worlds, threads)
         self.scene = self.worlds.source(scene)
@@ -315,6 +326,7 @@ class EpisodeBatch:
         if not begun:
             return begun_rows
         self.batch.reset(begun_rows)
+        self.batch.renew(begun_rows)
         self.context.begin(models, begun_rows)
         failed = self.worlds.reset(begun_rows, drawn)
         for row, why in failed.items():

@@ -281,7 +281,7 @@ class Player:
         load_all(job.plugins)
         source = load_source(job.tree, job.robot, job.scene, job.policies, job.options.own_world())
         self._job, self._build = job, source.build
-        self.runner = Runner(source.build(), source.scene, job.options)
+        self.runner = Runner(source.build, source.scene, job.options)
         self._batch: BatchRunner | None = None
         context = self.runner.context
         tree = BatchTree(self.runner.tree, 1, lambda leaf: leaf_in_batch(leaf, context))
@@ -315,7 +315,7 @@ class Player:
         if batch == 1 or len(seeds) == 1:
             for index, seed in enumerate(seeds):
                 if self._remembers:
-                    self.runner.plant(self._build())
+                    self.runner.plant(self._build)
                 yield index, episode(self.runner, seed, stream)
             return
         if self._batch is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,6 +61,8 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
         longest: Seconds of an episode, earlier siblings included, after which it is truncated.
         policies: Policies of other leaves, by the leaf's name: what was trained before.
         threads: How many threads step the worlds.
+        build: Makes one more tree of the same shape: needed where a behaviour of your own, or of py_trees,
+            has no form for many worlds, and so is ticked world by world, in a tree for each.
 
     Raises:
         InputError: See `bt_tasksim.training.episode_batch.EpisodeBatch`.
@@ -81,10 +83,10 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
         longest: float = LONGEST,
         policies: Mapping[str, Policy] | None = None,
         threads: int = 1,
+        build: Callable[[], Behaviour] | None = None,
     ) -> None:
-        self.batch = EpisodeBatch(
-            tree, scene, train, options, reward, longest, policies, worlds=num_envs, threads=threads
-        )
+        about = tree, scene, train, options, reward, longest, policies
+        self.batch = EpisodeBatch(*about, worlds=num_envs, threads=threads, build=build)
         self.stream, self.stage, self.num_envs = stream, stage, num_envs
         self.single_observation_space = self.batch.observation_space
         self.single_action_space = self.batch.action_space

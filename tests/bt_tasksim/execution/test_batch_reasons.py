@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Running
+from py_trees.common import Status
+from py_trees.composites import Sequence
+from py_trees.decorators import Decorator, Inverter
 
 from bt_tasksim import trees
+from bt_tasksim.concept.reporting import speaker, whole_outcome
 from bt_tasksim.core.batch_leaf import FAILURE, RUNNING, SUCCESS, BatchLeaf
 from bt_tasksim.core.outcomes import FAILED, TIMED_OUT
 from bt_tasksim.execution.batch import BatchTree
@@ -69,3 +75,54 @@ def test_a_fallback_tells_by_world_why_the_first_way_failed_too():
     batch.tick(everyone, 0.4)
     batch.tick(everyone, 0.5)
     assert batch.outcome(1).names["before"] == "first: time 2 in world 1", "and it counts anew"
+
+
+class Says(Behaviour):
+    """A behaviour of somebody's own, which fails or succeeds in its second tick, and says so."""
+
+    def __init__(self, name, fails=True):
+        super().__init__(name)
+        self.fails, self.ticks = fails, 0
+
+    def update(self):
+        self.ticks += 1
+        self.feedback_message = f"{self.name} in tick {self.ticks}"
+        if self.ticks % 2:
+            return Status.RUNNING
+        return Status.FAILURE if self.fails else Status.SUCCESS
+
+
+class Own(Decorator):
+    """A decorator of somebody's own: all below it is ticked by py_trees."""
+
+    def update(self):
+        return self.decorated.status
+
+
+class OwnSequence(Sequence):
+    """A composite of somebody's own."""
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda: trees.sequence("root", Own("own", Says("culprit"))),
+        lambda: Own("own", trees.sequence("inner", Says("fine", fails=False), Says("culprit"))),
+        lambda: trees.retry(2, Own("own", trees.retry(2, Says("culprit")))),
+        lambda: Own("own", trees.fallback("first or second", Own("o", Says("first")), Says("second"))),
+        lambda: trees.sequence("root", Own("own", Inverter("not", Says("fine", fails=False)))),
+        lambda: trees.fallback("root", OwnSequence("own", True, [Says("culprit")]), Own("o", Says("last"))),
+    ],
+)
+def test_below_what_is_not_known_it_is_said_as_py_trees_says_it(build):
+    tree, batch = build(), BatchTree(build(), 2, lambda leaf: None, build=build)
+    everyone = np.arange(2)
+    for now in range(12):
+        batch.tick(everyone, float(now))
+        tree.tick_once()
+        if tree.status != Status.RUNNING:
+            break
+    assert tree.status == Status.FAILURE
+    for world in (0, 1):
+        assert batch.speaker(world).name == speaker(tree).name
+        assert batch.outcome(world) == whole_outcome(speaker(tree))

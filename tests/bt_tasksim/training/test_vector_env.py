@@ -1,5 +1,7 @@
 """Episodes in many worlds at once: each is what an environment of its own would have had, bit for bit."""
 
+import logging
+
 import gymnasium
 import numpy as np
 import pytest
@@ -10,9 +12,11 @@ from py_trees.common import Status
 from test_rollouts import UP as NETWORK
 from toys import DONE, SCENE, STILL, UP, Below, Check, Even, Move, Raise, Turn, Unprogrammed, alone, honest
 
+from bt_tasksim.concept.leaf import ONE, ContextLeaf
 from bt_tasksim.concept_nodes import Grasp, Pick, Wait
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
 from bt_tasksim.core.registry import register
+from bt_tasksim.core.world import Command
 from bt_tasksim.training.collectors import DrawTask, RolloutTask
 from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.episode_batch import REDRAWS, EpisodeBatch
@@ -338,6 +342,50 @@ def test_after_it_the_tree_can_be_run(vector_of, toy):
     vector.close()
     assert [world.closed for world in vector.batch.worlds.each] == [1, 1]
     assert toy(tree).tick(50) == Status.SUCCESS
+
+
+class Own(ContextLeaf):
+    """A behaviour of one's own, which goes up by a step each tick, and forgets nothing."""
+
+    def __init__(self, name="own"):
+        super().__init__(name)
+        self.ticks = 0
+
+    def update(self):
+        self.ticks += 1
+        if self.ticks % 5 == 0:
+            return Status.SUCCESS
+        tool = self.context.observation.tool_pose + np.array([0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0])
+        self.context.write(Command(tool=tool), ONE, self)
+        return Status.RUNNING
+
+
+def with_own():
+    return sequence("s", Own(), Train(Raise()), fallback("f", Below(0.1), Own("second")), Check())
+
+
+@pytest.mark.parametrize("worlds", [1, 3])
+def test_a_behaviour_of_ones_own_is_ticked_in_a_tree_for_each_world(env_of, vector_of, worlds, caplog):
+    caplog.set_level(logging.ERROR)
+    with pytest.raises(InputError, match=r"Own has no form for many worlds.*build="):
+        vector_of(with_own(), num_envs=2)
+    vector = vector_of(with_own(), num_envs=worlds, build=with_own)
+    features, _ = vector.reset(seed=4)
+    envs = [env_of(with_own(), build=with_own) for _ in range(worlds)]
+    assert features.tolist() == [env.reset(seed=4 + k)[0].tolist() for k, env in enumerate(envs)]
+    ends = 0
+    for t in range(40):
+        action = np.array(UP if t % 3 else DONE)
+        features, rewards, terminated, _, infos = vector.step(np.tile(action, (worlds, 1)))
+        for k, env in enumerate(envs):
+            seen, paid, ended, cut, info = env.step(action)
+            assert (rewards[k], terminated[k]) == (paid, ended)
+            if ended or cut:
+                ends += 1
+                assert infos["final_info"]["why"][k] == info["why"]
+                seen, _ = env.reset()
+            assert features[k].tolist() == seen.tolist()
+    assert ends > 3
 
 
 @pytest.mark.parametrize(
