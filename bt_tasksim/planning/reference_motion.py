@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.facts import take_rows
+from bt_tasksim.core.fact_arrays import take_rows
 from bt_tasksim.core.poses import Array, array_namespace
 
 SHARP = math.cos(math.radians(100.0))
