@@ -123,9 +123,7 @@ def _replaced(before: Array, index: Index, values: Array) -> Array:
             f"the memories of unlike worlds do not fit together: {tuple(before.shape[1:])} and "
             f"{tuple(values.shape[1:])}; pad what is of unlike length"
         )
-    out = array_namespace(before).asarray(before, copy=True)
-    index.put(out, values)
-    return out
+    return index.replaced(before, values)
 
 
 class Rows:
