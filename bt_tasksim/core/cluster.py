@@ -34,6 +34,10 @@ from bt_tasksim.core.resources import HOME
 
 REACH = 5.0
 """Seconds within which a cluster's address must answer."""
+GREET = 10.0
+"""Seconds within which what is there must begin to speak."""
+SETTINGS_FRAME = 4
+"""Kind of the frame with which every end of an HTTP/2 connection begins (RFC 9113, 3.4)."""
 START = 60.0
 """Seconds within which Ray must have started, or joined the cluster."""
 LONGEST_PLACE = 24
@@ -204,12 +208,30 @@ def _short_place() -> str:
 def _check_reachable(address: str) -> None:
     host, _, port = address.rpartition(":")
     try:
-        socket.create_connection((host.strip("[]"), int(port)), REACH).close()
+        with socket.create_connection((host.strip("[]"), int(port)), REACH) as connection:
+            speaks = os.environ.get("RAY_USE_TLS", "0").lower() in ("1", "true") or _greets(connection)
     except OSError as error:
         raise MachineError(
             f"no Ray cluster answers at {address} ({error.strerror or error}): start its head there with "
             f"'ray start --head --port {port}'"
         ) from error
+    if not speaks:
+        raise MachineError(
+            f"what listens at {address} does not answer as the head of a Ray cluster: give the address and "
+            "port that its 'ray start --head' names"
+        )
+
+
+def _greets(connection: socket.socket) -> bool:
+    """Whether the other end begins as a Ray head does, which speaks HTTP/2: with a frame of settings."""
+    connection.settimeout(GREET)
+    begin = b""
+    try:
+        while len(begin) < 9 and (more := connection.recv(9 - len(begin))):
+            begin += more
+    except TimeoutError:
+        return False
+    return len(begin) == 9 and begin[3] == SETTINGS_FRAME and begin[5:] == bytes(4)
 
 
 def _environment(address: str) -> dict[str, str]:

@@ -30,6 +30,12 @@ from bt_tasksim.scene.scene import WorldSource
 
 WORLD_MEMORY = 3_000_000
 """Bytes that a world takes, of which 1.6 to 2.4 million were measured with one object."""
+PROCESS_MEMORY = 350_000_000
+"""Bytes that a process takes besides its worlds, of which 241 to 347 million were measured."""
+PICTURE_MEMORY = 350_000_000
+"""What it takes besides where it draws pictures."""
+ROOM = 0.8
+"""Share of the free memory that worlds may take."""
 FIELDS = tuple(field.name for field in fields(Observation))
 STATE = tuple(field.name for field in fields(WorldState))
 
@@ -48,20 +54,49 @@ def why_alone(options: EngineOptions) -> str:
     return "a film is of one world" if options.rendering else ""
 
 
-def check_memory(worlds: int) -> None:
+def check_memory(worlds: int, processes: int = 0, pictures: bool = False) -> None:
     """Refuse more worlds than this machine has room for.
 
+    Args:
+        worlds: How many, all processes together.
+        processes: Processes that are begun for them; none where this one has them.
+        pictures: They draw pictures.
+
     Raises:
-        InputError: It has not; says how many fit.
+        InputError: There is no room; says how many fit.
     """
-    room = most_worlds()
+    most = most_processes(1, pictures)
+    if processes > most:
+        raise InputError(
+            f"{processes} processes do not fit into this machine's memory, of which each takes some "
+            f"{_process_memory(pictures) / 1e6:.0f} MB; {most} do"
+        )
+    room = most_worlds(processes, pictures)
     if worlds > room:
-        raise InputError(f"a batch of {worlds} worlds does not fit into this machine's memory; {room} do")
+        among = f" in {processes} processes" if processes else ""
+        raise InputError(
+            f"a batch of {worlds} worlds{among} does not fit into this machine's memory; {room} do"
+        )
 
 
-def most_worlds() -> int:
-    """How many worlds this machine has room for, one at least."""
-    return max(1, int(0.8 * available_memory() / WORLD_MEMORY))
+def most_worlds(processes: int = 0, pictures: bool = False) -> int:
+    """How many worlds this machine has room for, one at least.
+
+    Args:
+        processes: Processes that are begun for them; none where this one has them.
+        pictures: They draw pictures.
+    """
+    left = ROOM * available_memory() - processes * _process_memory(pictures)
+    return max(1, int(left / WORLD_MEMORY))
+
+
+def most_processes(worlds: int, pictures: bool = False) -> int:
+    """How many processes with so many worlds each this machine has room for, one at least."""
+    return max(1, int(ROOM * available_memory() / (_process_memory(pictures) + worlds * WORLD_MEMORY)))
+
+
+def _process_memory(pictures: bool) -> int:
+    return PROCESS_MEMORY + (PICTURE_MEMORY if pictures else 0)
 
 
 @dataclass(frozen=True)

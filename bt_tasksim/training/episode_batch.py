@@ -7,39 +7,32 @@ still in the middle of a tick, and all others tick and step together.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
-from typing import NamedTuple
+from contextlib import ExitStack
 
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept.batch_leaves import ConceptInBatch, leaf_in_batch
-from bt_tasksim.concept.context import Context, Refusal
 from bt_tasksim.concept.status import STATUSES
-from bt_tasksim.concept.world_context import WorldContext
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING, SUCCESS
-from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
-from bt_tasksim.core.outcomes import INTERRUPTED, OUT_OF_REACH, TIME_OVER, Outcome, outcome_of_error
+from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError
+from bt_tasksim.core.outcomes import INTERRUPTED, TIME_OVER, Outcome, outcome_of_error
 from bt_tasksim.core.poses import Array
-from bt_tasksim.execution.batch import BatchTree
-from bt_tasksim.execution.leaf_errors import set_up
 from bt_tasksim.execution.pipeline_worlds import worlds_for
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import LONGEST
-from bt_tasksim.execution.world_by_world import BelowUnknown
-from bt_tasksim.execution.worlds import why_alone
 from bt_tasksim.policy.policy import Action, Policy, split_action
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.decision import Decision
-from bt_tasksim.training.endings import BEGAN_ANEW, FOLLOWER_LATE, TREE_ENDED, Ending, ending_of
+from bt_tasksim.training.drawn_worlds import DrawnWorlds, Draws
+from bt_tasksim.training.endings import BEGAN_ANEW, FOLLOWER_LATE, TREE_ENDED, ending_of
+from bt_tasksim.training.happened import Happened, not_reached
 from bt_tasksim.training.judge import Judgement, SignalOutcome
-from bt_tasksim.training.learning_leaves import checked_actions, find_train, shared_layout, spaces_of
+from bt_tasksim.training.learning_leaves import checked_actions
+from bt_tasksim.training.learning_tree import LearningTree
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.transitions import Transitions
-from bt_tasksim.trees.check import check_tree
-from bt_tasksim.trees.nodes.train import BatchTrain, concepts_in
 
 IDLE, DRAWING, TICKING, WAITING, DECIDED, STEPPING = range(6)
 """What a world does next: nothing; a world is to be drawn; its tree is to be ticked; it is waited for a
@@ -48,57 +41,6 @@ BEFORE = -1
 """Number of the activation before the first decision."""
 REDRAWS = 50
 """Draws in a row in which the subtree may stay inactive."""
-
-
-class Happened(NamedTuple):
-    """What is new in a world: a decision is waited for, or its episode is over, or there is none.
-
-    Attributes:
-        row: The world.
-        features: What the leaf sees ``(n,)``; after an end what it saw at its last decision.
-        paid: What the decision before paid, by part; None at an episode's first decision.
-        ending: How the episode ended; None where it goes on.
-        draw: The seed of the world.
-        redrawn: How many draws before it had no activation of the subtree.
-        error: Why there is no episode; None otherwise.
-    """
-
-    row: int
-    features: Array
-    paid: dict[str, float] | None
-    ending: Ending | None
-    draw: int
-    redrawn: int
-    error: BtTasksimError | None = None
-
-
-class Draws(NamedTuple):
-    """Where the worlds of an episode are drawn from.
-
-    Attributes:
-        rng: Gives one seed after the other, until one has an episode.
-        draw: The seed of the only world instead; None: as many as it takes.
-        stream: See `bt_tasksim.scene.configuration.STREAMS`.
-        stage: Number of the scene's stage; None: the scene itself.
-    """
-
-    rng: np.random.Generator
-    draw: int | None = None
-    stream: str = "training"
-    stage: int | None = None
-
-
-def why_alone_in(tree: Behaviour, scene: WorldSource, options: EngineOptions) -> str:
-    """Why episodes of a tree run one by one, as a sentence; empty where they need not."""
-    alone = why_alone(options)
-    if alone:
-        return alone
-    context = Context(load_robot(scene.robot), worlds=2)
-    try:
-        BatchTree(tree, context.worlds, lambda leaf: leaf_in_batch(leaf, context))
-    except InputError:
-        return "something in the tree has no form for many worlds"
-    return ""
 
 
 class EpisodeBatch:
@@ -140,47 +82,31 @@ class EpisodeBatch:
         threads: int = 1,
         build: Callable[[], Behaviour] | None = None,
     ) -> None:
-        check_tree(tree)
         options = options or EngineOptions(noise="original")
         self.tree, self.longest = tree, longest
         self.reward = reward or Reward()
-        self.train = find_train(tree, train)
-        self.learners = self.train.learners()
         self.robot = load_robot(scene.robot)
-        self.context = Context(self.robot, worlds)
-        for leaf in concepts_in(tree):
-            leaf.under_training = leaf in self.learners
-        set_up(tree, context=self.context)
-        for leaf in concepts_in(tree):
-            if policies and leaf.name in policies and leaf not in self.learners:
-                leaf.use(policies[leaf.name])
-        self.layout = shared_layout(self.train, self.learners, self.robot)
-        self.observation_space, self.action_space = spaces_of(self.layout, self.learners[0].model.actions)
-        self.batch = BatchTree(
-            tree,
-            worlds,
-            lambda leaf: leaf_in_batch(leaf, self.context),
-            build=build,
-            contexts=partial(WorldContext, self.context),
-        )
-        self._check_known()
-        self.worlds = worlds_for(self.robot, options, worlds, threads)
-        self.scene = self.worlds.source(scene)
+        with ExitStack() as stack:
+            learning = LearningTree(tree, self.robot, train, policies or {}, worlds, build)
+            stack.callback(learning.close)
+            self.worlds = worlds_for(self.robot, options, worlds, threads)
+            stack.callback(self.worlds.close)
+            self._drawn = DrawnWorlds(self.worlds, scene, self.robot, learning.context)
+            self._judgement = Judgement(learning.train, learning.batch, learning.context)
+            self._open = stack.pop_all()
+        self._learning, self.scene = learning, self._drawn.scene
+        self.train, self.learners, self.layout = learning.train, learning.learners, learning.layout
+        self.context, self.batch = learning.context, learning.batch
+        self.observation_space, self.action_space = learning.observation_space, learning.action_space
         self.context.ask_hidden = self.worlds.hidden
-        self._judgement = Judgement(self.train, self.batch, self.context)
         for number in self._judgement.nodes:
             self.batch.watch(number, self._watcher(number))
-        compiled = self.batch.compiled[self._judgement.train]
-        assert isinstance(compiled, BatchTrain)
-        self._train = compiled
         n = self.observation_space.shape[0]
         self._phase = np.full(worlds, IDLE)
         self._activation: Array = np.full(worlds, BEFORE, np.int64)
         self._following = np.zeros(worlds, bool)
         self._left = np.zeros(worlds, np.int64)
         self._features: Array = np.zeros((worlds, n), np.float32)
-        self._draws: list[Draws | None] = [None] * worlds
-        self._drawn = np.zeros(worlds, np.int64)
         self._redrawn = np.zeros(worlds, np.int64)
         self._transitions: dict[int, Transitions] = {}
         self._happened: list[Happened] = []
@@ -215,7 +141,8 @@ class EpisodeBatch:
         """
         self.check_open()
         self._drop(np.array([row]))
-        self._draws[row], self._redrawn[row], self._phase[row] = draws, 0, DRAWING
+        self._drawn.draw_from(row, draws)
+        self._redrawn[row], self._phase[row] = 0, DRAWING
 
     def leave(self, row: int) -> None:
         """End the episode of a world where it is."""
@@ -245,10 +172,7 @@ class EpisodeBatch:
         self.check_open()
         if not (self._phase[rows] == WAITING).all():
             raise RuntimeError("a decision for a world that does not wait for one: begin an episode first")
-        leaves = self.batch.waits_at[rows]
-        for number in set(leaves.tolist()):
-            there = np.flatnonzero(leaves == number)
-            self._leaf(number).decide(rows[there], Action(action.motion[there], action.terminate[there]))
+        self._learning.decide(rows, action)
         for k, row in enumerate(rows.tolist()):
             self._transitions[row].decided(action.motion[k])
         self._phase[rows] = DECIDED
@@ -286,9 +210,7 @@ class EpisodeBatch:
             return
         self._closed = True
         self._drop(np.arange(self.count))
-        for leaf in self.learners:
-            leaf.under_training = False
-        self.worlds.close()
+        self._open.close()
 
     def check_open(self) -> None:
         """Refuse what comes after `close`.
@@ -307,41 +229,28 @@ class EpisodeBatch:
         """Draw worlds and begin in them; the rows in which that was possible."""
         if not len(rows):
             return rows
-        drawn, models, begun = [], [], []
-        tips = [tip.name for tip in self.robot.tips]
-        for row in rows.tolist():
-            draws = self._draws[row]
-            assert draws is not None
-            self._drawn[row] = int(draws.rng.integers(2**31)) if draws.draw is None else draws.draw
-            try:
-                drawn.append(self.scene.sample(int(self._drawn[row]), draws.stream, draws.stage))
-            except BtTasksimError as error:
-                self._none(row, error)
-                continue
-            begun.append(row)
-            models.append(drawn[-1].world_model(tips, self.robot.opening))
-            self._left[row] = round(self.longest * drawn[-1].control_frequency)
-            self._judgement.tolerance[row] = drawn[-1].tolerance
-        begun_rows = np.array(begun, int)
-        if not begun:
-            return begun_rows
-        self.batch.reset(begun_rows)
-        self.batch.renew(begun_rows)
-        self.context.begin(models, begun_rows)
-        failed = self.worlds.reset(begun_rows, drawn)
+        drawn, failed = self._drawn.sample(rows)
+        taken = np.array(list(drawn), int)
+        self.batch.reset(taken)
+        self.batch.renew(taken)
+        if drawn:
+            failed |= self._drawn.begin(drawn)
         for row, why in failed.items():
             self._none(row, why)
-        fresh = np.array([row for row in begun if row not in failed], int)
+        for row, world in drawn.items():
+            self._left[row] = round(self.longest * world.control_frequency)
+            self._judgement.tolerance[row] = world.tolerance
+        fresh = np.array([row for row in drawn if row not in failed], int)
         self._activation[fresh], self._following[fresh] = BEFORE, False
         self._judgement.reset(fresh)
         if len(fresh):
-            self.context.advance(self.worlds.observe(fresh), fresh)
+            self._drawn.look(fresh)
         return fresh
 
     def _none(self, row: int, error: BtTasksimError) -> None:
         """There is no episode in a world."""
         self._phase[row] = IDLE
-        draw, redrawn = int(self._drawn[row]), int(self._redrawn[row])
+        draw, redrawn = int(self._drawn.seeds[row]), int(self._redrawn[row])
         self._happened.append(Happened(row, self._features[row], None, None, draw, redrawn, error))
 
     def _step(self, rows: Array) -> Array:
@@ -349,11 +258,7 @@ class EpisodeBatch:
         if not len(rows):
             return rows
         self._left[rows] -= 1
-        written = self.context.written
-        tool, hand = (None if part is None else part[rows] for part in (written.tool, written.hand))
-        unreached = self.worlds.step(tool, hand, rows)
-        writers = {miss.row: self.context.tool_writer(miss.row) for miss in unreached}
-        failed = self.worlds.errors(rows)
+        failed = self._drawn.step(rows)
         for row, error in failed.items():
             self._spoiled(row, error)
         if failed:
@@ -361,12 +266,7 @@ class EpisodeBatch:
             rows = rows[self._phase[rows] == STEPPING]
             if not len(rows):
                 return rows
-        self.context.advance(self.worlds.observe(rows), rows)
-        for miss in unreached:
-            if not isinstance(miss.error, UnreachableError):
-                raise miss.error
-            outcome = OUT_OF_REACH(what=miss.error, distance=miss.error.distance, angle=miss.error.angle)
-            self.context.refused[miss.row] = Refusal(writers[miss.row], outcome)
+        self._drawn.look(rows)
         return rows
 
     def _spoiled(self, row: int, error: BtTasksimError) -> None:
@@ -457,79 +357,61 @@ class EpisodeBatch:
         rows = rows[~judged]
         first = rows[self._activation[rows] == BEFORE]
         if len(first):
-            self._activation[first] = self._train.activations[first]
+            self._activation[first] = self._learning.activations(first)
             if judgement.follower is not None:
                 judgement.reset(first)  # what it did in earlier rounds
-        same = self._train.activations[rows] == self._activation[rows]
+        same = self._learning.activations(rows) == self._activation[rows]
         for row in rows[~same].tolist():
             self._end(row, cut=INTERRUPTED())
         rows = rows[same]
         self._phase[rows] = WAITING
-        for number, there in self.batch.arrays.groups(self.batch.waits_at[rows], rows):
-            self._waits(self._leaf(number), there)
+        for waiting in self._learning.waiting(rows):
+            self._features[waiting.rows] = waiting.features
+            decided = zip(waiting.rows, waiting.decisions, waiting.features, waiting.costs, strict=True)
+            for row, decision, features, cost in decided:
+                self._waits(row, decision, features, cost)
 
-    def _waits(self, leaf: ConceptInBatch, rows: Array) -> None:
-        """Worlds ``(k,)`` wait before a leaf for a decision: what it sees, and what the one before paid."""
-        judged = leaf.waiting(rows)
-        model, seen, memory = leaf.leaf.model, judged.seen, judged.memory
-        features = np.asarray(model.features(seen, memory), np.float32)
-        if features.shape != (len(rows), *self.observation_space.shape):
-            raise InputError(
-                f"'{leaf.leaf.name}': features() gives {features.shape[1:]}, layout() says "
-                f"{self.observation_space.shape}"
-            )
-        self._features[rows] = features
-        costs = np.asarray(model.necessary_cost(seen, memory), float).tolist()
-        for k, row in enumerate(rows.tolist()):
-            decision = Decision(leaf.leaf, seen, memory, k)
-            transitions, paid = self._transitions.get(row), None
-            if transitions is None:
-                self._transitions[row] = Transitions(decision, self.reward.gamma, costs[k])
-            else:
-                paid = self.reward.pay(transitions.to(decision, costs[k]))
-            self._happened.append(
-                Happened(row, features[k], paid, None, int(self._drawn[row]), int(self._redrawn[row]))
-            )
+    def _waits(self, row: int, decision: Decision, features: Array, cost: float) -> None:
+        """A world waits for a decision: what the one before has paid."""
+        transitions, paid = self._transitions.get(row), None
+        if transitions is None:
+            self._transitions[row] = Transitions(decision, self.reward.gamma, cost)
+        else:
+            paid = self.reward.pay(transitions.to(decision, cost))
+        drawn, redrawn = int(self._drawn.seeds[row]), int(self._redrawn[row])
+        self._happened.append(Happened(row, features, paid, None, drawn, redrawn))
 
     # ---- ends -------------------------------------------------------------------------------------------
 
     def _end(self, row: int, judged: SignalOutcome | None = None, cut: Outcome | None = None) -> None:
         """The episode of a world is over; at the end of the tick it is left."""
         transitions = self._transitions.pop(row)
-        last = transitions.decision.leaf
-        number = next(n for n, node in enumerate(self.batch.nodes) if node is last)
         reasons = self.batch.reasons
         failed = reasons.speaker(self._judgement.train, row)
         ending = ending_of(
             cut,
             judged,
-            self._leaf(number).outcome(row),
+            self._learning.outcome(transitions.decision.leaf, row),
             None if failed is None else reasons.outcome_of(failed, row),
             self.reward.sufficient,
-            STATUSES[int(self._train.place.status[row])].name,
+            STATUSES[int(self.batch.status[row, self._judgement.train])].name,
             float(self.context.times[row]),
         )
         paid = self.reward.pay(transitions.to_end(ending.end, ending.kept))
-        draw, redrawn = int(self._drawn[row]), int(self._redrawn[row])
+        draw, redrawn = int(self._drawn.seeds[row]), int(self._redrawn[row])
         self._happened.append(Happened(row, self._features[row].copy(), paid, ending, draw, redrawn))
         self._phase[row] = IDLE
         self._over.append(row)
 
     def _draw_again(self, row: int) -> None:
         """The subtree was never active in the world of a draw."""
-        draws = self._draws[row]
-        assert draws is not None
         self._redrawn[row] += 1
         self._phase[row] = DRAWING
         self._over.append(row)
-        if self._redrawn[row] < REDRAWS and draws.draw is None:
+        if self._redrawn[row] < REDRAWS and not self._drawn.has_one_draw(row):
             return
-        speaker = self.batch.reasons.speaker(0, row)
-        said = None if speaker is None else self.batch.reasons.said_by(speaker, row)
-        status = STATUSES[int(self.batch.status[row, 0])].name
-        why = "" if said is None else said.sentence
-        redrawn, draw = int(self._redrawn[row]), int(self._drawn[row])
-        self._none(row, not_reached(self.train.name, redrawn, draw, status, why))
+        redrawn, draw = int(self._redrawn[row]), int(self._drawn.seeds[row])
+        self._none(row, not_reached(self.train.name, self.batch, row, redrawn, draw))
 
     def _leave(self) -> None:
         """End all nodes in worlds whose episode is over."""
@@ -551,35 +433,3 @@ class EpisodeBatch:
         self.batch.reset(active)
         if self.worlds.observation is not None:
             self.context.advance(self.worlds.observation, rows)  # what they have commanded is void
-
-    def _check_known(self) -> None:
-        """Refuse what is to learn where py_trees ticks it, which waits for nobody."""
-        numbers = {id(node): number for number, node in enumerate(self.batch.nodes)}
-        for node in (self.train, *self.learners):
-            found = self.batch.compiled[numbers[id(node)]]
-            if isinstance(found, BelowUnknown):
-                above = found.above.node(0, 0)
-                raise InputError(
-                    f"'{node.name}' cannot be trained below '{above.name}': {type(above).__name__} has no "
-                    f"form that waits for decisions; give it one, see `compiled` in docs/parts/tree_node.md"
-                )
-
-    def _leaf(self, number: int) -> ConceptInBatch:
-        leaf = self.batch.compiled[number]
-        assert isinstance(leaf, ConceptInBatch)
-        return leaf
-
-
-def not_reached(train: str, redrawn: int, draw: int, status: str, why: str) -> InputError:
-    """Says that a Train node was never active.
-
-    Args:
-        train: Its name.
-        redrawn: In how many draws.
-        draw: The last one.
-        status: Status of the tree at the end of that.
-        why: What the tree says.
-    """
-    return InputError(
-        f"'{train}' was not reached in {redrawn} draws; the last one (seed {draw}) ended with {status}: {why}"
-    )

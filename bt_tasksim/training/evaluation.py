@@ -32,7 +32,7 @@ from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import Runner
-from bt_tasksim.execution.worlds import check_memory, most_worlds, why_alone
+from bt_tasksim.execution.worlds import check_memory, most_processes, most_worlds, why_alone
 from bt_tasksim.scene.configuration import check_seed
 from bt_tasksim.training.evaluation_file import EvaluationFile, KeptEvaluation
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
@@ -91,7 +91,8 @@ def usual_batch(options: EngineOptions, processes: int = 1) -> int:
         options: The engines; those that have no worlds in batches run one.
         processes: How many such processes there are on this machine.
     """
-    return 1 if why_alone(options) else max(1, min(BATCH, most_worlds() // processes))
+    begun = processes if processes > 1 else 0
+    return 1 if why_alone(options) else max(1, min(BATCH, most_worlds(begun) // processes))
 
 
 def usual_workers(options: EngineOptions, episodes: int) -> int:
@@ -101,7 +102,9 @@ def usual_workers(options: EngineOptions, episodes: int) -> int:
         options: The engines.
         episodes: How many episodes there are.
     """
-    return 1 if episodes < MANY or why_alone(options) else os.cpu_count() or 1
+    if episodes < MANY or why_alone(options):
+        return 1
+    return min(os.cpu_count() or 1, most_processes(BATCH))
 
 
 class EvaluationInterrupted(KeyboardInterrupt):  # as KeyboardInterrupt, which it is
@@ -172,7 +175,9 @@ def evaluate(
     batch = usual_batch(job.options, 1 if cluster else workers or 1) if job.batch is None else job.batch
     job = replace(job, batch=batch)
     if cluster is None:
-        check_memory(batch * (workers or 1))
+        processes = min(workers or 1, len(seeds))
+        pictures = job.options.rendering or job.options.perception != "state"
+        check_memory(batch * processes, processes if processes > 1 else 0, pictures)
     player = Player(job)  # errors show here, before any process starts
     runner = player.runner
     with player:

@@ -19,6 +19,7 @@ from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.episode_batch import EpisodeBatch
 from bt_tasksim.training.learning_leaves import find_train
+from bt_tasksim.training.learning_tree import in_training
 from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.subject import evaluation_subject, own_code
@@ -78,13 +79,8 @@ class KeeperElsewhere:
     def of(cls, keeping: Keeping, source: NamedTree, tree: Behaviour, scene: WorldSource) -> KeeperElsewhere:
         """The same as of this process, with its tree and scene."""
         learners = find_train(tree, keeping.train).learners()
-        context = Context(load_robot(scene.robot))
-        for leaf in concepts_in(tree):
-            leaf.under_training = leaf in learners
-            leaf.setup(context=context)
-            if leaf.name in keeping.policies and leaf not in learners:
-                leaf.use(keeping.policies[leaf.name])
-        return cls(keeping, source, keeping.subject(tree, scene, source))
+        with in_training(tree, learners, Context(load_robot(scene.robot)), keeping.policies):
+            return cls(keeping, source, keeping.subject(tree, scene, source))
 
     def __call__(self) -> EpisodeBatch:
         """Make it.

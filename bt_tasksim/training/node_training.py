@@ -38,10 +38,11 @@ from bt_tasksim.training.checkpoint import (
 )
 from bt_tasksim.training.collectors import LENGTH, DrawResult, DrawTask, EnvironmentRollout, RolloutTask
 from bt_tasksim.training.config import TrainConfig
-from bt_tasksim.training.episode_batch import EpisodeBatch, why_alone_in
+from bt_tasksim.training.episode_batch import EpisodeBatch
 from bt_tasksim.training.evaluation import usual_batch
 from bt_tasksim.training.keepers import KeeperElsewhere, Keeping
 from bt_tasksim.training.learning_leaves import shared_layout
+from bt_tasksim.training.learning_tree import why_alone_in
 from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.training.on_cluster import actor_memory
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress

@@ -17,7 +17,8 @@ from bt_tasksim.core.fleet import Fleet
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
 from bt_tasksim.training.collectors import Collecting, Collector, DrawTask, RolloutTask
-from bt_tasksim.training.episode_batch import Draws, EpisodeBatch
+from bt_tasksim.training.drawn_worlds import Draws
+from bt_tasksim.training.episode_batch import EpisodeBatch
 
 AnyTask = RolloutTask | DrawTask
 

@@ -17,7 +17,9 @@ from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import LONGEST
 from bt_tasksim.policy.policy import Policy
 from bt_tasksim.scene.scene import WorldSource
-from bt_tasksim.training.episode_batch import Draws, EpisodeBatch, Happened
+from bt_tasksim.training.drawn_worlds import Draws
+from bt_tasksim.training.episode_batch import EpisodeBatch
+from bt_tasksim.training.happened import Happened
 from bt_tasksim.training.reward import Reward
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -42,9 +43,11 @@ class Environment:
         self._env = _open(file, robot, drawn)
         self.base: Any = self._env.unwrapped
         self._fresh: int | None = None
-        if "success" not in self.base.evaluate():
+        try:
+            self.evaluate()
+        except BaseException:
             self.close()
-            raise InputError(f"ManiSkill's '{file.environment}' does not say what success is")
+            raise
 
     @property
     def frequencies(self) -> tuple[int, int]:
@@ -72,8 +75,22 @@ class Environment:
         self._env.step(action)
 
     def evaluate(self) -> dict[str, Any]:
-        """What the environment says of its present state, in plain values."""
-        return {name: _plain(value) for name, value in self.base.evaluate().items()}
+        """What the environment says of its present state, in plain values; ``success`` is true or false.
+
+        Raises:
+            InputError: It does not say what success is, or not with one truth value.
+        """
+        said = self.base.evaluate()
+        if not isinstance(said, Mapping) or "success" not in said:
+            raise InputError(f"ManiSkill's '{self.file.environment}' does not say what success is")
+        found = {name: _plain(value) for name, value in said.items()}
+        success = found["success"]
+        if not isinstance(success, bool | int | float) or success not in (0, 1):
+            raise InputError(
+                f"ManiSkill's '{self.file.environment}' should say success with one truth value for a world "
+                f"when it is evaluated, found {shown(repr(said['success']))}"
+            )
+        return {**found, "success": bool(success)}
 
     def actor(self, name: str) -> Any:
         """An actor by its name in the scene, or in the environment's attributes.
@@ -99,27 +116,35 @@ def _open(file: EnvironmentFile, robot: str, drawn: bool) -> Any:
     try:
         import gymnasium
         import mani_skill.envs  # noqa: F401  # its environments announce themselves
+        from mani_skill.agents.registration import REGISTERED_AGENTS
         from mani_skill.utils.registration import REGISTERED_ENVS
     except ImportError as error:
         raise MachineError(
             f"ManiSkill's environments cannot start: {error}; "
             "install the simulation extra: pip install 'bt-tasksim[sim]'"
         ) from error
-    name = file.environment
+    module, _, name = file.environment.rpartition(":")
+    if module and module not in sys.modules and _registered_by(REGISTERED_ENVS.get(name)) != module:
+        raise InputError(
+            f"the environment '{shown(name)}' is of the module '{shown(module)}', and a file runs no code: "
+            f"load it yourself with --plugin {shown(module)}, or import it in the tree's file"
+        )
     try:
         spec = gymnasium.spec(name)
-    except ModuleNotFoundError as error:
-        raise InputError(f"no module for the environment '{shown(name)}': {error}") from error
     except gymnasium.error.Error as error:
         known = nearest(name, REGISTERED_ENVS)
-        raise InputError(f"ManiSkill has no environment '{shown(name)}'{known}") from error
+        raise InputError(
+            f"ManiSkill has no environment '{shown(name)}'{known}; one of your own comes with --plugin"
+        ) from error
     if spec.id not in REGISTERED_ENVS:
         raise InputError(f"'{shown(name)}' is an environment, but none of ManiSkill's")
-    _check_assets(spec.id, REGISTERED_ENVS[spec.id])
+    _check_assets(spec.id, REGISTERED_ENVS[spec.id].asset_download_ids)
+    if robot in REGISTERED_AGENTS:
+        _check_assets(robot, REGISTERED_AGENTS[robot].asset_download_ids)
     with _quiet():
         try:
             return gymnasium.make(
-                name,
+                spec,
                 max_episode_steps=file.max_episode_steps,
                 num_envs=1,
                 obs_mode="none",
@@ -136,6 +161,11 @@ def _open(file: EnvironmentFile, robot: str, drawn: bool) -> Any:
                     "'make setup' fetches a software driver, or install Mesa's from 24.3 on"
                 ) from error
             raise InputError(f"ManiSkill's '{shown(name)}' does not start with '{robot}': {error}") from error
+        except EOFError as error:
+            raise InputError(
+                f"ManiSkill's '{shown(name)}' asks whether it may download what it needs: start it once by "
+                "itself, and answer"
+            ) from error
         except (AssertionError, AttributeError, KeyError, NotImplementedError, TypeError) as error:
             raise InputError(
                 f"ManiSkill's '{shown(name)}' does not start with the robot '{shown(robot)}' and "
@@ -143,12 +173,18 @@ def _open(file: EnvironmentFile, robot: str, drawn: bool) -> Any:
             ) from error
 
 
-def _check_assets(name: str, spec: Any) -> None:
-    """Refuse an environment that would ask in the terminal whether it may download what it needs."""
+def _registered_by(spec: Any) -> str:
+    """Name of the module or file of an environment's class."""
+    module: str = getattr(getattr(spec, "cls", None), "__module__", "")
+    return module.removeprefix("_plugin_").removeprefix("_tree_")
+
+
+def _check_assets(name: str, groups: Iterable[str] | None) -> None:
+    """Refuse what would ask in the terminal whether it may download what it needs."""
     from mani_skill.utils import assets
 
     wanted: list[str] = []
-    for group in spec.asset_download_ids or ():
+    for group in groups or ():
         inner = (
             assets.expand_data_group_into_individual_data_source_ids(group)
             if group in assets.DATA_GROUPS
@@ -176,7 +212,10 @@ def _quiet() -> Iterator[None]:
 
 def _plain(value: Any) -> Any:
     """One world's value: true or false, or a number; anything else as it is."""
-    array = np.asarray(value.cpu() if hasattr(value, "cpu") else value)
+    try:
+        array = np.asarray(value.cpu() if hasattr(value, "cpu") else value)
+    except ValueError:  # ragged
+        return value
     if array.size != 1 or array.dtype.kind not in "biuf":
         return value
     return array.reshape(()).item()

@@ -74,7 +74,8 @@ class EnvironmentFile(Model):
     """What a ManiSkill environment's things are called, and what they are."""
 
     environment: Text
-    """Its id, such as PickCube-v1; one of your own as module:namespace/Id-v0."""
+    """Its id, such as PickCube-v1. One of your own as module:Id-v1: that module has to be loaded, with
+    --plugin module or by the tree's file, since this file runs no code."""
     robots: Annotated[dict[Text, Text], Field(min_length=1)]
     """Our robots by ManiSkill's names of them; the first one is used unless another is asked for."""
     objects: dict[Name, ActorEntry | None] = Field(default_factory=dict)

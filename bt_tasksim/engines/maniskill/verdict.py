@@ -31,7 +31,7 @@ def verdict(
         distance: An object, a place, and the metres between them, where the environment's file asks for it.
         penetration: Deepest overlap of two bodies during the run, metres.
     """
-    success = bool(said["success"])
+    success: bool = said["success"]
     flags = [
         f"{name} {'yes' if value else 'no'}" if isinstance(value, bool) else f"{name} {value:.3g}"
         for name, value in said.items()

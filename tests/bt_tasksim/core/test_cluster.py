@@ -1,5 +1,6 @@
 """A cluster as a fleet: errors come through, lost actors are made up for, and nothing is left of Ray."""
 
+import contextlib
 import importlib.util
 import os
 import socket
@@ -180,17 +181,49 @@ def test_where_ray_is_not_installed_it_says_what_to_do(monkeypatch):
 
 
 @needs_ray
-def test_where_nobody_answers_it_says_so_soon(monkeypatch):
+def test_where_nobody_answers_it_says_so_soon():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     with pytest.raises(MachineError, match=f"no Ray cluster answers at 127.0.0.1:{port}.*ray start"):
         Cluster(list, f"127.0.0.1:{port}")
+
+
+GREETING = bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
+"""An empty frame of settings: what a head begins with, at least."""
+
+
+@needs_ray
+@pytest.mark.parametrize(
+    ("says", "sentence"),
+    [
+        (b"", "does not answer as the head of a Ray cluster"),
+        (None, "does not answer as the head of a Ray cluster"),
+        (b"SSH-2.0-OpenSSH_9.6\r\n", "does not answer as the head of a Ray cluster"),
+        (GREETING, "did not answer within 4 s|cannot be joined"),
+    ],
+    ids=["silent", "hangs up", "another one", "only greets"],
+)
+def test_who_is_no_head_is_told_from_one_soon(monkeypatch, says, sentence):
+    monkeypatch.setattr(module, "GREET", 1.0)
     monkeypatch.setattr(module, "START", 4.0)
-    before = of_ray()
+    before, kept = of_ray(), []
+
+    def serve(server):
+        with contextlib.suppress(OSError):
+            while True:
+                kept.append(server.accept()[0])
+                if says is None:
+                    kept.pop().close()
+                else:
+                    kept[-1].sendall(says)
+
     with socket.create_server(("127.0.0.1", 0)) as server:
-        threading.Thread(target=server.accept, daemon=True).start()
+        threading.Thread(target=serve, args=(server,), daemon=True).start()
         port, began = server.getsockname()[1], time.monotonic()
-        with pytest.raises(MachineError, match=r"did not answer within 4 s|cannot be joined"):
+        with pytest.raises(MachineError, match=sentence) as caught:
             Cluster(list, f"127.0.0.1:{port}")
-    assert time.monotonic() - began < 30.0 and of_ray() <= before
+    assert "\n" not in str(caught.value) and of_ray() <= before
+    assert time.monotonic() - began < (30.0 if says == GREETING else 5.0)
+    for connection in kept:
+        connection.close()

@@ -22,6 +22,7 @@ from bt_tasksim.training.evaluation import (
     Job,
     episode,
     evaluate,
+    usual_batch,
     usual_workers,
 )
 from bt_tasksim.training.evaluation_file import EvaluationFile
@@ -142,6 +143,22 @@ def test_many_episodes_have_a_process_for_each_core(monkeypatch):
     monkeypatch.setattr("os.cpu_count", lambda: 6)
     assert [usual_workers(EngineOptions(), n) for n in (1, 199, 200)] == [1, 1, 6]
     assert usual_workers(EngineOptions(perception="camera"), 10**6) == 1, "pictures take much memory"
+
+
+def test_processes_count_in_what_memory_has_room_for(monkeypatch):
+    """A machine with 2 GB that are free: each process takes 0.35 GB, and 0.7 GB with pictures."""
+    monkeypatch.setattr("bt_tasksim.execution.worlds.available_memory", lambda: 2_000_000_000)
+    monkeypatch.setattr("os.cpu_count", lambda: 6)
+    assert usual_workers(EngineOptions(), 200) == 2
+    assert usual_batch(EngineOptions()) == 64 and usual_batch(EngineOptions(), 4) == 16
+    job = Job("pick_and_throw", options=EngineOptions(noise="none"))
+    with pytest.raises(InputError, match=r"^6 processes do not fit .*350 MB; 4 do$"):
+        evaluate(job, range(100), 6)
+    with pytest.raises(InputError, match=r"batch of 800 worlds in 4 processes does not fit .*; 66 do"):
+        evaluate(dataclasses.replace(job, batch=200), range(100), 4)
+    camera = dataclasses.replace(job, options=EngineOptions(perception="camera"))
+    with pytest.raises(InputError, match=r"^4 processes do not fit .*700 MB; 2 do$"):
+        evaluate(camera, range(100), 4)
 
 
 def test_progress_is_told_of_every_episode():

@@ -1,5 +1,6 @@
 """Episodes in many worlds at once: each is what an environment of its own would have had, bit for bit."""
 
+import contextlib
 import logging
 
 import gymnasium
@@ -17,9 +18,12 @@ from bt_tasksim.concept_nodes import Grasp, Pick, Wait
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Command
+from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.training.collectors import DrawTask, RolloutTask
 from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.episode_batch import REDRAWS, EpisodeBatch
+from bt_tasksim.training.keepers import KeeperElsewhere, Keeping
+from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.training.reward import Reward
 from bt_tasksim.training.reward_parts import RewardPart
 from bt_tasksim.training.rollouts import in_batch
@@ -39,7 +43,7 @@ from bt_tasksim.trees import (
     subtree,
     timeout,
 )
-from bt_tasksim.trees.nodes.train import Train
+from bt_tasksim.trees.nodes.train import Train, concepts_in
 from tests.unlike_worlds import holding, mixed
 
 HERE = 0.35
@@ -386,6 +390,38 @@ def test_a_behaviour_of_ones_own_is_ticked_in_a_tree_for_each_world(env_of, vect
                 seen, _ = env.reset()
             assert features[k].tolist() == seen.tolist()
     assert ends > 3
+
+
+@pytest.mark.parametrize("where", ["worlds_for", "Judgement"])
+def test_a_tree_that_cannot_be_trained_after_all_can_be_run(vector_of, toy, monkeypatch, where):
+    def fails(*about):
+        raise InputError("no room")
+
+    tree = simple()
+    monkeypatch.setattr(f"bt_tasksim.training.episode_batch.{where}", fails)
+    with pytest.raises(InputError, match="no room"):
+        vector_of(tree, num_envs=2)
+    assert not any(leaf.under_training for leaf in concepts_in(tree))
+    assert all(world.closed == 1 for made in toys.Worlds.made for world in made.each)
+    assert toy(tree).tick(50) == Status.SUCCESS
+
+
+@pytest.mark.parametrize("error", [None, InputError("no such file")])
+def test_what_is_told_to_other_processes_leaves_the_tree_as_it_was(toy_engines, toy, monkeypatch, error):
+    def subject(*about):
+        assert raised.under_training, "it is in training as long as it is looked at"
+        if error is not None:
+            raise error
+        return {}
+
+    raised = Raise()
+    tree = sequence("s", Train(raised, "mine"), Check())
+    keeping = Keeping("mine", EngineOptions(), Reward(), {}, 2)
+    monkeypatch.setattr(Keeping, "subject", subject)
+    with pytest.raises(InputError) if error is not None else contextlib.nullcontext():
+        KeeperElsewhere.of(keeping, NamedTree("x"), tree, SCENE)
+    assert not raised.under_training
+    assert toy(tree).tick(50) == Status.SUCCESS
 
 
 @pytest.mark.parametrize(

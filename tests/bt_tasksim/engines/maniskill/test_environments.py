@@ -1,12 +1,16 @@
 """Real environments, small: names, poses, what is felt, the environment's own word, the same bits again."""
 
+import sys
+
 import numpy as np
 import pytest
 from py_trees.common import Status
 
+from bt_tasksim.cli.main import main
 from bt_tasksim.concept_nodes import Grasp, Pick, Wait
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.plugins import scratch
 from bt_tasksim.core.world import Command
 from bt_tasksim.engines.maniskill.environment import Environment
 from bt_tasksim.engines.maniskill.files import load_environment_file
@@ -220,3 +224,68 @@ def test_pictures_are_maniskills_own():
     with pytest.raises(InputError, match="render_camera"):
         drawn.pipeline.render("render_camara")
     drawn.pipeline.close()
+
+
+OWN = """
+from mani_skill.envs.tasks import PickCubeEnv
+from mani_skill.utils.registration import register_env
+
+
+@register_env("OwnCube-v1", max_episode_steps=50)
+class OwnCube(PickCubeEnv):
+    pass
+"""
+
+
+def test_an_environment_of_ones_own_is_loaded_by_whoever_names_its_module(tmp_path, monkeypatch, capsys):
+    (tmp_path / "own_envs.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+    path = tmp_path / "mine.yaml"
+    path.write_text("environment: own_envs:OwnCube-v1\nrobots: {panda: panda}\nobjects: {cube: {}}\n")
+    with pytest.raises(InputError, match=r"runs no code.*--plugin own_envs"):
+        Environment(load_environment_file(str(path)), "panda")
+    assert "own_envs" not in sys.modules, "a file imports nothing"
+    tree = tmp_path / "lift.py"
+    tree.write_text(
+        "from bt_tasksim.concept_nodes import Grasp\nfrom bt_tasksim.trees import sequence\n\n\n"
+        "def build():\n    return sequence('lift', Grasp('cube'))\n"
+    )
+    words = ["run", str(tree), "--engines", f"maniskill:{path}", "--out"]
+    for k, plugin in enumerate((str(tmp_path / "own_envs.py"), "own_envs")):
+        with scratch():
+            code = main([*words, str(tmp_path / f"out{k}"), "--plugin", plugin])
+        assert code in (0, 1), capsys.readouterr().err
+        assert "OwnCube-v1 calls it" in capsys.readouterr().out
+    sys.modules.pop("own_envs", None)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [None, {}, {"success": "yes"}, {"success": float("nan")}, {"success": [True, False]}, {"success": 2}],
+)
+def test_a_success_that_is_none_is_one_sentence(still, monkeypatch, said):
+    environment = still.pipeline.physics._open()
+    monkeypatch.setattr(environment.base, "evaluate", lambda: said)
+    with pytest.raises(InputError, match=r"'PickCube-v1' .*success") as caught:
+        environment.evaluate()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_success_may_be_a_number(still, monkeypatch):
+    environment = still.pipeline.physics._open()
+    monkeypatch.setattr(
+        environment.base, "evaluate", lambda: {"success": np.array([1]), "odd": [[1], [2, 3]]}
+    )
+    assert environment.evaluate() == {"success": True, "odd": [[1], [2, 3]]}
+
+
+def test_a_robot_whose_assets_are_not_there_is_refused_without_a_question(tmp_path):
+    from mani_skill.agents.registration import REGISTERED_AGENTS
+    from mani_skill.utils import assets
+
+    if all(map(assets.is_data_source_downloaded, REGISTERED_AGENTS["xarm6_robotiq"].asset_download_ids)):
+        pytest.skip("its assets are on this machine")
+    path = tmp_path / "mine.yaml"
+    path.write_text("environment: PickCube-v1\nrobots: {xarm6_robotiq: panda}\n")
+    with pytest.raises(InputError, match=r"'xarm6_robotiq' needs assets .*download_asset xarm6_robotiq'"):
+        Environment(load_environment_file(str(path)), "xarm6_robotiq")
