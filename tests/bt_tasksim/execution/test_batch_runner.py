@@ -40,11 +40,8 @@ def facts(found):
 
 
 def in_batch(build, scene, seeds, worlds, threads=1, **options):
-    runner = BatchRunner(build, scene, EngineOptions(**options), worlds, threads)
-    try:
+    with BatchRunner(build, scene, EngineOptions(**options), worlds, threads) as runner:
         return {seed: facts(found) for seed, found in runner.run(seeds)}
-    finally:
-        runner.close()
 
 
 def one_by_one(build, scene, seeds, **options):
@@ -351,6 +348,18 @@ def test_nonsense_is_refused():
     for counts in ({"worlds": 0}, {"threads": 0}, {"worlds": most_worlds() * 2}):
         with pytest.raises(InputError, match=r"one world|does not fit"):
             BatchRunner(source.build, source.scene, **counts)
+
+
+def test_a_tree_instead_of_what_makes_it_and_a_number_instead_of_seeds_are_refused():
+    source = load_source("pick_and_place")
+    with pytest.raises(InputError, match=r"what makes one, .* not the tree 'pick and place'"):
+        BatchRunner(source.build(), source.scene)
+    with BatchRunner(source.build, source.scene, worlds=2) as runner:
+        with pytest.raises(InputError, match=r"seeds, such as range\(20\)"):
+            runner.run(2)
+        for wrong in ("12", [0.5], [-1]):
+            with pytest.raises(InputError, match="seed"):
+                next(iter(runner.run(wrong)))
 
 
 def test_unlike_objects_share_a_batch():
