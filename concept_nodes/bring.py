@@ -28,7 +28,7 @@ from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, r
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
-from bt_tasksim.core.facts import ObjectFacts, take_rows
+from bt_tasksim.core.fact_arrays import ObjectFacts, take_rows
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.transfer import fetched

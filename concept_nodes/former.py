@@ -17,7 +17,7 @@ from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import holding as held
 from bt_tasksim.core.bundles import mapped
-from bt_tasksim.core.facts import FactArrays
+from bt_tasksim.core.fact_arrays import FactArrays
 from bt_tasksim.core.outcomes import PRECONDITION_UNMET, TEXT, Possible, Statement
 from bt_tasksim.core.poses import Array, array_namespace, host
 from bt_tasksim.planning import reference_motion

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from bt_tasksim.concept.functions import zeros
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import poses
-from bt_tasksim.core.facts import ObjectFacts, PlaceFacts, take_rows
+from bt_tasksim.core.fact_arrays import ObjectFacts, PlaceFacts, take_rows
 from bt_tasksim.core.poses import Array, array_namespace, constant
 
 DOWN = (0.0, 0.0, -1.0)

@@ -17,7 +17,6 @@ from bt_tasksim.policy.library import find_policy
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import PROGRAMMED, Action, LearnedPolicy, Policy, ProgrammedPolicy
 from bt_tasksim.scene.scene import Scene
-from bt_tasksim.training.collectors import countable
 from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.evaluation_outcomes import wilson
 
@@ -117,7 +116,9 @@ def episode(env: EpisodeEnv, policy: Policy, seed: int) -> Draw:
             hidden = env.batch.worlds.hidden()
             force = 0.0 if hidden is None else float(hidden.hand_force[0, 0])
             done = info["status"] == "SUCCESS"
-            return Draw(seed, bool(info["is_success"]), done, countable(info), info["why"], decisions, force)
+            assert env.ending is not None, "it is over"
+            counted = env.ending.counted_as
+            return Draw(seed, bool(info["is_success"]), done, counted, info["why"], decisions, force)
 
 
 def load(name: str) -> Policy:

@@ -16,7 +16,8 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.bundles import Rows
 from bt_tasksim.core.culprit import place_of
 from bt_tasksim.core.errors import CommandConflictError, LeafError
-from bt_tasksim.core.facts import FactsTable, WorldFacts
+from bt_tasksim.core.facts import WorldFacts
+from bt_tasksim.core.facts_table import FactsTable
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.plain import shown
 from bt_tasksim.core.poses import Array, array_namespace, constant, host

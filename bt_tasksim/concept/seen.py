@@ -6,7 +6,8 @@ They resolve names to columns. All arrays have a leading axis of worlds ``(N, ..
 from __future__ import annotations
 
 from bt_tasksim.core.bundles import Rows
-from bt_tasksim.core.facts import ObjectFacts, PlaceFacts, WorldFacts
+from bt_tasksim.core.fact_arrays import ObjectFacts, PlaceFacts
+from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.observables import observable
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.transfer import Index

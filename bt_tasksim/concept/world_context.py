@@ -8,7 +8,7 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.context import NO_EPISODE, Context, Refusal, Written, only_world
-from bt_tasksim.core.facts import FactsTable
+from bt_tasksim.core.facts_table import FactsTable
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 

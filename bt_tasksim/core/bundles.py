@@ -152,9 +152,7 @@ def _spread(values: Array, index: Index, worlds: int) -> Array:
 
 
 def _replaced(before: Array, index: Index, values: Array) -> Array:
-    out = array_namespace(before).asarray(before, copy=True)
-    index.put(out, values)
-    return out
+    return index.replaced(before, values)
 
 
 class Rows:

@@ -235,8 +235,7 @@ def _greets(connection: socket.socket) -> bool:
 
 
 def _environment(address: str) -> dict[str, str]:
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    found = {**os.environ, **threads, **child.VARIABLES}
+    found = {**os.environ, **child.ONE_THREAD, **child.VARIABLES}
     places = [os.environ.get("PYTHONPATH", ""), str(HOME.parent)]
     found["PYTHONPATH"] = os.pathsep.join(filter(None, places))
     found.pop("RAY_ADDRESS", None)

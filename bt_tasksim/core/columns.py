@@ -104,10 +104,12 @@ def _picked(values: Array, index: np.ndarray) -> Array:
 
 def with_rows(array: Array, index: Index, values: Array, filling: Any) -> Array:
     """An array ``(N, ...)`` with other rows ``(k, ...)``; what is shorter is filled up."""
-    xp = array_namespace(array)
     most = tuple(max(n, m) for n, m in zip(array.shape[1:], values.shape[1:], strict=True))
-    out = xp.asarray(array, copy=True) if most == tuple(array.shape[1:]) else filled(array, most, filling)
-    index.put(out, values if most == tuple(values.shape[1:]) else filled(values, most, filling))
+    values = values if most == tuple(values.shape[1:]) else filled(values, most, filling)
+    if most == tuple(array.shape[1:]):
+        return index.replaced(array, values)
+    out = filled(array, most, filling)
+    index.put(out, values)
     return out
 
 

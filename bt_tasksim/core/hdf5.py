@@ -198,9 +198,9 @@ class Reader:
             process_group=0,
             env={
                 **os.environ,
+                **child.ONE_THREAD,
                 **child.VARIABLES,
                 "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-                "OPENBLAS_NUM_THREADS": "1",
                 "HDF5_USE_FILE_LOCKING": "FALSE",
                 "HDF5_PLUGIN_PATH": os.devnull,
             },

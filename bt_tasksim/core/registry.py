@@ -46,6 +46,7 @@ HOMES: dict[str, tuple[str, ...]] = {
     ),
     "engine/rendering": ("bt_tasksim.engines.rendering", "bt_tasksim.engines.remote.engines"),
     "engine/postprocess": ("bt_tasksim.engines.perception", "bt_tasksim.engines.remote.engines"),
+    "noise model": ("bt_tasksim.engines.perception.noise",),
     "robot": ("bt_tasksim.robot.bundled",),
     "fixture": ("bt_tasksim.scene.bundled",),
     "shape": ("bt_tasksim.scene.kinds",),

@@ -44,9 +44,31 @@ class Index:
             return values[self.rows]
         return array_namespace(values).take(values, self.on(values), axis=0)
 
+    def along(self, values: Array, axis: int) -> Array:
+        """These entries of values along an axis, side by side in memory."""
+        if type(values) is np.ndarray:
+            return values.take(self.rows, axis=axis)
+        return array_namespace(values).take(values, self.on(values), axis=axis)
+
     def put(self, values: Array, new: Array) -> None:
         """Write ``new (k, ...)`` into these rows of values ``(N, ...)``."""
         values[self.on(values)] = new
+
+    def replaced(self, values: Array, new: Array) -> Array:
+        """Values ``(N, ...)`` like these, with ``new (k, ...)`` in these rows."""
+        out = array_namespace(values).asarray(values, copy=True)
+        self.put(out, new)
+        return out
+
+
+def spliced(arrays: Sequence[Array], rows: np.ndarray, new: Sequence[Array], axis: int = 0) -> list[Array]:
+    """Arrays of ``N`` entries along an axis, those at ``rows (k,)`` being new ones; nothing is written to."""
+    n = arrays[0].shape[axis]
+    source = np.arange(n)
+    source[rows] = n + np.arange(len(rows))
+    index = Index(source)
+    pairs = zip(arrays, new, strict=True)
+    return [index.along(array_namespace(*pair).concat(list(pair), axis=axis), axis) for pair in pairs]
 
 
 def sent(arrays: Sequence[np.ndarray], like: Array) -> list[Array]:

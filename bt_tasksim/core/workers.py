@@ -101,7 +101,7 @@ def _serve(make: Callable[[], StateT], pipe: Connection, others: list[Connection
     """A worker process: what it keeps is a variable of this function."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)  # how the parent ends in order is not how a copy of it ends
-    os.environ["OMP_NUM_THREADS"] = "1"
+    os.environ.update(child.ONE_THREAD)
     for other in others:
         other.close()
     parent = os.getppid()
@@ -129,8 +129,7 @@ def begun_anew() -> Iterator[None]:
 
     They take one thread for linear algebra: they are the parallelism.
     """
-    variables = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    variables |= child.VARIABLES
+    variables = child.ONE_THREAD | child.VARIABLES
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.facts import take_rows
+from bt_tasksim.core.fact_arrays import take_rows
 from bt_tasksim.core.poses import Array, array_namespace
 
 SHARP = math.cos(math.radians(100.0))
@@ -130,7 +130,9 @@ def _spaced(line: Array, along: Array, samples: int) -> Array:
     begins = xp.take_along_axis(along, k, axis=1)
     length = xp.take_along_axis(along, k + 1, axis=1) - begins
     there = length > 0.0
-    share = xp.where(there, (wanted - begins) / xp.where(there, length, xp.ones_like(length)), 0.0 * length)
+    share = xp.where(
+        there, (wanted - begins) / xp.where(there, length, xp.ones_like(length)), xp.zeros_like(length)
+    )
     spread = xp.broadcast_to(k[..., None], (*k.shape, 7))
     first, last = (xp.take_along_axis(line, index, axis=1) for index in (spread, spread + 1))
     return poses.interpolate(first, last, share)
@@ -161,17 +163,17 @@ def _rounded(waypoints: Sequence[Array], blend: float, pieces: int = 6) -> tuple
         rounds = xp.minimum(into, out) >= 1e-6
         back = rounds & (poses.dot(coming, going) < SHARP * into * out)
         room = xp.where(straight, into, into / 2)
-        turned = xp.minimum(xp.minimum(0.0 * into + 2 * blend, room), out / 2)
-        first = xp.where(back, turned, xp.minimum(0.0 * into + blend, into / 2))
-        last = xp.where(back, turned, xp.minimum(0.0 * into + blend, out / 2))
+        turned = xp.minimum(xp.minimum(xp.full_like(into, 2 * blend), room), out / 2)
+        first = xp.where(back, turned, xp.minimum(xp.full_like(into, blend), into / 2))
+        last = xp.where(back, turned, xp.minimum(xp.full_like(into, blend), out / 2))
         reversal = xp.where(back, xp.minimum(reversal, first), reversal)
-        share_in = xp.where(rounds, first / xp.where(rounds, into, xp.ones_like(into)), 0.0 * into)
-        share_out = xp.where(rounds, last / xp.where(rounds, out, xp.ones_like(out)), 0.0 * out)
+        share_in = xp.where(rounds, first / xp.where(rounds, into, xp.ones_like(into)), xp.zeros_like(into))
+        share_out = xp.where(rounds, last / xp.where(rounds, out, xp.ones_like(out)), xp.zeros_like(out))
         a = xp.where(rounds[:, None], poses.interpolate(tip, corner, 1.0 - share_in), corner)
         b = xp.where(rounds[:, None], poses.interpolate(corner, after, share_out), corner)
         go(a)
         for j in range(1, pieces):  # quadratic Bezier curve (de Casteljau)
-            t = 0.0 * into + j / (pieces - 1)
+            t = xp.full_like(into, j / (pieces - 1))
             curve = poses.interpolate(poses.interpolate(a, corner, t), poses.interpolate(corner, b, t), t)
             curve = xp.where(rounds[:, None], curve, corner)
             way = poses.norm(curve[:, :3] - line[-1][:, :3])

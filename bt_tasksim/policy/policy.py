@@ -9,7 +9,7 @@ from bt_tasksim.core.poses import Array, array_namespace, clip
 from bt_tasksim.policy.files import PolicySlot as PolicySlot
 from bt_tasksim.policy.files import check_fits, load_policy
 from bt_tasksim.policy.library import PROGRAMMED as PROGRAMMED
-from bt_tasksim.policy.library import find_policy, folder_of_pinned, source_of
+from bt_tasksim.policy.library import find_policy, folder_of_pinned
 from bt_tasksim.policy.network import Network
 
 TERMINATE = 0.5
@@ -77,7 +77,6 @@ class ProgrammedPolicy:
     """The concept's own programmed action, done when its own goal state is observed."""
 
     name = PROGRAMMED
-    source = PROGRAMMED
 
     def act(self, model: Decidable[ViewT], seen: ViewT, memory: Any) -> Action:
         """See `Policy.act`."""
@@ -90,13 +89,11 @@ class LearnedPolicy:
     Args:
         network: From features to outputs.
         name: How results name it.
-        source: What a leaf names to get it again.
     """
 
-    def __init__(self, network: Network, name: str, source: str = "") -> None:
+    def __init__(self, network: Network, name: str) -> None:
         self.network = network
         self.name = name
-        self.source = source
 
     def act(self, model: Decidable[ViewT], seen: ViewT, memory: Any) -> Action:
         """See `Policy.act`; where the concept takes no decision, its reference motion goes on."""
@@ -121,8 +118,8 @@ def split_action(output: Array, signal_std: float = 0.0) -> Action:
 def done_share(signal: Array, std: float) -> Array:
     """How much nearer to done ``(...)`` a completion signal ``(...)`` brings a task; at 1 in all it is done.
 
-    In training the signal has noise of this ``deviation``: a task ends with some probability p at each
-    decision, which is learned. Without the noise it ends where it would have ended in half of all trainings:
+    In training the signal has noise of this ``std``: a task ends with some probability p at each decision,
+    which is learned. Without the noise it ends where it would have ended in half of all trainings:
     when the product of the 1 - p comes to 1/2, so each decision adds -log2(1 - p). A threshold on the signal
     itself would wait for ever where training waited some decisions more. With no std it is a boolean.
 
@@ -152,7 +149,7 @@ def named_policy(name: str | None, slot: PolicySlot) -> Policy:
         return ProgrammedPolicy()
     network, card = load_policy(folder)
     check_fits(card, folder, slot)
-    return LearnedPolicy(network, f"{folder.resolve().name}@{card.hash}", source_of(folder))
+    return LearnedPolicy(network, f"{folder.resolve().name}@{card.hash}")
 
 
 def concept_name(concept: type) -> str:

@@ -7,16 +7,15 @@ depends on its task alone.
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
-from bt_tasksim.policy.policy import split_action
+from bt_tasksim.training.endings import Ending
 
 ResultT = TypeVar("ResultT")
 
@@ -51,8 +50,7 @@ class EpisodeEnd(NamedTuple):
         success: The completion signal was right.
         decisions: How many it had.
         total: What it paid in all.
-        reason: A countable one: ``success``, ``discarded``, ``violated``, ``timeout``, ``follower failed``
-            or ``failed``.
+        reason: See `Ending.counted_as`.
     """
 
     success: bool
@@ -121,9 +119,9 @@ class RolloutTask:
     stage: int | None = None
     length: float = LENGTH
 
-    def collector(self) -> RolloutCollector:
-        """What is to be done, episode by episode."""
-        return RolloutCollector(self)
+    def collector(self, network: Network) -> RolloutCollector:
+        """What is to be done, episode by episode, with the task's network."""
+        return RolloutCollector(self, network)
 
 
 @dataclass(frozen=True)
@@ -138,9 +136,9 @@ class DrawTask:
     network: dict[str, Array]
     draw: int
 
-    def collector(self) -> DrawCollector:
-        """What is to be done, episode by episode."""
-        return DrawCollector(self)
+    def collector(self, network: Network) -> DrawCollector:
+        """What is to be done, episode by episode, with the task's network."""
+        return DrawCollector(self, network)
 
 
 class Collecting(abc.ABC):
@@ -156,17 +154,16 @@ class Collecting(abc.ABC):
 
     @abc.abstractmethod
     def action(self, features: Array, output: Array) -> Array:
-        """What is decided ``(m,)`` where features ``(n,)`` are seen, and the network says ``(m,)``."""
+        """What stands in for the network's outputs ``(m,)`` where features ``(n,)`` are seen."""
 
     @abc.abstractmethod
-    def paid(self, features: Array, reward: float, ending: Mapping[str, Any] | None, truncated: bool) -> None:
+    def paid(self, features: Array, reward: float, ending: Ending | None) -> None:
         """What the decision paid, and the features ``(n,)`` after it.
 
         Args:
             features: What is seen next; at an end what was seen last.
             reward: What was paid.
-            ending: What is said of the episode, where it is over.
-            truncated: It was cut off.
+            ending: How the episode ended, where it is over.
         """
 
     @abc.abstractmethod
@@ -182,14 +179,14 @@ class Collector(abc.ABC, Generic[ResultT]):
     """Collects what a task asks for, from one episode or several, of which some may go on side by side.
 
     Args:
-        network: Arrays of the policy's network.
+        network: The policy's network.
 
     Attributes:
-        network: It.
+        network: See there.
     """
 
-    def __init__(self, network: dict[str, Array]) -> None:
-        self.network = Network.from_arrays(network)
+    def __init__(self, network: Network) -> None:
+        self.network = network
 
     @abc.abstractmethod
     def next(self) -> Collecting | None:
@@ -216,10 +213,11 @@ class RolloutCollector(Collector[EnvironmentRollout]):
 
     Args:
         task: Which.
+        network: The policy's network.
     """
 
-    def __init__(self, task: RolloutTask) -> None:
-        super().__init__(task.network)
+    def __init__(self, task: RolloutTask, network: Network) -> None:
+        super().__init__(network)
         self._task = task
         self._episodes: list[RolloutEpisode] = []
         self._front, self._before = 0, 0  # of the episodes that are over, and so are all before them
@@ -344,13 +342,13 @@ class RolloutEpisode(Collecting):
         bounded: Array = np.minimum(np.maximum(action, -1.0), 1.0)
         return bounded
 
-    def paid(self, features: Array, reward: float, ending: Mapping[str, Any] | None, truncated: bool) -> None:
+    def paid(self, features: Array, reward: float, ending: Ending | None) -> None:
         """See `Collecting.paid`."""
         self.rewards.append(reward)
-        self.after, self.truncated = features, truncated
+        self.after = features
         if ending is not None:
-            total = sum(self.rewards)
-            self.end = EpisodeEnd(bool(ending["is_success"]), len(self.rewards), total, countable(ending))
+            total, self.truncated = sum(self.rewards), ending.truncated
+            self.end = EpisodeEnd(ending.is_success, len(self.rewards), total, ending.counted_as)
 
     def failed(self, error: Exception) -> None:
         """See `Collecting.failed`: it is raised when the episodes before are over, if it counts at all."""
@@ -362,10 +360,11 @@ class DrawCollector(Collector[DrawResult]):
 
     Args:
         task: Which.
+        network: The policy's network.
     """
 
-    def __init__(self, task: DrawTask) -> None:
-        super().__init__(task.network)
+    def __init__(self, task: DrawTask, network: Network) -> None:
+        super().__init__(network)
         self._task = task
         self._episode: DrawEpisode | None = None
 
@@ -373,7 +372,7 @@ class DrawCollector(Collector[DrawResult]):
         """See `Collector.next`."""
         if self._episode is not None:
             return None
-        self._episode = DrawEpisode(self._task.draw, self.network.signal_std)
+        self._episode = DrawEpisode(self._task.draw)
         return self._episode
 
     def counts(self, episode: Collecting) -> bool:
@@ -396,14 +395,13 @@ class DrawEpisode(Collecting):
 
     Args:
         draw: The seed of its world.
-        signal_std: Std of the completion signal's noise, see `bt_tasksim.policy.policy.done_share`.
 
     Attributes:
         result: What came of it; None: it goes on.
     """
 
-    def __init__(self, draw: int, signal_std: float) -> None:
-        self._draw, self._signal_std, self._nearer = draw, signal_std, 0.0
+    def __init__(self, draw: int) -> None:
+        self._draw = draw
         self.result: DrawResult | None = None
 
     def begin(self) -> Begin:
@@ -415,27 +413,15 @@ class DrawEpisode(Collecting):
 
     def action(self, features: Array, output: Array) -> Array:
         """See `Collecting.action`."""
-        motion, done = split_action(output, self._signal_std)
-        self._nearer += float(done)
-        return np.append(motion, 1.0 if self._nearer >= 1.0 else -1.0)
+        return output
 
-    def paid(self, features: Array, reward: float, ending: Mapping[str, Any] | None, truncated: bool) -> None:
+    def paid(self, features: Array, reward: float, ending: Ending | None) -> None:
         """See `Collecting.paid`."""
         if ending is not None:
-            self.result = DrawResult(self._draw, bool(ending["is_success"]), countable(ending))
+            self.result = DrawResult(self._draw, ending.is_success, ending.counted_as)
 
     def failed(self, error: Exception) -> None:
         """See `Collecting.failed`: a draw may have no episode."""
         if not isinstance(error, InputError):
             raise error
         self.result = DrawResult(self._draw, False, str(error))
-
-
-def countable(info: Mapping[str, Any]) -> str:
-    """A countable reason for the end of an episode."""
-    if info["is_success"]:
-        return "success"
-    if info["discarded"]:
-        return "discarded"
-    part = next((p for p in ("violated", "timeout") if info["reward"][p] != 0.0), "")
-    return part or ("follower failed" if info["status"] == "SUCCESS" else "failed")

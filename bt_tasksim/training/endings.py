@@ -46,6 +46,20 @@ class Ending:
         """An error spoiled the judgement."""
         return self.judged is not None and self.judged.discarded
 
+    @property
+    def counted_as(self) -> str:
+        """A word to count by.
+
+        It is ``success``, ``discarded``, ``violated``, ``timeout``, ``follower failed`` or ``failed``.
+        """
+        if self.is_success:
+            return "success"
+        if self.discarded:
+            return "discarded"
+        if self.end in ("violated", "timeout"):
+            return self.end
+        return "follower failed" if self.status == "SUCCESS" else "failed"
+
     def info(self, paid: dict[str, float]) -> dict[str, Any]:
         """What gymnasium's ``info`` says of an episode's last step.
 

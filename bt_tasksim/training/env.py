@@ -18,6 +18,7 @@ from bt_tasksim.policy.policy import Action, Policy, split_action
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.decision import Decision
 from bt_tasksim.training.drawn_worlds import Draws
+from bt_tasksim.training.endings import Ending
 from bt_tasksim.training.episode_batch import EpisodeBatch
 from bt_tasksim.training.happened import Happened
 from bt_tasksim.training.learning_leaves import checked_actions
@@ -92,6 +93,8 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         """Draws so far in which the subtree was never active."""
         self.discarded = 0
         """Episodes so far whose judgement an error spoiled."""
+        self.ending: Ending | None = None
+        """How the last episode that was over ended."""
 
     @property
     def decision(self) -> Decision | None:
@@ -166,5 +169,6 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         reward, ending = sum(found.paid.values()), found.ending
         if ending is None:
             return found.features, reward, False, False, {"reward": found.paid}
+        self.ending = ending
         self.discarded += ending.discarded
         return found.features, reward, not ending.truncated, ending.truncated, ending.info(found.paid)

@@ -16,6 +16,7 @@ import numpy as np
 from bt_tasksim.core.fleet import Fleet
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
+from bt_tasksim.policy.policy import Action, split_action
 from bt_tasksim.training.collectors import Collecting, Collector, DrawTask, RolloutTask
 from bt_tasksim.training.drawn_worlds import Draws
 from bt_tasksim.training.episode_batch import EpisodeBatch
@@ -46,8 +47,9 @@ def in_batch(batch: EpisodeBatch, tasks: Sequence[AnyTask], /) -> Iterator[tuple
     collectors: dict[int, Collector[Any]] = {}
     networks: dict[int, Network] = {}  # by the identity of their arrays, of which tasks share one
     for index, task in enumerate(tasks):
-        collectors[index] = task.collector()
-        collectors[index].network = networks.setdefault(id(task.network), collectors[index].network)
+        if id(task.network) not in networks:
+            networks[id(task.network)] = Network.from_arrays(task.network)
+        collectors[index] = task.collector(networks[id(task.network)])
     free = list(range(batch.count))[::-1]
     going: dict[int, tuple[int, Collecting]] = {}  # by world: a task and an episode of it
 
@@ -78,10 +80,7 @@ def in_batch(batch: EpisodeBatch, tasks: Sequence[AnyTask], /) -> Iterator[tuple
                 elif event.paid is None:
                     episode.began(event.redrawn)
                 else:
-                    reward = sum(event.paid.values())
-                    said = None if event.ending is None else event.ending.info(event.paid)
-                    truncated = event.ending is not None and event.ending.truncated
-                    episode.paid(event.features, reward, said, truncated)
+                    episode.paid(event.features, sum(event.paid.values()), event.ending)
                 if event.error is None and event.ending is None:
                     asked.append((event.row, event.features))
             for index in sorted(touched):
@@ -143,4 +142,5 @@ def _decide(
             going[row][1].action(features, output)
             for (row, features), output in zip(group, outputs, strict=True)
         ]
-        batch.decide(rows, np.stack(actions))
+        motion, terminate = split_action(np.stack(actions), network.signal_std)
+        batch.act(rows, Action(motion.astype(np.float64), terminate))

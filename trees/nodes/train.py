@@ -38,17 +38,10 @@ class Train(Decorator):
             raise InputError(f"'{child.name}' already has a parent, '{child.parent.name}': build a new one")
         super().__init__(name or f"train {child.name}", child)
         self.activations = 0
-        self.interrupted = False
 
     def initialise(self) -> None:
         """A new activation."""
         self.activations += 1
-        self.interrupted = False
-
-    def terminate(self, new_status: Status) -> None:
-        """Remember whether something outside has ended the activation."""
-        if new_status == Status.INVALID and self.status == Status.RUNNING:
-            self.interrupted = True
 
     def update(self) -> Status:
         """The child's status."""
@@ -110,24 +103,16 @@ class BatchTrain(PassesOn):
 
     Attributes:
         activations: ``(N,)`` how often it has begun.
-        interrupted: boolean ``(N,)``: something outside has ended the last activation.
     """
 
     def __init__(self, place: NodePlace) -> None:
         super().__init__(place)
         self.activations = self.arrays.full(0, "int64")
-        self.interrupted = self.arrays.full(False, "bool")
 
     def tick(self, rows: Array) -> None:
         """Count activations."""
-        begins = self.begins(rows)
-        self.activations[begins] += 1
-        self.interrupted[begins] = False
+        self.activations[self.begins(rows)] += 1
         super().tick(rows)
-
-    def stopped(self, rows: Array) -> None:
-        """Remember that something outside has ended the activation."""
-        self.interrupted[rows] = True
 
 
 def _inherits_layout(cls: type[ConceptFunctions]) -> bool:

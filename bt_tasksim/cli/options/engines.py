@@ -82,7 +82,10 @@ class EngineFlags:
         ),
     ] = "auto"
     noise: Annotated[
-        str, typer.Option(metavar="N", help="Error of the pose estimates: fine, none, original, hard.")
+        str,
+        typer.Option(
+            metavar="N", help="Error of the pose estimates: fine, none, original, hard, or a plugin's."
+        ),
     ] = "fine"
     safety: Annotated[
         bool, typer.Option("--safety", help="Apply the robot's safety limits in simulation, too.")

@@ -391,13 +391,15 @@ class InverseKinematics:
             moved = self._step(jacobian * free[:, None, ...], left, damping, pull * free) * free
             moved = moved * (_LONGEST / at_least(_largest(moved), _LONGEST))
             step = moved + held
-            excess = xp.where(free > 0.0, xp.maximum(q + step - self._upper, self._lower - q - step), 0.0 * q)
+            excess = xp.where(
+                free > 0.0, xp.maximum(q + step - self._upper, self._lower - q - step), xp.zeros_like(q)
+            )
             worst = joint == xp.argmax(excess, axis=0)
             sets = worst & (excess > 0.0)
             if not some(sets):
                 break
             limit = xp.where(step > 0.0, self._upper - q, self._lower - q)
-            step, free = xp.where(sets, limit, step), xp.where(sets, 0.0 * free, free)
+            step, free = xp.where(sets, limit, step), xp.where(sets, xp.zeros_like(free), free)
         return xp.minimum(xp.maximum(q + step, self._lower), self._upper)
 
     def _error(self, seen: Array, goal: Array) -> Array:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from bt_tasksim.core.poses import Array, array_namespace, host, indices
-from bt_tasksim.core.transfer import Index
+from bt_tasksim.core.transfer import Index, spliced
 
 
 def where_true(mask: Array) -> np.ndarray:
@@ -17,13 +17,13 @@ def where_true(mask: Array) -> np.ndarray:
 
 def taken(array: Array, rows: np.ndarray) -> Array:
     """The named rows ``(..., k)`` of an array ``(..., N)``."""
-    return _picked(array, Index(rows))
+    return Index(rows).along(array, -1)
 
 
 def taken_of(arrays: Iterable[Array], rows: np.ndarray) -> list[Array]:
     """`taken` of several arrays."""
     index = Index(rows)
-    return [_picked(array, index) for array in arrays]
+    return [index.along(array, -1) for array in arrays]
 
 
 def put(array: Array, rows: np.ndarray, values: Array) -> Array:
@@ -33,14 +33,7 @@ def put(array: Array, rows: np.ndarray, values: Array) -> Array:
 
 def put_in(arrays: Sequence[Array], rows: np.ndarray, values: Sequence[Array]) -> list[Array]:
     """`put` of several arrays of as many rows."""
-    n = arrays[0].shape[-1]
-    source = np.arange(n)
-    source[rows] = n + np.arange(len(rows))
-    index = Index(source)
-    return [
-        _picked(array_namespace(old, new).concat([old, new], axis=-1), index)
-        for old, new in zip(arrays, values, strict=True)
-    ]
+    return spliced(arrays, rows, values, axis=-1)
 
 
 def joined(pieces: Sequence[Sequence[Array]], rows: Sequence[np.ndarray]) -> list[Array]:
@@ -48,16 +41,8 @@ def joined(pieces: Sequence[Sequence[Array]], rows: Sequence[np.ndarray]) -> lis
     if len(pieces) == 1:
         return list(pieces[0])
     index = Index(np.argsort(np.concatenate(rows)))
-    return [
-        _picked(array_namespace(*parts).concat(list(parts), axis=-1), index)
-        for parts in zip(*pieces, strict=True)
-    ]
-
-
-def _picked(array: Array, index: Index) -> Array:
-    if type(array) is np.ndarray:
-        return array.take(index.rows, axis=-1)
-    return array_namespace(array).take(array, index.on(array), axis=-1)
+    whole = (array_namespace(*parts).concat(list(parts), axis=-1) for parts in zip(*pieces, strict=True))
+    return [index.along(array, -1) for array in whole]
 
 
 def columns(array: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant, host
-from bt_tasksim.core.transfer import Index
+from bt_tasksim.core.transfer import Index, spliced
 from bt_tasksim.core.world import Observation, WorldState
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -144,7 +144,7 @@ class BatchObservations:
         self._surfaces = Surfaces(worlds)  # a new one: older observations go on with theirs
         if self._last is not None:
             none = np.full(len(configurations), np.nan)
-            time = put_rows(self._last.time, np.asarray(rows, int), constant(none, self._last.time))
+            time = spliced([self._last.time], np.asarray(rows, int), [constant(none, self._last.time)])[0]
             self._last = self._last._replace(time=time)
 
     def build(self, state: WorldState, estimate: Array, rows: np.ndarray | None = None) -> Observation:
@@ -182,7 +182,7 @@ class BatchObservations:
             if rows is None:
                 return motion(before, now)
             picked = Index(rows)
-            return motion(Instant(*(_picked(x, picked) for x in before)), now)
+            return motion(Instant(*(picked.along(x, 0) for x in before)), now)
 
         return LazyObservation.of(known, lambda: contact_points(surfaces, index, now, tips), moved)
 
@@ -223,8 +223,7 @@ def _merged(before: Instant | None, now: Instant, rows: np.ndarray, n: int) -> I
         before = Instant(*(xp.full((n, *x.shape[1:]), xp.nan, dtype=x.dtype, device=x.device) for x in now))
     most = max(before.objects.shape[1], now.objects.shape[1])
     before, now = (i._replace(objects=widened(i.objects, most)) for i in (before, now))
-    index = Index(_source(n, rows))
-    return Instant(*(_picked(_both(old, new), index) for old, new in zip(before, now, strict=True)))
+    return Instant(*spliced(before, rows, now))
 
 
 def widened(objects: Array, most: int) -> Array:
@@ -235,31 +234,6 @@ def widened(objects: Array, most: int) -> Array:
     xp = array_namespace(objects)
     none = xp.full((k, most - n, 7), xp.nan, dtype=objects.dtype, device=objects.device)
     return xp.concat([objects, none], axis=1)
-
-
-def rows_of(array: Array, rows: np.ndarray) -> Array:
-    """The named rows ``(k, ...)`` of an array ``(n, ...)``."""
-    return _picked(array, Index(rows))
-
-
-def _picked(array: Array, index: Index) -> Array:
-    return array_namespace(array).take(array, index.on(array), axis=0)
-
-
-def put_rows(array: Array, rows: np.ndarray, values: Array) -> Array:
-    """An array ``(n, ...)`` whose named rows are ``values (k, ...)``."""
-    return rows_of(_both(array, values), _source(array.shape[0], rows))
-
-
-def _both(array: Array, values: Array) -> Array:
-    return array_namespace(array).concat([array, values], axis=0)
-
-
-def _source(n: int, rows: np.ndarray) -> np.ndarray:
-    """Where each of ``n`` rows comes from once ``rows (k,)`` are behind the ``n`` old ones."""
-    source = np.arange(n)
-    source[rows] = n + np.arange(len(rows))
-    return source
 
 
 class LazyObservation(Observation):

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import part, register
 
 
 @dataclass(frozen=True)
 class NoiseModel:
     """Error of an object's estimated pose: one draw for each object and episode, fixed to the object.
+
+    A subclass may draw otherwise.
 
     Attributes:
         name: Its name.
@@ -40,16 +43,15 @@ class NoiseModel:
         return np.concatenate([t * np.array(self.position), rotation], axis=-1)
 
 
-NOISE = {
-    model.name: model
-    for model in (
-        NoiseModel("none", (0.0, 0.0, 0.0), 0.0),
-        NoiseModel("fine", (0.002, 0.002, 0.002), float(np.deg2rad(2.0))),
-        # Source: the released original's grasp training, task-sequencing-robotics-simulator.
-        NoiseModel("original", (0.005, 0.005, 0.02), 0.06, uniform=True),
-        NoiseModel("hard", (0.008, 0.008, 0.015), 0.06),
-    )
-}
+def register_noise(model: NoiseModel) -> NoiseModel:
+    """Announce a noise model under its name.
+
+    Raises:
+        InputError: Another module has registered another one under it.
+    """
+    module = str(sys._getframe(1).f_globals.get("__name__", ""))
+    object.__setattr__(model, "__qualname__", model.name)  # by which the registry knows a repeated definition
+    return register("noise model", model.name, module)(model)
 
 
 def noise_model(name: str) -> NoiseModel:
@@ -58,7 +60,12 @@ def noise_model(name: str) -> NoiseModel:
     Raises:
         InputError: There is no such model.
     """
-    try:
-        return NOISE[name]
-    except KeyError:
-        raise InputError(f"unknown noise model '{name}'{nearest(name, NOISE)}") from None
+    found: NoiseModel = part("noise model", name)
+    return found
+
+
+register_noise(NoiseModel("none", (0.0, 0.0, 0.0), 0.0))
+register_noise(NoiseModel("fine", (0.002, 0.002, 0.002), float(np.deg2rad(2.0))))
+# Source: the released original's grasp training, task-sequencing-robotics-simulator.
+register_noise(NoiseModel("original", (0.005, 0.005, 0.02), 0.06, uniform=True))
+register_noise(NoiseModel("hard", (0.008, 0.008, 0.015), 0.06))

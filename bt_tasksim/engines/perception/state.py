@@ -11,14 +11,13 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
+from bt_tasksim.core.transfer import Index, spliced
 from bt_tasksim.core.world import Observation, WorldModel, WorldState
 from bt_tasksim.engines.base import EngineSetup, PostProcessEngine
 from bt_tasksim.engines.images import Image
 from bt_tasksim.engines.perception.features import (
     BatchObservations,
     alone,
-    put_rows,
-    rows_of,
     widened,
     with_axis,
 )
@@ -103,7 +102,7 @@ class BatchState:
             self._look(state.objects, index)
         assert self._local is not None
         most = state.objects.shape[1]  # more than anybody has looked at, where a world did not begin
-        local = widened(self._local if rows is None else rows_of(self._local, rows), most)
+        local = widened(self._local if rows is None else Index(rows).along(self._local, 0), most)
         estimate = poses.multiply(state.objects, local[:, :most, :])
         return self._builder.build(state, estimate, rows)
 
@@ -116,11 +115,11 @@ class BatchState:
         for i, row in enumerate(new):
             error = self._errors[row]
             drawn[i, : len(error)] = error
-        local = _error_in_object(rows_of(objects, at), constant(drawn, objects))
+        local = _error_in_object(Index(at).along(objects, 0), constant(drawn, objects))
         if self._local is None:
             self._local = constant(np.full((self.n, most, 7), np.nan), objects)
         self._local = widened(self._local, most)
-        self._local = put_rows(self._local, new, widened(local, self._local.shape[1]))
+        self._local = spliced([self._local], new, [widened(local, self._local.shape[1])])[0]
         self._unseen[new] = False
 
 

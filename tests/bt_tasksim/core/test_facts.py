@@ -8,7 +8,10 @@ import pytest
 from bt_tasksim.core import poses
 from bt_tasksim.core.columns import filled
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.facts import FactArrays, FactsTable, WorldFacts, joined, rotations, take_rows
+from bt_tasksim.core.fact_arrays import FactArrays, take_rows
+from bt_tasksim.core.fact_making import rotations
+from bt_tasksim.core.facts import WorldFacts, joined
+from bt_tasksim.core.facts_table import FactsTable
 from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import ObjectModel, Obstacle, PlaceModel, WorldModel
 from tests.array_libraries import agree

@@ -8,9 +8,12 @@ from toys import SCENE, Check, Even, Raise, Unprogrammed, alone
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.policy.network import Network
+from bt_tasksim.policy.policy import done_share
 from bt_tasksim.training.collectors import DrawTask, RolloutTask
+from bt_tasksim.training.endings import Ending
 from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.episode_batch import EpisodeBatch
+from bt_tasksim.training.judge import FOLLOWED, SignalOutcome
 from bt_tasksim.training.rollouts import in_batch, results
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.nodes.train import Train
@@ -104,18 +107,21 @@ def test_episodes_of_one_environment_go_on_side_by_side(maker):
     assert len(batch.waiting) == 0, "those that go on beyond are left"
 
 
+RIGHT = SignalOutcome(True, "SUCCESS", FOLLOWED(node="it"))
+GOOD = Ending("success", RIGHT.outcome, False, True, RIGHT, "SUCCESS", 1.0)
+
+
 def played(episode, decisions, ends=True):
     """An episode of so many decisions, in no world; the number is what is seen, decided and paid."""
     assert episode.begin().stream == "training"
     episode.began(0)
     for k in range(decisions):
         episode.action(np.full(3, k, np.float32), np.zeros(2, np.float32))
-        said = {"is_success": True} if ends and k == decisions - 1 else None
-        episode.paid(np.full(3, k + 1, np.float32), float(k), said, False)
+        episode.paid(np.full(3, k + 1, np.float32), float(k), GOOD if ends and k == decisions - 1 else None)
 
 
 def test_an_episode_that_ran_on_is_cut_where_the_environment_ends():
-    collector = environment(0, decisions=10, length=4.0).collector()
+    collector = environment(0, decisions=10, length=4.0).collector(Network.from_arrays(UP))
     first, second, third = (collector.next() for _ in range(3))
     played(second, 9, ends=False)
     played(third, 3)
@@ -132,7 +138,7 @@ def test_an_episode_that_ran_on_is_cut_where_the_environment_ends():
 
 def test_an_episode_that_there_is_not_is_an_error_only_where_it_counts():
     for decisions, raised in ((8, False), (9, True)):
-        collector = environment(0, decisions=decisions, length=4.0).collector()
+        collector = environment(0, decisions=decisions, length=4.0).collector(Network.from_arrays(UP))
         first, second = collector.next(), collector.next()
         second.failed(InputError("there is none"))
         assert not collector.done
@@ -153,6 +159,16 @@ def test_held_apart_draws_are_judged_without_noise_and_apart(maker):
     assert [won for _, won, _ in found] == reached and 0 < sum(reached) < 8
     assert all("was not reached" in why for _, won, why in found if not won)
     assert [alone(env, task) for task in tasks[::-1]] == found[::-1]
+
+
+def test_in_a_held_apart_draw_each_leaf_adds_up_its_own_signals(maker):
+    """As in a tree that runs: what the first leaf's signals come to is not the second one's."""
+    hints = Network(np.zeros(3), np.ones(3), [(np.zeros((2, 3)), np.array([0.0, 0.2]))], signal_std=0.4)
+    each = np.ceil(1.0 / done_share(np.float32(0.2), 0.4))
+    leaves = Raise(name="first"), Raise(name="second")
+    batch = kept(Train(sequence("i", *leaves)), worlds=2)
+    list(in_batch(batch, [DrawTask(hints.arrays(), 0)]))
+    assert [len(leaf.log) for leaf in leaves] == [each, each] and each > 2
 
 
 def test_a_worker_that_finds_an_error_says_it(maker):

@@ -20,6 +20,8 @@ from bt_tasksim.core.units import METRES
 from bt_tasksim.core.world import Command, Hidden
 from bt_tasksim.execution import worlds
 from bt_tasksim.execution.pipeline_worlds import PipelineWorlds
+from bt_tasksim.policy.network import Network
+from bt_tasksim.policy.policy import Action, split_action
 
 _spec = importlib.util.spec_from_file_location("toy_world", Path(__file__).parents[2] / "conftest.py")
 _shared = importlib.util.module_from_spec(_spec)
@@ -314,7 +316,7 @@ def play(env: Any, decide: Any, seed: int | None = 0) -> tuple[list[float], bool
 
 def alone(env: Any, task: Any) -> Any:
     """The result of a task of `bt_tasksim.training.collectors`, in an environment of its own."""
-    collector = task.collector()
+    collector = task.collector(Network.from_arrays(task.network))
     while not collector.done:
         episode = collector.next()
         wanted = episode.begin()
@@ -329,9 +331,10 @@ def alone(env: Any, task: Any) -> Any:
         over = False
         while not over:
             action = episode.action(features, collector.network(features))
-            features, reward, terminated, truncated, info = env.step(action)
+            motion, done = split_action(np.asarray(action)[None], collector.network.signal_std)
+            features, reward, terminated, truncated, _ = env.act(Action(np.asarray(motion, float), done))
             ended = terminated or truncated
-            episode.paid(features, reward, info if ended else None, truncated)
+            episode.paid(features, reward, env.ending if ended else None)
             over = ended or collector.done
     return collector.result()
 

@@ -51,7 +51,6 @@ class WarpGroup:
         self._free: list[int] = []
         self._main: WarpWorlds | None = None
         self._sides: dict[int, WarpWorlds] = {}
-        self.com = np.array(first.world.model.body_ipos[first.world.object_body])
 
     @property
     def room(self) -> int:

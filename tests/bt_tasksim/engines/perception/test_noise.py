@@ -5,13 +5,14 @@ import pytest
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.engines.perception.noise import NOISE, noise_model
+from bt_tasksim.core.registry import parts
+from bt_tasksim.engines.perception.noise import noise_model
 
 N = 20000
 
 
 def draws(name, seed=0):
-    return NOISE[name].draw(np.random.default_rng(seed), N)
+    return noise_model(name).draw(np.random.default_rng(seed), N)
 
 
 def test_none_is_none():
@@ -34,7 +35,7 @@ def test_original_is_uniform_and_hard_is_normal():
     assert np.allclose(draws("hard")[:, :3].std(axis=0), [0.008, 0.008, 0.015], rtol=0.03)
 
 
-@pytest.mark.parametrize("name", sorted(NOISE))
+@pytest.mark.parametrize("name", sorted(parts("noise model")))
 def test_the_generator_alone_decides(name):
     assert np.array_equal(draws(name, 3), draws(name, 3))
     assert name == "none" or not np.array_equal(draws(name, 3), draws(name, 4))
