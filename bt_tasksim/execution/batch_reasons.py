@@ -1,8 +1,4 @@
-"""Why a tree ended as it did in one world of a batch: made from the arrays when somebody asks.
-
-Each function is what one of the same name says of a tree of py_trees, see `bt_tasksim.concept.reporting`
-and `bt_tasksim.trees.nodes.pass_through`.
-"""
+"""Why a tree ended as it did in one world of a batch: made from the arrays when somebody asks."""
 
 from __future__ import annotations
 
@@ -10,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept.reporting import Reporting, as_statement, outcome_of
+from bt_tasksim.concept.reporting import BEHAVIOURS, Sayings
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, BatchLeaf
-from bt_tasksim.core.outcomes import FAILED, Outcome, Statement
+from bt_tasksim.core.outcomes import Outcome, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.world_by_world import BelowUnknown, WorldByWorld
 from bt_tasksim.trees.nodes.batch import BatchNode
@@ -35,87 +31,89 @@ class BatchReasons:
         compiled: Mapping[int, BatchNode | BatchLeaf],
         status: Sequence[Array],
     ) -> None:
-        self._nodes, self._children, self._compiled, self._status = nodes, children, compiled, status
-        self._parents = {child: node for node, below in enumerate(children) for child in below}
+        self.nodes, self.children, self.compiled, self.status = nodes, children, compiled, status
+        self.parents = {child: node for node, below in enumerate(children) for child in below}
 
     def name(self, node: int) -> str:
         """A node's name."""
-        return self._nodes[node].name
+        return self.nodes[node].name
 
     def tip(self, node: int, row: int) -> int | None:
-        """The deepest node that was decided last, at or below a node; None where it is not active."""
+        """See `Sayings.tip`."""
+        return WorldSayings(self, row).tip(node)
+
+    def outcome_of(self, node: int, row: int) -> Outcome | None:
+        """See `Sayings.outcome_of`."""
+        return WorldSayings(self, row).outcome_of(node)
+
+    def said_by(self, node: int, row: int) -> Statement | None:
+        """See `Sayings.said_by`."""
+        return WorldSayings(self, row).said_by(node)
+
+    def said_below(self, node: int, row: int) -> Statement | None:
+        """See `Sayings.said_below`."""
+        return WorldSayings(self, row).said_below(node)
+
+    def speaker(self, node: int, row: int) -> int | None:
+        """See `Sayings.speaker`."""
+        return WorldSayings(self, row).speaker(node)
+
+    def whole_outcome(self, node: int, row: int) -> Outcome | None:
+        """See `Sayings.whole_outcome`."""
+        return WorldSayings(self, row).whole_outcome(node)
+
+
+class WorldSayings(Sayings[int]):
+    """What nodes say in one world of a batch.
+
+    Args:
+        batch: Of all worlds.
+        row: Which world.
+    """
+
+    def __init__(self, batch: BatchReasons, row: int) -> None:
+        self._batch, self._row = batch, row
+
+    def tip(self, node: int) -> int | None:
+        """See `Sayings.tip`."""
+        batch, row = self._batch, self._row
         while True:
-            found = self._compiled[node]
+            found = batch.compiled[node]
             if isinstance(found, WorldByWorld | BelowUnknown):
                 below = found.tip(row)
                 return None if below is None else node + below
             current = found.current(row) if isinstance(found, BatchNode) else None
             if current is None:
-                return node if int(self._status[node][row]) != INVALID else None
-            node = self._children[node][current]
+                return node if int(batch.status[node][row]) != INVALID else None
+            node = batch.children[node][current]
 
-    def outcome_of(self, node: int, row: int) -> Outcome | None:
-        """What a node says itself; words of one that has failed are `FAILED`."""
-        ticked = self._ticked(node, row)
+    def failed(self, node: int) -> bool:
+        """See `Sayings.failed`."""
+        return int(self._batch.status[node][self._row]) == FAILURE
+
+    def says(self, node: int) -> Statement | None:
+        """See `Sayings.says`."""
+        found, ticked = self._batch.compiled[node], self._ticked(node)
         if ticked is not None:
-            return outcome_of(ticked)
-        said = self._says(node, row)
-        if said is None or isinstance(said, Outcome):
-            return said
-        words = said.sentence
-        return FAILED(text=words) if words and int(self._status[node][row]) == FAILURE else None
+            return BEHAVIOURS.says(ticked)
+        return found.says(self._row) if isinstance(found, BatchNode) else found.outcome(self._row)
 
-    def said_by(self, node: int, row: int) -> Statement | None:
-        """What a node says itself."""
-        outcome = self.outcome_of(node, row)
-        ticked = self._ticked(node, row)
+    def below(self, node: int) -> Sequence[int]:
+        """See `Sayings.below`."""
+        return self._batch.children[node]
+
+    def above(self, node: int) -> int | None:
+        """See `Sayings.above`."""
+        return self._batch.parents.get(node)
+
+    def adds(self, node: int, outcome: Outcome) -> Outcome:
+        """See `Sayings.adds`."""
+        found, ticked = self._batch.compiled[node], self._ticked(node)
         if ticked is not None:
-            return outcome or as_statement(ticked.feedback_message)
-        said = self._says(node, row) if outcome is None else None
-        return outcome if said is None else as_statement(said.sentence)
+            return BEHAVIOURS.adds(ticked, outcome)
+        return found.adds(self._row, outcome) if isinstance(found, BatchNode) else outcome
 
-    def said_below(self, node: int, row: int) -> Statement | None:
-        """What the deepest node says that has something to say."""
-        tip = self.tip(node, row)
-        return (self.said_by(tip, row) if tip is not None else None) or self.said_by(node, row)
-
-    def speaker(self, node: int, row: int) -> int | None:
-        """The node, at or below one that has failed, that made it fail: decided last, with words to say."""
-        found = self.tip(node, row)
-        if found is not None and self._has_words(found, row):
-            return found
-        ahead = [node]
-        while ahead:
-            below = ahead.pop()
-            if int(self._status[below][row]) == FAILURE and self._has_words(below, row):
-                return below
-            ahead.extend(self._children[below])
-        return found
-
-    def whole_outcome(self, node: int, row: int) -> Outcome | None:
-        """What a node that has failed says, with what the nodes above it have to add."""
-        outcome = self.outcome_of(node, row)
-        while outcome is not None and node in self._parents:
-            node = self._parents[node]
-            above, ticked = self._compiled[node], self._ticked(node, row)
-            if isinstance(above, BatchNode):
-                outcome = above.adds(row, outcome)
-            elif isinstance(ticked, Reporting):
-                outcome = ticked.seen_from_here(outcome)
-        return outcome
-
-    def _says(self, node: int, row: int) -> Statement | None:
-        found = self._compiled[node]
-        return found.says(row) if isinstance(found, BatchNode) else found.outcome(row)
-
-    def _ticked(self, node: int, row: int) -> Behaviour | None:
+    def _ticked(self, node: int) -> Behaviour | None:
         """The node itself, where py_trees ticks it in this world."""
-        found = self._compiled[node]
-        return found.behaviour(row) if isinstance(found, WorldByWorld | BelowUnknown) else None
-
-    def _has_words(self, node: int, row: int) -> bool:
-        ticked = self._ticked(node, row)
-        if ticked is not None:
-            return bool(ticked.feedback_message)
-        said = self._says(node, row)
-        return said is not None and bool(said.sentence)
+        found = self._batch.compiled[node]
+        return found.behaviour(self._row) if isinstance(found, WorldByWorld | BelowUnknown) else None

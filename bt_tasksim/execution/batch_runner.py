@@ -298,7 +298,8 @@ class BatchRunner:
             worlds = [self.scene.sample(seed, stream) for _, seed in drawn]
             self._episodes_of(drawn, worlds)
             taken = np.array([row for row, _ in drawn])
-            failed = self.worlds.reset(taken, worlds)
+            self.worlds.reset(taken, worlds)
+            failed = self.worlds.errors(taken)
             for row, seed in drawn:
                 if row in failed:
                     self._phase[row], self._episodes[row] = IDLE, None

@@ -37,7 +37,7 @@ class PipelineWorlds(Worlds):
         """See `Worlds.source`: the physics engine may bring its own world."""
         return self.pipeline.worlds(scene)
 
-    def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> dict[int, BtTasksimError]:
+    def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> None:
         """See `Worlds.reset`."""
         for configuration in configurations:
             model = configuration.world_model(self._tips, self._robot.opening)
@@ -46,7 +46,6 @@ class PipelineWorlds(Worlds):
                 self._seen = self.pipeline.reset(configuration, model)
             except BtTasksimError as error:
                 self._error = error
-        return self.errors(rows)
 
     def errors(self, rows: Array) -> dict[int, BtTasksimError]:
         """See `Worlds.errors`."""

@@ -133,16 +133,12 @@ class Worlds(ABC):
         return scene
 
     @abstractmethod
-    def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> dict[int, BtTasksimError]:
-        """Fresh worlds at these rows ``(k,)``; `observe` comes next.
-
-        Returns:
-            Why some of them could not begin, by row.
-        """
+    def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> None:
+        """Fresh worlds at these rows ``(k,)``; `observe` comes next, where `errors` has none."""
 
     @abstractmethod
     def errors(self, rows: Array) -> dict[int, BtTasksimError]:
-        """Why worlds have failed, by row."""
+        """Why worlds among ``rows (k,)`` could not begin, or have failed since they began, by row."""
 
     @abstractmethod
     def observe(self, rows: Array) -> Observation:
@@ -222,6 +218,7 @@ class BatchWorlds(Worlds):
         self.kinematics = BatchKinematics.of(robot, count, self._like)
         self._arm = PinocchioKinematics(robot)
         self._perception = BatchState(robot, count, noise_model(options.noise))
+        self._unplaced: dict[int, BtTasksimError] = {}
         self._tool = self._nobody(7)
         self._hand = self._nobody(1 + len(robot.synergies))
 
@@ -231,16 +228,18 @@ class BatchWorlds(Worlds):
         shape = (self.count, width)
         return array_namespace(like).full(shape, np.nan, dtype=like.dtype, device=like.device)
 
-    def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> dict[int, BtTasksimError]:
+    def reset(self, rows: Array, configurations: Sequence[ActorConfiguration]) -> None:
         """See `Worlds.reset`."""
         placed, failed = self._placed(rows, configurations)
+        for row in rows.tolist():
+            self._unplaced.pop(row, None)
+        self._unplaced |= failed
         self.physics.reset(rows, placed)
         self.kinematics.reset(rows, placed)
         self._perception.reset(rows, placed)
         index = Index(np.asarray(rows))
         index.put(self._tool, np.nan)
         index.put(self._hand, np.nan)
-        return failed | self.errors(rows)
 
     def _placed(
         self, rows: Array, configurations: Sequence[ActorConfiguration]
@@ -266,8 +265,11 @@ class BatchWorlds(Worlds):
 
     def errors(self, rows: Array) -> dict[int, BtTasksimError]:
         """See `Worlds.errors`."""
-        found = ((row, self.physics.errors[row]) for row in rows.tolist())
-        return {row: error for row, error in found if error is not None}
+        numbers = rows.tolist()
+        found = {row: error for row in numbers if (error := self.physics.errors[row]) is not None}
+        if self._unplaced:
+            found = {row: error for row in numbers if (error := self._unplaced.get(row)) is not None} | found
+        return found
 
     def observe(self, rows: Array) -> Observation:
         """See `Worlds.observe`."""

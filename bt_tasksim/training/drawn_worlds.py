@@ -83,7 +83,8 @@ class DrawnWorlds:
         rows, tips = np.array(list(drawn), int), [tip.name for tip in self._robot.tips]
         worlds = list(drawn.values())
         self._context.begin([world.world_model(tips, self._robot.opening) for world in worlds], rows)
-        return self._engines.reset(rows, worlds)
+        self._engines.reset(rows, worlds)
+        return self._engines.errors(rows)
 
     def step(self, rows: Array) -> dict[int, BtTasksimError]:
         """One control period in worlds ``(k,)``, with what was written there: which have failed, and why.

@@ -5,8 +5,8 @@ bt-tasksim evaluate examples/maniskill/pick_cube.py --engines maniskill:PickCube
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Wait
-from bt_tasksim.trees import sequence
+from concept_nodes import Bring, Grasp, Pick, Wait
+from trees import sequence
 
 
 def build() -> Behaviour:

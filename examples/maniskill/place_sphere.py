@@ -5,8 +5,8 @@ bt-tasksim evaluate examples/maniskill/place_sphere.py --engines maniskill:Place
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place, Release
-from bt_tasksim.trees import sequence
+from concept_nodes import Bring, Grasp, Pick, Place, Release
+from trees import sequence
 
 
 def build() -> Behaviour:

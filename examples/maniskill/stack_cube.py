@@ -5,8 +5,8 @@ bt-tasksim evaluate examples/maniskill/stack_cube.py --engines maniskill:StackCu
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place, Release, Wait
-from bt_tasksim.trees import fallback, sequence
+from concept_nodes import Bring, Grasp, Pick, Place, Release, Wait
+from trees import fallback, sequence
 
 
 def grasp(cube: str) -> Behaviour:

@@ -5,8 +5,8 @@ bt-tasksim evaluate examples/maniskill/stack_pyramid.py --engines maniskill:Stac
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place, Release, Wait
-from bt_tasksim.trees import sequence
+from concept_nodes import Bring, Grasp, Pick, Place, Release, Wait
+from trees import sequence
 
 
 def put(cube: str, place: str) -> Behaviour:

@@ -8,7 +8,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from bt_tasksim.concept.reporting import Reporting
+from bt_tasksim.concept.reporting import Reporting, said_below
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import Statement, register_reason
 from bt_tasksim.core.poses import Array
@@ -16,7 +16,6 @@ from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
 from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, SUCCESS, BatchNode, NodePlace
-from bt_tasksim.trees.nodes.pass_through import said_below
 
 CHILDREN_FAILED = register_reason(
     "children_failed",

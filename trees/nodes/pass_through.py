@@ -11,8 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
-from bt_tasksim.concept.reporting import Reporting, as_statement, outcome_of
-from bt_tasksim.core.outcomes import Statement
+from bt_tasksim.concept.reporting import Reporting
 
 
 class PassThrough(Reporting, Decorator):
@@ -29,14 +28,3 @@ def end_tick(node: Decorator, status: Status) -> Iterator[Behaviour]:
         node.stop(status)
     node.status = status
     yield node
-
-
-def said_below(node: Behaviour) -> Statement | None:
-    """What the deepest node says that has something to say."""
-    tip = node.tip()
-    return (said_by(tip) if tip is not None else None) or said_by(node)
-
-
-def said_by(node: Behaviour) -> Statement | None:
-    """What a node says itself."""
-    return outcome_of(node) or as_statement(node.feedback_message)

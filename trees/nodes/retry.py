@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_tasksim.concept.reporting import said_below
 from bt_tasksim.core.outcomes import Outcome, Statement, register_reason
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
@@ -14,7 +15,6 @@ from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
 from bt_tasksim.trees.nodes.batch import FAILURE, NodePlace
 from bt_tasksim.trees.nodes.causes import Cause, batch_cause_of, cause_of, summary
-from bt_tasksim.trees.nodes.pass_through import said_below
 from bt_tasksim.trees.nodes.rounds import BatchRounds, Rounds
 
 ATTEMPT_FAILED = register_reason(

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_tasksim.concept.reporting import said_below
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.trees.nodes.batch import RUNNING, BatchNode, NodePlace
-from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick, said_below
+from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick
 
 
 class Rounds(PassThrough, abc.ABC):

@@ -5,10 +5,11 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_tasksim.concept.reporting import said_by
 from bt_tasksim.core.outcomes import Statement
 from bt_tasksim.trees.nodes.base import free_children
 from bt_tasksim.trees.nodes.batch import NodePlace, PassesOn
-from bt_tasksim.trees.nodes.pass_through import PassThrough, said_by
+from bt_tasksim.trees.nodes.pass_through import PassThrough
 
 
 class SubTree(PassThrough):

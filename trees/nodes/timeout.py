@@ -13,13 +13,14 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import not_set_up
+from bt_tasksim.concept.reporting import said_below
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import TIMED_OUT, Form, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
 from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, NodePlace, PassesOn
-from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick, said_below
+from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick
 
 AT_WORK = Form("'{node}' was at work")
 SLACK = 1e-9

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -113,5 +114,24 @@ def evaluate(
         tell(stop.evaluation)
         raise
     tell(found)
+    if not found.successes and (own := _own_concepts(tree.tree)):
+        say(f"  none succeeded: 'bt-tasksim check {own}' tries the concepts in it, and says what to mend")
     if json_ is not None:
         say(f"wrote {json_}")
+
+
+def _own_concepts(tree: str) -> str:
+    """The file of a tree, or else of a plugin, that defines concepts of its own; empty where none does."""
+    from bt_tasksim.concept.model import ConceptModel
+    from bt_tasksim.core.plugins import load_plugin, loaded
+    from bt_tasksim.trees.load import tree_module
+
+    files = {plugin: load_plugin(plugin) for plugin in loaded() if plugin.endswith(".py")}
+    if tree.endswith(".py"):
+        files = {tree: sys.modules[tree_module(tree)], **files}
+    for file, module in files.items():
+        for part in vars(module).values():
+            own = isinstance(part, type) and part.__module__ == module.__name__
+            if own and issubclass(part, ConceptModel):
+                return file
+    return ""

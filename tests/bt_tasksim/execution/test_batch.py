@@ -194,7 +194,7 @@ def test_a_leaf_may_wait_again_and_a_reset_drops_half_a_tick():
     assert leaves["b"].stopped == [1], "it had ended in world 0"
 
 
-def test_train_counts_activations_and_remembers_interruptions():
+def test_train_counts_activations():
     def build():
         return trees.reactive_sequence("root", Scripted("SSSF", "ask"), Train(Scripted("RRSR", "act")))
 
@@ -206,7 +206,6 @@ def test_train_counts_activations_and_remembers_interruptions():
         tree.tick(rows(0, 2), 0.0)
         alone = one.children[1]
         assert train.activations.tolist() == [alone.activations, 0, alone.activations]
-        assert train.interrupted.tolist() == [alone.interrupted, False, alone.interrupted]
 
 
 def test_time_is_each_worlds_own():

@@ -37,7 +37,8 @@ class Batch:
         rows = np.array(list(drawn))
         models = [world.world_model(TIPS, ROBOT.opening) for world in drawn.values()]
         self.context.begin(models, rows)
-        failed = self.worlds.reset(rows, list(drawn.values()))
+        self.worlds.reset(rows, list(drawn.values()))
+        failed = self.worlds.errors(rows)
         begun = np.array([row for row in rows.tolist() if row not in failed], int)
         if len(begun):
             self.look(begun)
@@ -158,3 +159,5 @@ def test_a_world_that_cannot_begin_leaves_the_others_alone_whatever_it_holds(row
         same(batch.names(other, drawn(0)), alone(0))
         batch.look(np.array([other]))
         same(batch.names(other, drawn(0))[3:], alone(0)[3:])
+        assert list(batch.worlds.errors(np.arange(2))) == [row], "it has not begun so far"
+        assert not batch.begin({row: drawn(1)}) and not batch.worlds.errors(np.arange(2))

@@ -84,12 +84,11 @@ class Worlds(worlds.Worlds):
         self.sizes: list[int] = []
         Worlds.made.append(self)
 
-    def reset(self, rows: Any, configurations: Any) -> dict[int, Any]:
+    def reset(self, rows: Any, configurations: Any) -> None:
         tips = [tip.name for tip in self.robot.tips]
         for row, drawn in zip(rows.tolist(), configurations, strict=True):
             self._failed.pop(row, None)
             self._seen[row] = self.each[row].reset(drawn, drawn.world_model(tips, self.robot.opening))
-        return {}
 
     def errors(self, rows: Any) -> dict[int, Any]:
         return {row: self._failed[row] for row in rows.tolist() if row in self._failed}

@@ -32,6 +32,37 @@ def test_evaluate_counts_failures_with_a_seed_and_a_reason(call, tree_file):
     assert "2 x pick cup: out_of_reach, such as seed 0: " in out
 
 
+OWN = """
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core.world import Command
+from trees import sequence
+from trees.scenarios.pick_and_throw import scene
+
+
+class Never(ConceptModel):
+    def command(self, action, seen, memory):
+        return Command(tool=seen.tool)
+
+    def done(self, seen, memory):
+        return seen.tool[:, 2] < -1.0
+
+    def violated(self, seen, memory):
+        return seen.tool[:, 2] > -1.0
+
+
+def build():
+    return sequence("never", Never())
+"""
+
+
+def test_where_ones_own_concept_never_succeeds_it_points_to_check(call, tree_file):
+    Path("never.py").write_text(OWN)
+    code, out, _ = call("evaluate", "never.py", "--episodes", 2)
+    assert code == 0 and "0 of 2" in out and "bt-tasksim check never.py" in out
+    _, out, _ = call("evaluate", tree_file('sequence("far", Pick("cup"))'), "--episodes", 1)
+    assert "0 of 1" in out and "check" not in out, "there is nothing in it that check could try"
+
+
 def test_a_machine_without_the_simulator_says_what_to_install(call, monkeypatch):
     monkeypatch.setitem(sys.modules, "sapien", None)
     code, _, err = call("evaluate", "pick_and_place", "--episodes", 1)
