@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from bt_tasksim.core.poses import Array, array_namespace
     from bt_tasksim.core.registry import register
     from bt_tasksim.core.world import Command, Hidden, Observation
+    from bt_tasksim.execution.batch_runner import BatchRunner
     from bt_tasksim.execution.pipelines import EngineOptions
     from bt_tasksim.execution.result import Result
     from bt_tasksim.execution.runner import Runner
@@ -78,6 +79,7 @@ _HOMES = {
     "bt_tasksim.core.poses": ("Array", "array_namespace"),
     "bt_tasksim.core.registry": ("register",),
     "bt_tasksim.core.world": ("Command", "Hidden", "Observation"),
+    "bt_tasksim.execution.batch_runner": ("BatchRunner",),
     "bt_tasksim.execution.pipelines": ("EngineOptions",),
     "bt_tasksim.core.errors": ("BtTasksimError", "InputError", "MachineError"),
     "bt_tasksim.core.outcomes": ("Form", "Outcome", "Possible", "Statement", "register_reason"),
@@ -111,6 +113,7 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names} | _MODU
 
 __all__ = [
     "Array",
+    "BatchRunner",
     "BtTasksimError",
     "Command",
     "ConceptModel",

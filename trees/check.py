@@ -38,8 +38,8 @@ def check_tree(root: Behaviour) -> None:
     and in py_trees' own Parallel without ``synchronise`` there may be none. The last child of a reactive
     node may be one concept or a composite with memory that holds several.
 
-    py_trees' own Timeout and Timer are warned of: they count wall-clock time, of which a simulation needs
-    hardly any, and which is another one in each run of the same seed.
+    py_trees' own Timeout and Timer are warned of: they count wall-clock time, of which a single simulation
+    needs hardly any and a batch of many more, and which is another one in each run of the same seed.
 
     Raises:
         InputError: The tree is refused; the sentence names the nodes.
@@ -51,9 +51,9 @@ def check_tree(root: Behaviour) -> None:
         for clock, instead in WALL_CLOCKS.items():
             if isinstance(node, clock):
                 warnings.warn(
-                    f"'{node.name}' is py_trees' own {clock.__name__}, which counts wall-clock time: in a "
-                    f"simulation it ends late, and another time in each run; use {instead}, which counts "
-                    f"episode time",
+                    f"'{node.name}' is py_trees' own {clock.__name__}, which counts wall-clock time: in one "
+                    f"world it ends late, among the many of a batch early, and at another time in each run; "
+                    f"use {instead}, which counts episode time",
                     BtTasksimWarning,
                     stacklevel=2,
                 )

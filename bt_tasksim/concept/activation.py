@@ -17,6 +17,7 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.contract import Contract
 from bt_tasksim.concept.functions import ConceptFunctions, any_of, booleans, first_of, sequence_of
 from bt_tasksim.concept.reporting import as_statement
 from bt_tasksim.concept.seen import Seen
@@ -81,6 +82,7 @@ class Activation:
 
     def __init__(self, leaf: Behaviour, model: ConceptFunctions, context: Context) -> None:
         self._leaf, self._model, self._context = leaf, model, context
+        self._contract = Contract(leaf, model)
         worlds = context.worlds
         self.activations: Array = np.zeros(worlds, np.int64)
         """How often it has begun ``(N,)``."""
@@ -132,6 +134,10 @@ class Activation:
         Args:
             judged: What `judge` has found.
             action: One for each of the worlds in which it goes on.
+
+        Raises:
+            LeafError: A function of the concept gives what it should not, see `Contract`.
+            InputError: A memory is not made as it was before.
         """
         model, context, statuses = self._model, self._context, judged.statuses
         if not len(judged.rows):
@@ -157,10 +163,11 @@ class Activation:
             judged, motion = judged.at(positions), Index(positions).of(action.motion)
         else:
             motion = action.motion
-        command, after = model.carry_out(motion, judged.seen, judged.memory)
+        found = model.carry_out(motion, judged.seen, judged.memory)
+        command, after = self._contract.carried(found)
         context.write(command, judged.rows, self._leaf)
         if after is not judged.memory:
-            self.memory = merged(self.memory, context.index(judged.rows), after, context.worlds)
+            self._remember(judged.rows, after, self._contract.giver("carry_out", "advance"))
         return statuses
 
     def going_on(self, rows: Array) -> Judged:
@@ -182,7 +189,9 @@ class Activation:
         begins = rows[positions]
         self._started[begins] = context.times[begins]
         seen = self.seen(begins)
-        unmet = sequence_of(model.initial_state(seen), type(model).__name__)
+        unmet = sequence_of(model.initial_state(seen), self._contract.where("initial_state"))
+        for possible in unmet:
+            self._contract.answers(possible.applies, len(begins), "initial_state")
         cannot = host(any_of(seen.tool, unmet))
         if cannot.any():
             unmet = [possible.on_host() for possible in unmet]
@@ -194,7 +203,7 @@ class Activation:
                 return
             begins, positions, seen = begins[can], positions[can], seen.at(can)
         try:
-            self.memory = merged(self.memory, context.index(begins), model.begin(seen), context.worlds)
+            self._remember(begins, model.begin(seen), "begin")
         except NoWayError:
             self._begin_each(begins, positions, seen, statuses)
 
@@ -202,8 +211,7 @@ class Activation:
         """Begin world by world: in one of them at least there is no way."""
         for k, (row, position) in enumerate(zip(begins.tolist(), positions.tolist(), strict=True)):
             try:
-                memory = self._model.begin(seen.at(np.array([k])))
-                self.memory = merged(self.memory, np.array([row]), memory, self._context.worlds)
+                self._remember(np.array([row]), self._model.begin(seen.at(np.array([k]))), "begin")
             except NoWayError as error:
                 self._fail(statuses, position, row, CANNOT_START(NO_WAY(what=error)))
 
@@ -221,8 +229,15 @@ class Activation:
         model, context, seen = self._model, self._context, judged.seen
         held = {goal: context.reached(goal, model.actor, judged.rows) for goal in model.maintains}
         asked = [goal for goal, worlds in held.items() if worlds.any()]
-        maintained = (model.maintained(goal, seen, judged.memory) for goal in asked)
-        broken, *keeps = fetched([model.violated(seen, judged.memory), *maintained])
+        exceeded_or_kept = [model.violated(seen, judged.memory)]
+        self._contract.answers(
+            exceeded_or_kept[0], len(judged.rows), self._contract.giver("violated", "limits")
+        )
+        for goal in asked:
+            kept = model.maintained(goal, seen, judged.memory)
+            self._contract.answers(kept, len(judged.rows), "maintained")
+            exceeded_or_kept.append(kept)
+        broken, *keeps = fetched(exceeded_or_kept)
         lost = np.zeros(len(judged.rows), bool)
         missing = np.zeros(len(judged.rows), bool)
         for goal, kept in zip(asked, keeps, strict=True):
@@ -246,17 +261,28 @@ class Activation:
         failed = broken | lost
         return judged.at(np.flatnonzero(~failed)) if failed.any() else judged
 
+    def _remember(self, rows: Array, memory: Any, function: str) -> None:
+        """Keep what a function gave for some worlds."""
+        context = self._context
+        with self._contract.kept(function):
+            self.memory = merged(self.memory, context.index(rows), memory, context.worlds)
+
     # ---- saying -----------------------------------------------------------------------------------------
 
     def _measured(self, judged: Judged, position: int) -> Statement | None:
         """Where things stand in one world, by its position among those that go on."""
         one = judged.at(np.array([position]))
-        said = as_statement(self._model.explain(one.seen, one.memory))
+        said = self._explained(one)
         return None if said is None else said.at(0)
+
+    def _explained(self, judged: Judged) -> Statement | None:
+        found = self._model.explain(judged.seen, judged.memory)
+        self._contract.words(found, len(judged.rows))
+        return as_statement(found)
 
     def _say_end(self, ends: Judged, done: Array) -> None:
         """How it ended where it was done, or late."""
-        said = as_statement(self._model.explain(ends.seen, ends.memory))
+        said = self._explained(ends)
         said = None if said is None else said.on_host()
         elapsed = self.elapsed(ends.rows).tolist()
         for k, row in enumerate(ends.rows.tolist()):

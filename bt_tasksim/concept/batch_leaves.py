@@ -6,12 +6,11 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.activation import Activation, Judged, no_action
-from bt_tasksim.concept.condition import ConditionNode
+from bt_tasksim.concept.condition import ConditionNode, answer
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import ConceptNode
-from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.batch_leaf import FAILURE, PENDING, RUNNING, SUCCESS, BatchLeaf
-from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.core.outcomes import Outcome, Statement
 from bt_tasksim.core.poses import Array, array_namespace, host
 from bt_tasksim.core.transfer import Index
 from bt_tasksim.policy.policy import Action
@@ -42,8 +41,7 @@ class ConceptInBatch(BatchLeaf):
         if not len(judged.rows):
             return judged.statuses
         if not leaf.under_training:
-            action = leaf.policy_in_use.act(leaf.model, judged.seen, judged.memory)
-            return activation.act(judged, leaf.amended(action, judged.memory))
+            return activation.act(judged, leaf.decision(judged))
         due = host(leaf.model.decides(judged.seen, judged.memory))
         if not due.all():
             free = judged.at(np.flatnonzero(~due))
@@ -94,21 +92,19 @@ class ConditionInBatch(BatchLeaf):
 
     def __init__(self, leaf: ConditionNode, context: Context) -> None:
         self._leaf, self._context = leaf, context
-        self._answers: dict[int, tuple[Seen, Array, int]] = {}
+        self._answers: dict[int, tuple[Statement | None, int, bool]] = {}
 
     def tick(self, rows: Array, fresh: Array) -> Array:
         """See `BatchLeaf.tick`."""
-        seen = self._context.seen(rows, np.zeros(len(rows)))
-        holds = host(self._leaf.model.holds(seen))
-        self._answers.update((row, (seen, holds, k)) for k, row in enumerate(rows.tolist()))
+        found, why = self._leaf.asked(self._context.seen(rows, np.zeros(len(rows))))
+        holds = host(found)
+        each = enumerate(zip(rows.tolist(), holds.tolist(), strict=True))
+        self._answers.update((row, (why, k, yes)) for k, (row, yes) in each)
         return np.where(holds, SUCCESS, FAILURE).astype(np.int8)
 
     def outcome(self, row: int) -> Outcome | None:
         """The last answer in a world."""
-        if row not in self._answers:
-            return None
-        seen, holds, k = self._answers[row]
-        return self._leaf.model.answer(seen, k, bool(holds[k]))
+        return answer(*self._answers[row]) if row in self._answers else None
 
 
 def leaf_in_batch(leaf: Behaviour, context: Context) -> BatchLeaf | None:

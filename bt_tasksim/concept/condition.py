@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from py_trees.common import Status
 
+from bt_tasksim.concept.contract import Contract
 from bt_tasksim.concept.leaf import ONE, ModelLeaf
 from bt_tasksim.concept.model import LeafModel
 from bt_tasksim.concept.parameters import Parameter, declared_parameters
@@ -34,6 +35,7 @@ class ConditionNode(ModelLeaf):
 
     def __init__(self, *args: Any, name: str | None = None, **kwargs: Any) -> None:
         super().__init__(self.model_class.value(*args, **kwargs), name)
+        self._contract = Contract(self, self.model)
 
     @property
     def model(self) -> Condition:
@@ -44,9 +46,22 @@ class ConditionNode(ModelLeaf):
     def update(self) -> Status:
         """Ask once."""
         seen = self.context.seen(ONE, np.zeros(1))
-        yes = bool(self.model.holds(seen)[0])
-        self.report(self.model.answer(seen, 0, yes))
+        holds, why = self.asked(seen)
+        yes = bool(holds[0])
+        self.report(answer(why, 0, yes))
         return Status.SUCCESS if yes else Status.FAILURE
+
+    def asked(self, seen: Seen) -> tuple[Array, Statement | None]:
+        """The answer, boolean ``(N,)``, and why.
+
+        Raises:
+            LeafError: The condition gives something else.
+        """
+        worlds = len(seen.elapsed)
+        holds, why = self.model.holds(seen), self.model.explain(seen)
+        self._contract.answers(holds, worlds, "holds")
+        self._contract.words(why, worlds)
+        return holds, as_statement(why)
 
 
 if TYPE_CHECKING:
@@ -80,7 +95,7 @@ class Condition(LeafModel, _CalledCondition):
         """The answer: a `Form` with its numbers ``(N,)``, or words that are true of all worlds."""
         return None
 
-    def answer(self, seen: Seen, world: int, yes: bool) -> Outcome:
-        """The answer in one world, by its row, as an outcome."""
-        said = as_statement(self.explain(seen))
-        return (HOLDS if yes else HOLDS_NOT)(None if said is None else said.at(world))
+
+def answer(why: Statement | None, world: int, yes: bool) -> Outcome:
+    """A condition's answer in one world, by its row, as an outcome."""
+    return (HOLDS if yes else HOLDS_NOT)(None if why is None else why.at(world))

@@ -9,8 +9,9 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.activation import Activation
+from bt_tasksim.concept.activation import Activation, Judged
 from bt_tasksim.concept.context import Context
+from bt_tasksim.concept.contract import Contract
 from bt_tasksim.concept.functions import ConceptFunctions
 from bt_tasksim.concept.reporting import Reporting
 from bt_tasksim.concept.status import STATUSES
@@ -103,6 +104,7 @@ class ConceptNode(ModelLeaf):
         self.under_training = False
         """Whoever trains it decides: it is ticked in a `BatchTree`, which waits there for decisions."""
         self._activation: Activation | None = None
+        self._contract = Contract(self, self.model)
         self._policy: Policy | None = None
 
     @property
@@ -170,8 +172,22 @@ class ConceptNode(ModelLeaf):
         judged = self.activation.judge(ONE, np.array([self.status != Status.RUNNING]))
         if not len(judged.rows):
             return self._said(judged.statuses)
-        action = self.policy_in_use.act(self.model, judged.seen, judged.memory)
-        return self._said(self.activation.act(judged, self.amended(action, judged.memory)))
+        return self._said(self.activation.act(judged, self.decision(judged)))
+
+    def decision(self, judged: Judged) -> Action:
+        """What its policy decides in the worlds in which it goes on.
+
+        Raises:
+            LeafError: It decides what is no action of so many worlds.
+        """
+        policy, worlds = self.policy_in_use, len(judged.rows)
+        action = policy.act(self.model, judged.seen, judged.memory)
+        motion, terminate, held = "programmed_motion", "done", self._contract
+        if policy.name != PROGRAMMED:
+            motion, terminate, held = "act", "act", Contract(self, policy)
+        held.motion(action.motion, worlds, self.model.actions, motion)
+        held.shares(action.terminate, worlds, terminate)
+        return self.amended(action, judged.memory)
 
     def amended(self, action: Action, memory: Any) -> Action:
         """What is made of a decision ``(k, ...)``, whoever decided, in as many worlds; by default it itself.

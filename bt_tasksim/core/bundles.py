@@ -70,6 +70,7 @@ def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
     """
     if whole is not None:
         _check_alike(whole, new)
+    _check_rows(new, len(rows))
     if len(rows) == worlds:
         return new
     index = _index(rows)
@@ -90,6 +91,11 @@ def _check_alike(before: Any, now: Any, name: str = "") -> None:
     """
     kind, kept = getattr(now, "dtype", None), getattr(before, "dtype", None)
     if kind is not None and kept is not None and kind == kept:
+        if before.shape[1:] != now.shape[1:]:
+            raise InputError(
+                f"a memory has one shape in all worlds and at all ticks, but {name or 'it'} has "
+                f"{_row_shape(before)} at first and {_row_shape(now)} then: pad what is of unlike length"
+            )
         return
     inner = None if kind is not None else parts(now)
     old = None if inner is None or kept is not None else parts(before)
@@ -101,6 +107,34 @@ def _check_alike(before: Any, now: Any, name: str = "") -> None:
             f"a memory is of one kind in all worlds and at all ticks, but {name or 'it'} is {_kind(before)} "
             f"at first and {_kind(now)} then: make it the same in begin and in advance"
         )
+
+
+def _check_rows(new: Any, worlds: int, name: str = "") -> None:
+    """Check that a bundle is made of arrays that have a row for each world.
+
+    Raises:
+        InputError: It is not.
+    """
+    if hasattr(new, "dtype"):
+        if not new.shape or new.shape[0] != worlds:
+            count = f"{worlds} world{'s' if worlds > 1 else ''}"
+            raise InputError(
+                f"a memory's arrays have a row for each world, but {name or 'it'} has the shape "
+                f"{tuple(new.shape)} for {count}"
+            )
+        return
+    inner = parts(new)
+    if inner is None and new is not None and not isinstance(new, str):
+        raise InputError(
+            f"a memory is an array with a row for each world, or a NamedTuple of such, but {name or 'it'} is "
+            f"{new!r}"
+        )
+    for part, value in (inner or {}).items():
+        _check_rows(value, worlds, f"{name}.{part}" if name else part)
+
+
+def _row_shape(values: Array) -> str:
+    return str(("N", *values.shape[1:])).replace("'N'", "N")
 
 
 def _kind(value: Any) -> str:
@@ -118,11 +152,6 @@ def _spread(values: Array, index: Index, worlds: int) -> Array:
 
 
 def _replaced(before: Array, index: Index, values: Array) -> Array:
-    if before.shape[1:] != values.shape[1:]:
-        raise InputError(
-            f"the memories of unlike worlds do not fit together: {tuple(before.shape[1:])} and "
-            f"{tuple(values.shape[1:])}; pad what is of unlike length"
-        )
     return index.replaced(before, values)
 
 

@@ -21,7 +21,7 @@ from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.batch_reasons import BatchReasons
-from bt_tasksim.execution.leaf_errors import leaf_error
+from bt_tasksim.execution.leaf_errors import is_leafs, leaf_error
 from bt_tasksim.execution.world_by_world import BelowUnknown, Copies, Watcher, WorldByWorld
 from bt_tasksim.trees.check import check_tree
 from bt_tasksim.trees.nodes.base import NodeKind
@@ -262,9 +262,9 @@ class BatchTree:
                 self._handlers[event](*(parcels[0] if len(parcels) == 1 else self._merged(parcels)))
         except BaseException as error:
             self._give_up(rows)
-            if self._at is None or isinstance(error, BtTasksimError) or not isinstance(error, Exception):
+            if self._at is None or isinstance(error, BtTasksimError) or not is_leafs(error):
                 raise
-            raise leaf_error(error, self.nodes[self._at[0]].name) from error
+            raise leaf_error(error, self.nodes[self._at[0]]) from error
         finally:
             self._at = None
         status = self._status_of[0][rows]

@@ -38,6 +38,10 @@ class BatchReasons:
         """A node's name."""
         return self.nodes[node].name
 
+    def tip(self, node: int, row: int) -> int | None:
+        """See `Sayings.tip`."""
+        return WorldSayings(self, row).tip(node)
+
     def outcome_of(self, node: int, row: int) -> Outcome | None:
         """See `Sayings.outcome_of`."""
         return WorldSayings(self, row).outcome_of(node)

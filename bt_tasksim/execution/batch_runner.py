@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Self
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -56,7 +57,7 @@ class _Episode:
 
 
 class BatchRunner:
-    """Runs one tree in one scene, in many worlds at once.
+    """Runs one tree in one scene, in many worlds at once; behind ``with`` it closes itself.
 
     What becomes of a seed does not depend on the others, nor on how many worlds or threads there are: it is
     what `Runner` makes of it.
@@ -85,6 +86,11 @@ class BatchRunner:
         longest: float = LONGEST,
         like: Array | None = None,
     ) -> None:
+        if not callable(build):
+            raise InputError(
+                f"a BatchRunner makes a tree for each world: give it what makes one, such as your function "
+                f"build, not {f'the tree {build.name!r}' if isinstance(build, Behaviour) else repr(build)}"
+            )
         if worlds < 1 or threads < 1:
             raise InputError(f"a batch has one world and one thread at least, found {worlds} and {threads}")
         self.scene, self.longest, self.options = scene, longest, options or EngineOptions()
@@ -131,9 +137,13 @@ class BatchRunner:
             result.
 
         Raises:
-            InputError: The scene or the tree is no good.
+            InputError: The scene or the tree is no good, or these are no seeds.
         """
-        waiting = iter(seeds)
+        if not isinstance(seeds, Iterable):
+            raise InputError(f"run takes seeds, such as range(20) or [7], found {seeds!r}")
+        return self._run(iter(seeds), stream)
+
+    def _run(self, waiting: Iterator[int], stream: str) -> Iterator[tuple[int, Result | BtTasksimError]]:
         try:
             yield from self._fill(waiting, stream)
             while (self._phase != IDLE).any():
@@ -145,6 +155,13 @@ class BatchRunner:
     def close(self) -> None:
         """Let go of worlds and threads."""
         self.worlds.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """See `close`."""
+        self.close()
 
     # ---- one control period ------------------------------------------------------------------------------
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Generator
 from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.core.culprit import users_place
+from bt_tasksim.concept.leaf import ModelLeaf
+from bt_tasksim.core.culprit import place_of, users_place
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError
 
 
@@ -24,11 +26,12 @@ def set_up(tree: Behaviour, **arguments: Any) -> None:
             node.setup(**arguments)
         except BtTasksimError:
             raise
-        except Exception as error:
-            place = users_place(error)
+        except BaseException as error:
+            if not is_leafs(error):
+                raise
             raise InputError(
-                f"'{node.name}' cannot be set up: {type(error).__name__}{f' in {place}' if place else ''}: "
-                f"{error}; a node's setup takes what there is to know by name: def setup(self, **kwargs)"
+                f"'{node.name}' cannot be set up: {_said(error)}; "
+                "a node's setup takes what there is to know by name: def setup(self, **kwargs)"
             ) from error
 
 
@@ -44,9 +47,10 @@ def ticking(tree: Behaviour) -> Generator[Behaviour, None, None]:
     except BaseException as error:
         culprit = _raising_leaf(error, tree)
         end_all(tree, culprit)
-        if isinstance(error, BtTasksimError) or not isinstance(error, Exception):
+        closed = isinstance(error, GeneratorExit) and culprit is None
+        if isinstance(error, BtTasksimError) or closed or not is_leafs(error):
             raise
-        raise leaf_error(error, culprit.name if culprit is not None else tree.name) from error
+        raise leaf_error(error, tree if culprit is None else culprit) from error
 
 
 def end_all(tree: Behaviour, culprit: Behaviour | None = None) -> None:
@@ -69,10 +73,37 @@ def no_status(node: Behaviour) -> LeafError:
     )
 
 
-def leaf_error(error: Exception, name: str) -> LeafError:
-    """The error that names the leaf that raised and, where it is the user's own, file and line."""
+def is_leafs(error: BaseException) -> bool:
+    """Whether an exception says that the leaf that raised it is broken: it is an error, or would end Python.
+
+    An interrupt says nothing about the leaf, nor does the exit of a signal's handler.
+    """
+    if not isinstance(error, SystemExit):
+        return isinstance(error, Exception | GeneratorExit)
+    handlers = {getattr(signal.getsignal(known), "__code__", None) for known in signal.valid_signals()}
+    trace = error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code in handlers:
+            return False
+        trace = trace.tb_next
+    return True
+
+
+def leaf_error(error: BaseException, node: Behaviour) -> LeafError:
+    """The error that names the leaf that raised and, where it is the user's own, file and line.
+
+    Where the exception comes from what the leaf gave to others, they are those of its class.
+    """
+    owner = type(getattr(node, "model", node))
+    place = "" if users_place(error) else place_of(owner)
+    whose = f" ({owner.__name__}, {place})" if place and isinstance(node, ModelLeaf) else ""
+    return LeafError(f"leaf '{node.name}'{whose} raised {_said(error)}")
+
+
+def _said(error: BaseException) -> str:
+    """``ValueError in my_concept.py:12: too large``."""
     place = users_place(error)
-    return LeafError(f"leaf '{name}' raised {type(error).__name__}{f' in {place}' if place else ''}: {error}")
+    return f"{type(error).__name__}{f' in {place}' if place else ''}: {error}".removesuffix(": ")
 
 
 def _raising_leaf(error: BaseException, tree: Behaviour) -> Behaviour | None:

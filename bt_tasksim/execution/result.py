@@ -21,12 +21,15 @@ class Result:
         status: The tree's own status at the end.
         success: The tree ended SUCCESS and the physics state agrees.
         outcome: How it ended: what the success evaluator found, or why the tree failed or was stopped.
-        leaf: Name of the leaf that failed or was stopped; empty where the tree succeeded or time was over.
+        leaf: Name of the node that made the tree fail, or of the leaf that was stopped from outside; empty
+            where the tree succeeded or time was over. It is a leaf, or a node that decides by itself, such as
+            a time-out: then ``why`` names the leaf that was at work.
         verdict: What the success evaluator found, None on a real robot.
         seed: Seed of the episode.
         control_steps: Control periods until the tree ended.
         sim_time: Seconds of the episode until the tree ended.
-        wall_time: Seconds it took.
+        wall_time: Seconds on the clock from its beginning to its result. In a batch other worlds are computed
+            meanwhile: the sum over episodes is more than the batch took.
         policies: Policy in use by leaf.
         configuration: The world as drawn.
         timing: How well the control rate was kept; None where there was none to keep.

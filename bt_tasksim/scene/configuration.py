@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import operator
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -182,8 +183,12 @@ def check_seed(seed: int) -> None:
     Raises:
         InputError: It cannot.
     """
-    if not 0 <= seed <= LARGEST_SEED:
-        raise InputError(f"a seed is a whole number from 0 to {LARGEST_SEED}, found {seed}")
+    try:
+        fits = 0 <= operator.index(seed) <= LARGEST_SEED
+    except TypeError:
+        fits = False
+    if not fits:
+        raise InputError(f"a seed is a whole number from 0 to {LARGEST_SEED}, found {seed!r}")
 
 
 def generator(seed: int, stream: str, purpose: str) -> np.random.Generator:

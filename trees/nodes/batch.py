@@ -108,6 +108,9 @@ class Reasons(Protocol):
     def name(self, node: int) -> str:
         """A node's name."""
 
+    def tip(self, node: int, row: int) -> int | None:
+        """The deepest node that was decided last, at or below a node; None where it is not active."""
+
     def outcome_of(self, node: int, row: int) -> Outcome | None:
         """What a node says itself, as an outcome."""
 

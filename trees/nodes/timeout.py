@@ -15,13 +15,14 @@ from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import not_set_up
 from bt_tasksim.concept.reporting import said_below
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import TIMED_OUT, Statement
+from bt_tasksim.core.outcomes import TIMED_OUT, Form, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
 from bt_tasksim.trees.nodes.batch import FAILURE, INVALID, RUNNING, NodePlace, PassesOn
 from bt_tasksim.trees.nodes.pass_through import PassThrough, end_tick
 
+AT_WORK = Form("'{node}' was at work")
 SLACK = 1e-9
 """Seconds by which summed control periods may fall short of a time."""
 
@@ -72,12 +73,19 @@ class Timeout(PassThrough):
             self._started = now
             self.report(None)
         elif now - self._started >= self.seconds - SLACK:
-            self.report(TIMED_OUT(said_below(self.decorated), limit=self.seconds))
+            tip = self.decorated.tip()
+            said = _at_work(None if tip is None else tip.name, said_below(self.decorated))
+            self.report(TIMED_OUT(said, limit=self.seconds))
             self.decorated.stop(Status.INVALID)
             yield from end_tick(self, Status.FAILURE)
             return
         yield from self.decorated.tick()
         yield from end_tick(self, self.decorated.status)
+
+
+def _at_work(name: str | None, said: Statement | None) -> Statement | None:
+    """What stood below when the time was over: the node that was ticked last, and what it said."""
+    return said if name is None else AT_WORK(said, node=name)
 
 
 def timeout(seconds: float, child: Behaviour, *, name: str = "Timeout") -> Timeout:
@@ -139,7 +147,10 @@ class BatchTimeout(PassesOn):
         self.started[rows] = self.xp.where(running, self.started[rows], now)
         (late,), (rows,) = self.split(over, rows)
         for row in late.tolist():
-            self._below[row] = self.batch.reasons.said_below(self.place.children[0], row)
+            child, reasons = self.place.children[0], self.batch.reasons
+            tip = reasons.tip(child, row)
+            name = None if tip is None else reasons.name(tip)
+            self._below[row] = _at_work(name, reasons.said_below(child, row))
         self.stop_child(0, late)
         self.end(late, FAILURE)
         self.tick_child(0, rows)

@@ -78,8 +78,19 @@ def test_where_there_was_nothing_the_other_worlds_are_zeros():
 
 
 def test_memories_of_unlike_shapes_are_refused():
-    with pytest.raises(InputError, match=r"memories of unlike worlds do not fit together: \(3,\) and \(2,\)"):
+    with pytest.raises(InputError, match=r"one shape .* it has \(N, 3\) at first and \(N, 2\)"):
         merged(np.zeros((4, 3)), np.array([1]), np.zeros((1, 2)), 4)
+
+
+def test_a_memory_of_another_shape_is_refused_where_all_worlds_get_it_too():
+    with pytest.raises(InputError, match=r"one shape .* a.b has \(N, 3\) at first and \(N, 2\)"):
+        merged({"a": {"b": np.zeros((1, 3))}}, np.array([0]), {"a": {"b": np.zeros((1, 2))}}, 1)
+
+
+@pytest.mark.parametrize(("shape", "worlds"), [((), 1), ((7,), 1), ((1, 3), 2)])
+def test_a_memory_without_a_row_for_each_world_is_refused(shape, worlds):
+    with pytest.raises(InputError, match=f"row for each world, but 0 has the shape .* {worlds} world"):
+        merged(None, np.arange(worlds), [np.zeros(shape)], worlds)
 
 
 def test_in_torch_too():

@@ -17,6 +17,7 @@ from bt_tasksim.core.outcomes import FAILED, TIMED_OUT
 from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.trees.nodes.fallback import ALTERNATIVES_FAILED
 from bt_tasksim.trees.nodes.retry import ATTEMPT_FAILED
+from bt_tasksim.trees.nodes.timeout import AT_WORK
 
 
 class Fails(BatchLeaf):
@@ -57,7 +58,8 @@ def test_a_failure_is_told_with_what_was_tried_before_by_world():
     batch.reset(everyone)
     batch.tick(everyone, 0.0)
     batch.tick(everyone, 2.0)
-    assert batch.outcome(1) == TIMED_OUT(limit=1.0), "what was before the world began anew is forgotten"
+    late = TIMED_OUT(AT_WORK(None, node="second"), limit=1.0)
+    assert batch.outcome(1) == late, "what was before the world began anew is forgotten"
 
 
 def test_a_fallback_tells_by_world_why_the_first_way_failed_too():

@@ -1,6 +1,8 @@
 """Episodes in batches: what becomes of a seed is, to the last bit, what a runner of one world makes of it."""
 
 import dataclasses
+import os
+import signal
 from functools import cache
 
 import numpy as np
@@ -14,6 +16,7 @@ from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import ObjectName
 from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Wait
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError
+from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.world import Command
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions
@@ -37,11 +40,8 @@ def facts(found):
 
 
 def in_batch(build, scene, seeds, worlds, threads=1, **options):
-    runner = BatchRunner(build, scene, EngineOptions(**options), worlds, threads)
-    try:
+    with BatchRunner(build, scene, EngineOptions(**options), worlds, threads) as runner:
         return {seed: facts(found) for seed, found in runner.run(seeds)}
-    finally:
-        runner.close()
 
 
 def one_by_one(build, scene, seeds, **options):
@@ -134,6 +134,156 @@ def test_a_leaf_that_raises_in_one_world_leaves_the_others_alone():
     assert in_batch(lambda: sequence("root", Raises("target")), scene, seeds, 3) == alone
 
 
+class Breaks(ConceptModel):
+    """Breaks what a concept has to keep to, in one of its functions."""
+
+    how = ""
+    """In which, and how."""
+
+    def _given(self, name, right):
+        function, _, what = self.how.partition(" ")
+        if name != function:
+            return right
+        if what.startswith("raise"):
+            raise {"raise exit": SystemExit(3), "raise close": GeneratorExit()}[what]
+        n = right.shape[0] if hasattr(right, "shape") else 1
+        return {
+            "none": None, "text": np.array(["much"] * n), "complex": np.ones(n, complex), "plain": True,
+            "wide": np.zeros((n, 50), bool), "words": "yes", "objects": np.array([None] * n),
+        }[what]  # fmt: skip
+
+    def initial_state(self, seen):
+        return HALT.where(self._given("initial_state", seen.elapsed < 0.0))
+
+    def begin(self, seen):
+        return self._given("begin", seen.elapsed)
+
+    def advance(self, action, seen, memory):
+        if self.how == "advance shape":
+            return np.zeros((len(seen.elapsed), int(seen.elapsed[0] > 0.2) + 1))
+        return self._given("advance", memory)
+
+    def command(self, action, seen, memory):
+        if self.how.startswith("hand"):
+            hand = {"text": np.array([["a"]] * len(action)), "wide": np.zeros((len(action), 50))}
+            return Command(hand=(hand | {"complex": np.ones((len(action), 1), complex)})[self.how[5:]])
+        return self._given("command", Command())
+
+    def violated(self, seen, memory):
+        return self._given("violated", seen.elapsed > 99.0)
+
+    def programmed_motion(self, seen, memory):
+        return self._given("programmed_motion", np.zeros((len(seen.elapsed), 0)))
+
+    def done(self, seen, memory):
+        return self._given("done", seen.elapsed > 0.2)
+
+    def explain(self, seen, memory):
+        return self._given("explain", "well")
+
+
+def broken(how):
+    return type("Broken", (Breaks,), {"how": how, "__doc__": "Breaks something."})(name="broken")
+
+
+HALT = register_reason("halt_in_a_test", "it cannot")
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        "done none", "done text", "done complex", "done plain", "done wide", "done words", "done objects",
+        "done raise exit", "done raise close", "begin raise exit", "initial_state plain",
+        "initial_state wide", "violated none", "violated plain", "violated complex", "programmed_motion none",
+        "programmed_motion plain", "programmed_motion text", "programmed_motion wide", "command none",
+        "command words", "explain plain", "hand text", "hand wide", "hand complex",
+    ],
+)  # fmt: skip
+def test_what_a_function_should_not_give_is_told_with_its_line_at_any_batch(how):
+    scene, seeds = load_source("pick_and_place").scene, (0, 1, 2)
+
+    def build():
+        return sequence("root", Wait(0.1), broken(how))
+
+    alone = one_by_one(build, scene, seeds)
+    function = "command" if how.startswith("hand") else how.split()[0]
+    for kind, sentence in alone.values():
+        assert kind is LeafError and "leaf 'broken'" in sentence and "\n" not in sentence
+        assert "test_batch_runner.py:" in sentence
+        assert "raise" in how or function in sentence
+    assert in_batch(build, scene, seeds, 2) == alone
+
+
+@pytest.mark.parametrize("how", ["advance shape", "begin plain", "advance plain", "advance wide"])
+def test_a_memory_that_is_not_kept_alike_is_told_with_its_leaf_at_any_batch(how):
+    scene = load_source("pick_and_place").scene
+
+    def build():
+        return sequence("root", broken(how))
+
+    said = []
+    for worlds in (1, 3):
+        runner = BatchRunner(build, scene, worlds=worlds)
+        with pytest.raises(InputError) as error:
+            list(runner.run((0, 1, 2)))
+        runner.close()
+        said.append(str(error.value))
+    with pytest.raises(InputError) as error:
+        Runner(build(), scene).run(0)
+    assert said[0] == str(error.value) and said[1].partition(" for ")[0] == said[0].partition(" for ")[0]
+    assert said[0].startswith(f"leaf 'broken': Broken.{how.split()[0]} (test_batch_runner.py:")
+
+
+class Exits(Behaviour):
+    """Ends Python, or goes back as far as Python's own; what a signal's handler asks for is no such thing."""
+
+    def __init__(self, error, early=False):
+        super().__init__("exits")
+        self.error, self.early = error, early
+
+    def setup(self, **kwargs):
+        if self.early:
+            raise self.error
+
+    def update(self):
+        raise self.error
+
+
+@pytest.mark.parametrize("error", [SystemExit(3), SystemExit(), GeneratorExit()])
+def test_a_leaf_that_would_end_python_is_a_leaf_that_raised(error):
+    scene, seeds = load_source("pick_and_place").scene, (0, 1, 2)
+
+    def build():
+        return sequence("root", Exits(error))
+
+    alone = one_by_one(build, scene, seeds)
+    assert all(kind is LeafError and "leaf 'exits' raised" in said for kind, said in alone.values())
+    assert in_batch(build, scene, seeds, 2) == alone
+    for runner in (Runner, BatchRunner):
+        with pytest.raises(InputError, match=r"'exits' cannot be set up: (System|Gen)\w+ in test_batch"):
+            runner(lambda: sequence("root", Exits(error, early=True)), scene)
+
+
+def test_an_interrupt_stays_one_and_so_does_the_exit_of_a_signals_handler():
+    scene = load_source("pick_and_place").scene
+
+    class Stops(Behaviour):
+        def update(self):
+            os.kill(os.getpid(), signal.SIGUSR1)
+            return Status.RUNNING
+
+    def leave(*_):
+        raise SystemExit(5)
+
+    before = signal.signal(signal.SIGUSR1, leave)
+    try:
+        for end, leaf in ((KeyboardInterrupt, Exits(KeyboardInterrupt())), (SystemExit, Stops("stops"))):
+            with pytest.raises(end):
+                Runner(sequence("root", leaf), scene).run(0)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+
+
 class Counted(Decorator):
     """A decorator of somebody's own: the leaf below is ticked by py_trees, world by world."""
 
@@ -198,6 +348,18 @@ def test_nonsense_is_refused():
     for counts in ({"worlds": 0}, {"threads": 0}, {"worlds": most_worlds() * 2}):
         with pytest.raises(InputError, match=r"one world|does not fit"):
             BatchRunner(source.build, source.scene, **counts)
+
+
+def test_a_tree_instead_of_what_makes_it_and_a_number_instead_of_seeds_are_refused():
+    source = load_source("pick_and_place")
+    with pytest.raises(InputError, match=r"what makes one, .* not the tree 'pick and place'"):
+        BatchRunner(source.build(), source.scene)
+    with BatchRunner(source.build, source.scene, worlds=2) as runner:
+        with pytest.raises(InputError, match=r"seeds, such as range\(20\)"):
+            runner.run(2)
+        for wrong in ("12", [0.5], [-1]):
+            with pytest.raises(InputError, match="seed"):
+                next(iter(runner.run(wrong)))
 
 
 def test_unlike_objects_share_a_batch():

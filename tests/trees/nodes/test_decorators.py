@@ -16,6 +16,7 @@ from bt_tasksim.core.outcomes import FAILED, TEXT, TIMED_OUT
 from bt_tasksim.trees.nodes.fallback import ALTERNATIVES_FAILED
 from bt_tasksim.trees.nodes.parallel import CHILDREN_FAILED
 from bt_tasksim.trees.nodes.retry import ATTEMPT_FAILED
+from bt_tasksim.trees.nodes.timeout import AT_WORK
 from bt_tasksim.trees.vocabulary import kind_of
 
 STATUS = {"R": Status.RUNNING, "S": Status.SUCCESS, "F": Status.FAILURE}
@@ -210,7 +211,7 @@ def test_timeout_names_what_was_not_done():
     context.times = np.array([0.1])
     tree.tick_once()
     assert tree.status == Status.FAILURE
-    assert tree.outcome == TIMED_OUT(TEXT(text="answer 1"), limit=0.1)
+    assert tree.outcome == TIMED_OUT(AT_WORK(TEXT(text="answer 1"), node="leaf"), limit=0.1)
 
 
 def test_timeout_lets_a_result_through():
