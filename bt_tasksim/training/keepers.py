@@ -91,7 +91,8 @@ class KeeperElsewhere:
         found = self.source.load(self.keeping.options)
         keeper = self.keeping.keeper(found.build(), found.scene)
         subject = self.keeping.subject(keeper.tree, keeper.scene, self.source)
-        if others := differing(self.subject, subject):
+        known = {name: hashed for name, hashed in subject.items() if name in self.subject}
+        if others := differing(self.subject, known):  # who sent this may have no file of the tree
             raise InputError(
                 f"another {others} is found there by the name '{self.source.tree}': "
                 "have the same files everywhere"

@@ -89,14 +89,15 @@ def own_code(tree: Behaviour, name: str = "", plugins: Iterable[str] = ()) -> di
 
     Args:
         tree: The tree; the modules of its behaviours and models count.
-        name: Name or file of the tree, which was loaded last; empty where it came otherwise.
+        name: Name or file of the tree, which was loaded last; empty, or never loaded, where it came
+            otherwise: somebody in this process has built it, and others will by this name.
         plugins: Plugins, loaded.
 
     Returns:
         Hashes by ``file NAME`` or ``module NAME``.
     """
     roots = [load_plugin(plugin) for plugin in plugins]
-    if name.endswith(".py"):
+    if name.endswith(".py") and tree_module(name) in sys.modules:
         roots.append(sys.modules[tree_module(name)])
     parts = {type(part) for node in nodes_of(tree) for part in (node, getattr(node, "model", None))}
     for module in {part.__module__ for part in parts} - {"__main__", "__mp_main__"}:
