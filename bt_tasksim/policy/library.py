@@ -112,6 +112,12 @@ def is_bundled(name: str) -> bool:
     return name == PROGRAMMED or name in _policy_folders(asset("policies"))
 
 
+def source_of(folder: Path) -> str:
+    """What a leaf has to name to get this policy again, from any working folder."""
+    whole = folder.resolve()
+    return whole.name if whole.parent == asset("policies").resolve() else str(whole)
+
+
 def folder_of_pinned(concept: str, robot: str) -> Path | None:
     """The folder of the policy that is pinned for a concept and a robot; None where none is.
 

@@ -9,7 +9,7 @@ from bt_tasksim.core.poses import Array, array_namespace, clip
 from bt_tasksim.policy.files import PolicySlot as PolicySlot
 from bt_tasksim.policy.files import check_fits, load_policy
 from bt_tasksim.policy.library import PROGRAMMED as PROGRAMMED
-from bt_tasksim.policy.library import find_policy, folder_of_pinned
+from bt_tasksim.policy.library import find_policy, folder_of_pinned, source_of
 from bt_tasksim.policy.network import Network
 
 TERMINATE = 0.5
@@ -77,6 +77,7 @@ class ProgrammedPolicy:
     """The concept's own programmed action, done when its own goal state is observed."""
 
     name = PROGRAMMED
+    source = PROGRAMMED
 
     def act(self, model: Decidable[ViewT], seen: ViewT, memory: Any) -> Action:
         """See `Policy.act`."""
@@ -89,11 +90,13 @@ class LearnedPolicy:
     Args:
         network: From features to outputs.
         name: How results name it.
+        source: What a leaf names to get it again; a run's log keeps it.
     """
 
-    def __init__(self, network: Network, name: str) -> None:
+    def __init__(self, network: Network, name: str, source: str = "") -> None:
         self.network = network
         self.name = name
+        self.source = source
 
     def act(self, model: Decidable[ViewT], seen: ViewT, memory: Any) -> Action:
         """See `Policy.act`; where the concept takes no decision, its reference motion goes on."""
@@ -149,7 +152,7 @@ def named_policy(name: str | None, slot: PolicySlot) -> Policy:
         return ProgrammedPolicy()
     network, card = load_policy(folder)
     check_fits(card, folder, slot)
-    return LearnedPolicy(network, f"{folder.resolve().name}@{card.hash}")
+    return LearnedPolicy(network, f"{folder.resolve().name}@{card.hash}", source_of(folder))
 
 
 def concept_name(concept: type) -> str:

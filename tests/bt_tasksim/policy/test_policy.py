@@ -127,24 +127,24 @@ def test_every_library_and_device_decides_the_same():
 def test_where_nothing_is_pinned_the_programmed_policy_decides(shipped, name, concept):
     shipped()
     policy = _resolved(concept("cup", policy=name), PANDA)
-    assert isinstance(policy, ProgrammedPolicy) and policy.name == "programmed"
+    assert isinstance(policy, ProgrammedPolicy) and policy.name == policy.source == "programmed"
 
 
 def test_a_policy_is_named_by_its_folder(policy, shipped, monkeypatch):
     folder = policy("mine")
     found = _resolved(Grasp("cup", policy=str(folder)), PANDA)
-    assert isinstance(found, LearnedPolicy)
+    assert isinstance(found, LearnedPolicy) and found.source == str(folder)
     name, hash = found.name.split("@")
     assert name == "mine" and len(hash) == 12
     monkeypatch.chdir(folder)
     assert _resolved(Grasp("cup", policy="."), PANDA).name == found.name
-    assert _resolved(Grasp("cup", policy="../mine/"), PANDA).name == found.name
+    assert _resolved(Grasp("cup", policy="../mine/"), PANDA).source == str(folder)
 
 
 def test_a_pinned_policy_is_taken_on_its_robot_alone(shipped):
     shipped("grasp-one", pins={"grasp": {"panda": "grasp-one"}})
     found = _resolved(Grasp("cup"), PANDA)
-    assert found.name.startswith("grasp-one@")
+    assert found.name.startswith("grasp-one@") and found.source == "grasp-one"
     assert _resolved(Grasp("cup", policy="grasp-one"), PANDA).name == found.name
     for leaf, robot in (
         (Grasp("cup"), XARM),
@@ -158,8 +158,8 @@ def test_a_shipped_name_comes_before_a_folder(shipped, policy, monkeypatch, tmp_
     shipped("same", steps=1)
     local = policy("same", steps=2)
     monkeypatch.chdir(tmp_path)
-    found, beside = (_resolved(Grasp("cup", policy=name), PANDA).name for name in ("same", "./same"))
-    assert found != beside == _resolved(Grasp("cup", policy=str(local)), PANDA).name
+    assert _resolved(Grasp("cup", policy="same"), PANDA).source == "same"
+    assert _resolved(Grasp("cup", policy="./same"), PANDA).source == str(local)
 
 
 @pytest.mark.parametrize(
@@ -192,8 +192,7 @@ def test_a_policy_whose_training_was_interrupted(policy, tmp_path, monkeypatch, 
         policy("runs/grasp-mine")
     name = "runs" if named == "." else f"runs/{named}"
     if ended and named != ".":
-        there = _resolved(Grasp("cup", policy=str(tmp_path / name)), PANDA)
-        assert _resolved(Grasp("cup", policy=name), PANDA).name == there.name
+        assert _resolved(Grasp("cup", policy=name), PANDA).source == str(tmp_path / name)
         return
     with pytest.raises(InputError) as error:
         _resolved(Grasp("cup", policy=name), PANDA)
