@@ -53,7 +53,7 @@ class Spy:
         explore: Seed of random motions; None: those of the other policy.
     """
 
-    name = "spy"
+    name, source = "spy", ""
 
     def __init__(
         self,

@@ -233,7 +233,7 @@ def describe_nodes(nodes: list[Behaviour]) -> list[dict[str, Any]]:
 def policies_of(nodes: list[Behaviour]) -> list[dict[str, Any]]:
     """Which policy each concept uses: its node's number, its name, and what a leaf names to get it again."""
     return [
-        {"node": i, "name": leaf.policy_in_use.name, "source": getattr(leaf.policy_in_use, "source", "")}
+        {"node": i, "name": leaf.policy_in_use.name, "source": leaf.policy_in_use.source}
         for i, leaf in enumerate(nodes)
         if isinstance(leaf, ConceptNode)
     ]

@@ -69,6 +69,10 @@ class Policy(Protocol):
     def name(self) -> str:
         """How results name it; with the card's hash for a learned one."""
 
+    @property
+    def source(self) -> str:
+        """What a leaf names to get it again, which a run's log keeps; empty where that is not possible."""
+
     def act(self, model: Decidable[ViewT], seen: ViewT, memory: Any) -> Action:
         """The action for this instant; pure and batched."""
 

@@ -70,7 +70,7 @@ def test_each_activation_counts_from_its_own_begin(toy, act):
 class BitByBit:
     """Each decision brings the task a third nearer to done."""
 
-    name = "bit by bit"
+    name, source = "bit by bit", ""
 
     def act(self, model, seen, memory):
         return Action(model.programmed_motion(seen, memory), np.full(len(seen.tool), 1.0 / 3.0 + 1e-12))

@@ -83,7 +83,7 @@ def test_what_has_no_policy_yet_does_not_judge(env_of):
 
 def test_it_judges_once_it_has_one(env_of):
     class Up:
-        name = "up"
+        name, source = "up", ""
 
         def act(self, model, seen, memory):
             return Action(np.ones((1, 1)), seen.tool[:, 2] > 0.6)
