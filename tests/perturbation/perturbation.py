@@ -52,7 +52,8 @@ def shift_seeds(shift: int) -> dict[str, Callable[[ModuleType], None]]:
 
         @functools.wraps(sample)
         def shifted(self: Any, seed: int, *rest: Any, **options: Any) -> Any:
-            other = (seed + shift) % SEEDS if 0 <= seed < SEEDS else seed  # what is refused stays so
+            whole = isinstance(seed, int) and 0 <= seed < SEEDS
+            other = (seed + shift) % SEEDS if whole else seed  # what is refused stays so
             drawn = sample(self, other, *rest, **options)
             return dataclasses.replace(drawn, seed=int(seed))
 

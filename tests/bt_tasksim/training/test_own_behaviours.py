@@ -60,7 +60,7 @@ def test_what_a_node_remembers_ends_with_its_episode(tmp_path):
     runner = Runner(source.build(), source.scene, job.options)
     alone = runner.run(3)
     assert (alone.status.name, alone.control_steps) == (found[0][3].status, found[0][3].control_steps)
-    assert {o.status for o in found[0]} == {"SUCCESS"} and all(o.control_steps > 20 for o in found[0])
+    assert all(o.control_steps > 5 for o in found[0]), "the one before has not ended it at once"
 
 
 @pytest.mark.parametrize("batch", [1, 2])
