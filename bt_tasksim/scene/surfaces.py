@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import Any, Protocol, Self, TypeGuard
 
 import numpy as np
 
@@ -39,7 +39,6 @@ class OuterSurface(Protocol):
         """The nearest points ``(..., 3)`` to points ``(..., 3)``, in the solid's frame, metres."""
 
 
-@runtime_checkable
 class Joinable(Protocol):
     """A surface several of which can be computed at once."""
 
@@ -187,15 +186,13 @@ class ManySurfaces:
     def __init__(self, surfaces: Sequence[OuterSurface]) -> None:
         groups: dict[Any, list[int]] = {}
         for i, surface in enumerate(surfaces):
-            key = (type(surface), surface.kind) if isinstance(surface, Joinable) else id(surface)
+            key = (type(surface), surface.kind) if _joinable(surface) else id(surface)
             groups.setdefault(key, []).append(i)
         self._order = np.argsort([i for rows in groups.values() for i in rows])
         self._groups: list[tuple[np.ndarray, OuterSurface]] = []
         for rows in groups.values():
             first = surfaces[rows[0]]
-            joined = (
-                type(first).together([surfaces[i] for i in rows]) if isinstance(first, Joinable) else first
-            )
+            joined = type(first).together([surfaces[i] for i in rows]) if _joinable(first) else first
             self._groups.append((np.array(rows), joined))
 
     def nearest(self, point: Array) -> Array:
@@ -209,6 +206,11 @@ class ManySurfaces:
             for index, (_, surface) in zip(rows, self._groups, strict=True)
         ]
         return xp.take(xp.concat(found, axis=0), xp.asarray(self._order, device=point.device), axis=0)
+
+
+def _joinable(surface: OuterSurface) -> TypeGuard[Joinable]:
+    """Whether it is a `Joinable`; asking the protocol itself takes as long as computing the surface."""
+    return hasattr(type(surface), "together")
 
 
 def _column(values: Sequence[float | Array]) -> Array:

@@ -261,7 +261,8 @@ def _from_journal(journal: Path, versions: Mapping[str, str]) -> KeptEvaluation:
 
 def _real(path: str | Path) -> Path:
     """Where a path leads: there the file is, and its journal beside it, by whatever name it is reached."""
-    return Path(os.path.realpath(path))
+    real = os.path.realpath(path)
+    return Path(path) if real == os.path.abspath(path) else Path(real)  # sentences name it as it was given
 
 
 def _check_ours(journal: Path) -> bool:

@@ -77,9 +77,14 @@ def plain(value: Any) -> Any:
     return value
 
 
+FORMER = {"Fallback": "Selector"}
+"""Classes of nodes that were made when there was only a base class of theirs."""
+
+
 def node(tree: Any) -> dict[str, Any]:
     """A tree's nodes, names and arguments."""
-    found = {"type": type(tree).__name__, "name": tree.name}
+    kind = type(tree).__name__
+    found = {"type": FORMER.get(kind, kind), "name": tree.name}
     model = getattr(tree, "model", None)
     if model is not None:
         found["values"] = plain(model.values)

@@ -45,7 +45,7 @@ def test_old_command_lines_mean_what_they_meant(line):
         if "--workers" not in line:
             was["workers"] = None  # which is 1, but on a cluster
     if "connect_timeout" in found:
-        was = {"device": "cpu", **was}
+        was = {"device": "cpu", "laws": "auto", **was}
     if line.startswith("run "):
         was = {"video_camera": "overview", "video_size": "", "video_fps": 10.0, **was}
     if line.startswith("new "):
