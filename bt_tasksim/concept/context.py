@@ -15,10 +15,10 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.bundles import Rows
 from bt_tasksim.core.culprit import place_of
-from bt_tasksim.core.errors import CommandConflictError, LeafError
+from bt_tasksim.core.errors import BtTasksimError, CommandConflictError, LeafError, UnreachableError
 from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.facts_table import FactsTable
-from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.core.outcomes import OUT_OF_REACH, Outcome
 from bt_tasksim.core.plain import shown
 from bt_tasksim.core.poses import Array, array_namespace, constant, host
 from bt_tasksim.core.transfer import Index, fetched, sent
@@ -218,6 +218,23 @@ class Context:
             LeafError: A part is not finite; names the leaf that wrote it.
         """
         return Written(*(part.of_world(world) for part in self._parts.values()))
+
+    def refusal(self, world: int, error: BtTasksimError) -> Refusal:
+        """What `refused` is to say where an engine could not carry out what was written in this tick.
+
+        It is asked for before `advance`, which forgets who wrote what.
+
+        Args:
+            world: The world, by its row.
+            error: Why not.
+
+        Raises:
+            BtTasksimError: The error itself, where it is not about reach.
+        """
+        if not isinstance(error, UnreachableError):
+            raise error
+        outcome = OUT_OF_REACH(what=error, distance=error.distance, angle=error.angle)
+        return Refusal(self.tool_writer(world), outcome)
 
     def withdraw(self, leaf: Behaviour, rows: Array) -> None:
         """Drop what a leaf has written in this tick: it was interrupted, and others may act instead."""

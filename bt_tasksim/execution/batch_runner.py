@@ -13,13 +13,13 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tasksim.concept.batch_leaves import leaf_in_batch
-from bt_tasksim.concept.context import Context, Refusal
+from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.concept.world_context import WorldContext
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING
-from bt_tasksim.core.errors import BtTasksimError, InputError, UnreachableError
-from bt_tasksim.core.outcomes import FAILED, OUT_OF_REACH, TIME_OVER, Outcome
+from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.outcomes import FAILED, TIME_OVER, Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import Hidden, WorldModel
@@ -30,7 +30,7 @@ from bt_tasksim.execution.leaf_errors import no_status, set_up
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import LONGEST, NOT_JUDGED, SETTLE, Runner
-from bt_tasksim.execution.worlds import BatchWorlds, hidden_of
+from bt_tasksim.execution.worlds import BatchWorlds, Unreached, hidden_of
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.scene import WorldSource
@@ -179,10 +179,10 @@ class BatchRunner:
         begun: list[int] = []
         yield from self._begin(rested, waiting, stream, begun)
         going = np.setdiff1d(np.flatnonzero(self._phase != IDLE), np.array(begun, int))
+        unreached: list[Unreached] = []
         if len(going):
             index = Index(going)
             tool, hand = (None if part is None else index.of(part) for part in (written.tool, written.hand))
-            writers = {row: self.context.tool_writer(row) for row in going.tolist()}
             unreached = self.worlds.step(tool, hand, going)
             self.control_steps += len(going)
             for row in going.tolist():
@@ -192,16 +192,11 @@ class BatchRunner:
             self._left[going] -= 1
             yield from self._broken(going)
             going = going[self._phase[going] != IDLE]
-        else:
-            unreached, writers = [], {}
+        refused = {miss.row: self.context.refusal(miss.row, miss.error) for miss in unreached}
         seen = np.union1d(going, np.array(begun, int))
         if len(seen):
             self.context.advance(self.worlds.observe(seen), seen)
-        for miss in unreached:
-            if not isinstance(miss.error, UnreachableError):
-                raise miss.error
-            outcome = OUT_OF_REACH(what=miss.error, distance=miss.error.distance, angle=miss.error.angle)
-            self.context.refused[miss.row] = Refusal(writers.get(miss.row), outcome)
+        self.context.refused.update(refused)
 
     def _tick(self) -> None:
         """Tick all worlds whose tree has not ended; those whose tree ends now come to rest."""

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_tasksim.concept.context import Context, Refusal, one_world
+from bt_tasksim.concept.context import Context, one_world
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.reporting import as_statement, speaker, whole_outcome
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
 from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import (
     FAILED,
-    OUT_OF_REACH,
     TIME_OVER,
     Outcome,
     outcome_of_error,
@@ -297,10 +296,9 @@ class Runner:
         try:
             self._observed(pipeline.step(command))
         except UnreachableError as error:
-            writer = context.tool_writer()
+            refusal = context.refusal(0, error)
             self._observed(pipeline.step(Command()))
-            miss = OUT_OF_REACH(what=error, distance=error.distance, angle=error.angle)
-            context.refused[0] = Refusal(writer, miss)
+            context.refused[0] = refusal
 
     def tick(self) -> Command:
         """Tick the tree once; returns the command that its leaves have written.

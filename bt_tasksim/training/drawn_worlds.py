@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bt_tasksim.concept.context import Context, Refusal
-from bt_tasksim.core.errors import BtTasksimError, UnreachableError
-from bt_tasksim.core.outcomes import OUT_OF_REACH
+from bt_tasksim.core.errors import BtTasksimError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.execution.worlds import Unreached, Worlds
+from bt_tasksim.execution.worlds import Worlds
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.scene import WorldSource
@@ -53,7 +52,7 @@ class DrawnWorlds:
         self.scene = engines.source(scene)
         self.seeds = np.zeros(context.worlds, np.int64)
         self._draws: list[Draws | None] = [None] * context.worlds
-        self._unreached: list[tuple[Unreached, Refusal]] = []
+        self._refused: dict[int, Refusal] = {}
 
     def draw_from(self, row: int, draws: Draws) -> None:
         """Where the next worlds in a row come from."""
@@ -94,17 +93,12 @@ class DrawnWorlds:
         """
         written = self._context.written
         tool, hand = (None if part is None else part[rows] for part in (written.tool, written.hand))
-        self._unreached = []
-        for miss in self._engines.step(tool, hand, rows):
-            if not isinstance(miss.error, UnreachableError):
-                raise miss.error
-            outcome = OUT_OF_REACH(what=miss.error, distance=miss.error.distance, angle=miss.error.angle)
-            self._unreached.append((miss, Refusal(self._context.tool_writer(miss.row), outcome)))
+        unreached = self._engines.step(tool, hand, rows)
+        self._refused = {miss.row: self._context.refusal(miss.row, miss.error) for miss in unreached}
         return self._engines.errors(rows)
 
     def look(self, rows: Array) -> None:
         """Let the leaves see worlds ``(k,)`` as they are now, and what could not be reached in the step."""
         self._context.advance(self._engines.observe(rows), rows)
-        unreached, self._unreached = self._unreached, []
-        for miss, refusal in unreached:
-            self._context.refused[miss.row] = refusal
+        self._context.refused.update(self._refused)
+        self._refused = {}
