@@ -5,7 +5,7 @@ A process that is forked has the tree. An actor of a cluster builds its own, and
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
@@ -44,10 +44,12 @@ class Keeping:
     policies: Mapping[str, Policy]
     worlds: int
 
-    def keeper(self, tree: Behaviour, scene: WorldSource) -> EpisodeBatch:
-        """It, made."""
+    def keeper(
+        self, tree: Behaviour, scene: WorldSource, build: Callable[[], Behaviour] | None
+    ) -> EpisodeBatch:
+        """It, made; ``build`` makes one more tree, see `EpisodeBatch`."""
         about = tree, scene, self.train, self.options, self.reward
-        return EpisodeBatch(*about, policies=self.policies, worlds=self.worlds)
+        return EpisodeBatch(*about, policies=self.policies, worlds=self.worlds, build=build)
 
     def subject(self, tree: Behaviour, scene: WorldSource, source: NamedTree) -> dict[str, str]:
         """What it is of, as hashes by name, once the tree is set up."""
@@ -89,7 +91,7 @@ class KeeperElsewhere:
             InputError: What is found there is no good, or is not what it is here.
         """
         found = self.source.load(self.keeping.options)
-        keeper = self.keeping.keeper(found.build(), found.scene)
+        keeper = self.keeping.keeper(found.build(), found.scene, found.build)
         subject = self.keeping.subject(keeper.tree, keeper.scene, self.source)
         known = {name: hashed for name, hashed in subject.items() if name in self.subject}
         if others := differing(self.subject, known):  # who sent this may have no file of the tree

@@ -57,16 +57,18 @@ def in_training(
             leaf.under_training = False
 
 
-def why_alone_in(tree: Behaviour, scene: WorldSource, options: EngineOptions) -> str:
+def why_alone_in(
+    tree: Behaviour, scene: WorldSource, options: EngineOptions, build: Callable[[], Behaviour] | None
+) -> str:
     """Why episodes of a tree run one by one, as a sentence; empty where they need not."""
     alone = why_alone(options)
-    if alone:
+    if alone or build is not None:
         return alone
     context = Context(load_robot(scene.robot), worlds=2)
     try:
         BatchTree(tree, context.worlds, lambda leaf: leaf_in_batch(leaf, context))
     except InputError:
-        return "something in the tree has no form for many worlds"
+        return "something in the tree has no form for many worlds, and there is no build="
     return ""
 
 

@@ -72,6 +72,7 @@ class TrainingTask:
         name: Name of the tree in the cards.
         cluster: Address of a cluster.
         source: Where its actors find tree and scene.
+        build: Makes one more tree of the same shape.
     """
 
     tree: Behaviour
@@ -81,6 +82,7 @@ class TrainingTask:
     name: str
     cluster: str | None = None
     source: NamedTree | None = None
+    build: Callable[[], Behaviour] | None = None
 
 
 class NodeTraining:
@@ -134,12 +136,12 @@ class NodeTraining:
 
         task, reward = self.task, self.config.reward
         members = task.workers
-        alone = why_alone_in(task.tree, task.scene, task.options)
+        alone = why_alone_in(task.tree, task.scene, task.options, task.build)
         worlds = 1 if alone else self._worlds(members)
         keeping = Keeping(self.node.name, task.options, reward, self.trained, worlds)
 
         def make() -> EpisodeBatch:
-            return keeping.keeper(task.tree, task.scene)
+            return keeping.keeper(task.tree, task.scene, task.build)
 
         if alone:
             LOG.warning("the episodes run one by one: %s", alone)

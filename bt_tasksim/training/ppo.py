@@ -48,6 +48,7 @@ def train(
     name: str | None = None,
     cluster: str | None = None,
     source: NamedTree | None = None,
+    build: Callable[[], Behaviour] | None = None,
 ) -> LearnedPolicy:
     """Train what a tree's `Train` nodes mark, one after the other, each with the ones before it frozen.
 
@@ -68,6 +69,8 @@ def train(
         cluster: Address of a Ray cluster, or ``local`` for one of this machine, see
             `bt_tasksim.core.cluster`. What comes of the training is the same.
         source: The names by which actors of a cluster find tree and scene, of which each builds its own.
+        build: Makes one more tree of the same shape: with it a tree in which something has no form for many
+            worlds runs in batches, too, see `bt_tasksim.execution.batch.BatchTree`.
 
     Returns:
         The policy of the first node.
@@ -95,7 +98,7 @@ def train(
     nodes = train_nodes(tree)
     for node in nodes:
         shared_layout(node, node.learners(), load_robot(scene.robot))
-    task = TrainingTask(tree, scene, options, workers, name or tree.name, cluster, source)
+    task = TrainingTask(tree, scene, options, workers, name or tree.name, cluster, source, build)
     with nullcontext() if out is None else _alone_in(Path(out)):
         return _train(task, out, config, resume, backward, report)
 

@@ -114,6 +114,7 @@ def run(request: Request, report: Callable[[Progress], None]) -> str:
                 name=source.name,
                 cluster=request.cluster,
                 source=named,
+                build=source.build,
             )
     except KeyboardInterrupt as stop:
         kept = any((training_folder(folder) / CHECKPOINT).is_file() for folder in places.values())

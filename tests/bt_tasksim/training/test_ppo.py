@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import py_trees
 import pytest
 import torch
 import toys
@@ -336,6 +337,26 @@ def test_a_full_disk_is_one_sentence_and_leaves_the_last_checkpoint(begun, monke
     with pytest.raises(MachineError, match="No space left on device"):
         learn(out, resume=True)
     assert file.read_bytes() == before
+
+
+def test_beside_a_behaviour_of_ones_own_it_is_trained_in_batches(tmp_path, caplog):
+    """With what makes a tree; without it world by world, and it comes to the same."""
+
+    def own():
+        return sequence(
+            "own", py_trees.behaviours.Success("a behaviour of one's own"), Train(Raise()), Check()
+        )
+
+    policies, most = [], []
+    for name, build in (("alone", None), ("batch", own)):
+        toys.Worlds.made.clear()
+        train(own(), SCENE, out=tmp_path / name, config=TINY, workers=1, build=build)
+        policies.append(weights(tmp_path / name))
+        most.append(max((max(worlds.sizes) for worlds in toys.Worlds.made), default=1))
+    assert policies[0] == policies[1] and most[0] == 1 < most[1]
+    assert [record.getMessage().startswith("the episodes run one by one") for record in caplog.records].count(
+        True
+    ) == 1
 
 
 def test_what_cannot_be_trained_is_refused_before_it_begins(tmp_path):
