@@ -28,7 +28,7 @@ from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.trees.load import load_source
 
-WORLDS = (1, 64, 256)
+WORLDS = (1, 64, 256, 1024)
 OUTSIDE_US = {1: 1200.0, 64: 110.0, 256: 70.0}
 """At most so many microseconds a control step and world are outside physics, by worlds."""
 RATIO = {1: 4.3, 2: 7.0}
@@ -73,7 +73,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
                 + "".join(
                     f"{found[name]:{width}.0f}" if name in found else " " * width for name, width in COLUMNS
                 )
-                + f"{OUTSIDE_US[worlds]:7.0f}",
+                + (f"{OUTSIDE_US[worlds]:7.0f}" if worlds in OUTSIDE_US else ""),
                 flush=True,
             )
     finally:
