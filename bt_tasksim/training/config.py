@@ -103,7 +103,7 @@ class TrainConfig:
 
     steps: Annotated[int, Field(ge=1, le=10**12)] = 1_000_000
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
-    rollout: Annotated[int, Field(ge=2, le=LARGEST_ROLLOUT)] = 8192
+    rollout: Annotated[int, Field(ge=2, le=LARGEST_ROLLOUT)] = 4096
     epochs: Annotated[int, Field(ge=1, le=1000)] = 10
     minibatch: Annotated[int, Field(ge=1, le=LARGEST_ROLLOUT)] = 512
     learning_rate: Annotated[Number, Field(gt=0.0, le=1.0)] = 4e-4
