@@ -71,7 +71,7 @@ ALWAYS_ZERO = {"bench", "check", "decompose", "evaluate", "new", "new-key", "pol
 """Commands that end with 0; a run may fail, as one draw may."""
 
 TRAINING = {
-    "steps": 128, "rollout": 64, "epochs": 1, "minibatch": 32, "evaluate_every": 1,
+    "steps": 128, "n_envs": 2, "n_steps": 32, "epochs": 1, "minibatch": 32, "evaluate_every": 1,
     "evaluation_draws": 2, "checkpoint_every": 1,
 }  # fmt: skip
 

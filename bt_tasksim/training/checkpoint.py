@@ -216,17 +216,11 @@ def _facts(text: str, path: Path) -> Facts:
 def _is_row(row: Any) -> bool:
     if not isinstance(row, dict) or not isinstance(row.get("stage"), str):
         return False
-    if type(row.get("steps")) is not int or row["steps"] < 0 or not _is_length(row.get("length")):
-        return False
     held = row.get("held_apart") or {"successes": 0, "draws": 1}
     if not isinstance(held, dict):
         return False
     wins, draws = held.get("successes"), held.get("draws")
     return type(wins) is int and type(draws) is int and 0 <= wins <= draws and draws > 0
-
-
-def _is_length(value: Any) -> bool:
-    return isinstance(value, float) and 0.0 <= value < math.inf
 
 
 def _one_line(error: BaseException) -> str:

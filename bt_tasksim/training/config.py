@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -17,50 +17,13 @@ from bt_tasksim.core.renamed import renamed_fields
 from bt_tasksim.core.typed_file import Model, Number, check_record, record_model, validate
 from bt_tasksim.training.reward import Reward
 
-T = TypeVar("T")
 LARGEST_ROLLOUT = 2**21
 """Decisions: they are kept in memory, some hundred numbers each."""
 
 
-FORMER = {"n_envs": 8, "lanes": 8, "n_steps": 512, "lane_steps": 512}
-"""Defaults of former settings: a rollout was so many environments with so many decisions each."""
-
-
-def with_rollout(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with `TrainConfig.rollout` instead of the former ones whose product it is.
-
-    Raises:
-        FieldError: They are no whole numbers above zero, or one is given under two names.
-    """
-    former = [name for name in FORMER if name in values]
-    for name in former:
-        if type(values[name]) is not int or values[name] < 1:
-            raise FieldError(
-                f"training: '{name}' should be a whole number above zero, found {short(values[name])}", name
-            )
-    if not former:
-        return dict(values)
-    if "rollout" in values or {"n_envs", "lanes"} <= {*former} or {"n_steps", "lane_steps"} <= {*former}:
-        raise FieldError(f"training: '{former[0]}' is a former name of 'rollout': give that alone", former[0])
-    envs = values.get("n_envs", values.get("lanes", FORMER["lanes"]))
-    steps = values.get("n_steps", values.get("lane_steps", FORMER["lane_steps"]))
-    return {name: value for name, value in values.items() if name not in former} | {"rollout": envs * steps}
-
-
-def _takes_former(cls: type[T]) -> type[T]:
-    """Calls may use them, too."""
-    made: Callable[..., None] = cls.__dict__["__init__"]
-
-    @functools.wraps(made)
-    def init(self: T, *args: Any, **values: Any) -> None:
-        made(self, *args, **with_rollout(values))
-
-    setattr(cls, "__init__", init)  # noqa: B010 - no method to mypy
-    return cls
-
-
-@_takes_former
 @renamed_fields(
+    lanes="n_envs",
+    lane_steps="n_steps",
     log_deviation="log_std",
     final_log_deviation="final_log_std",
     lesson_share="stage_share",
@@ -75,8 +38,9 @@ class TrainConfig:
     Attributes:
         steps: Decisions of the leaves under training, in all.
         seed: Everything random follows from it.
-        rollout: Decisions between two updates: as many whole episodes as are thought to have so many, see
-            `episodes`.
+        n_envs: Environments in a rollout, side by side; results depend on it, and not on the workers.
+        n_steps: Decisions of each environment in one rollout. 8 environments of 512 hold some 150 episodes:
+            enough to judge a completion signal that pays once in each.
         epochs: Passes over a rollout.
         minibatch: Decisions in a gradient step.
         learning_rate: At the beginning.
@@ -103,7 +67,8 @@ class TrainConfig:
 
     steps: Annotated[int, Field(ge=1, le=10**12)] = 1_000_000
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
-    rollout: Annotated[int, Field(ge=2, le=LARGEST_ROLLOUT)] = 4096
+    n_envs: Annotated[int, Field(ge=1, le=4096)] = 8
+    n_steps: Annotated[int, Field(ge=1, le=LARGEST_ROLLOUT)] = 512
     epochs: Annotated[int, Field(ge=1, le=1000)] = 10
     minibatch: Annotated[int, Field(ge=1, le=LARGEST_ROLLOUT)] = 512
     learning_rate: Annotated[Number, Field(gt=0.0, le=1.0)] = 4e-4
@@ -128,10 +93,22 @@ class TrainConfig:
         check_record(self, "training")
         if not isinstance(self.reward, Reward):
             raise InputError(f"training: 'reward' should be a Reward, found {short(self.reward)}")
+        if not 2 <= self.rollout <= LARGEST_ROLLOUT:
+            raise FieldError(
+                f"training: a rollout of 'n_envs' times 'n_steps' should have 2 to {LARGEST_ROLLOUT} "
+                f"decisions, found {self.rollout}",
+                "n_steps",
+            )
 
-    def episodes(self, length: float) -> int:
-        """How many episodes a rollout has, where they are thought to have ``length`` decisions each."""
-        return max(1, round(self.rollout / length))
+    @property
+    def rollout(self) -> int:
+        """Decisions of one rollout."""
+        return self.n_envs * self.n_steps
+
+    @property
+    def rollouts(self) -> int:
+        """How many rollouts there are, the last one included though it may go beyond ``steps``."""
+        return math.ceil(self.steps / self.rollout)
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data, for a card."""
@@ -144,7 +121,7 @@ class TrainConfig:
         Raises:
             InputError: A setting is unknown or no good.
         """
-        return cls.from_model(validate(record_model(cls), Document("training", with_rollout(data))))
+        return cls.from_model(validate(record_model(cls), Document("training", dict(data))))
 
     @classmethod
     def from_model(cls, model: Model) -> TrainConfig:

@@ -1,9 +1,9 @@
-"""PPO of stable-baselines3, fed with whole episodes."""
+"""PPO of stable-baselines3, fed with rollouts of several environments."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,8 @@ from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
-from bt_tasksim.training.collectors import EpisodeRollout
+from bt_tasksim.training.collectors import EnvironmentRollout
 from bt_tasksim.training.config import TrainConfig
-
-_NOTHING = gymnasium.spaces.Box(0.0, 1.0, (1,), np.float32)
-"""Room for what a buffer need not hold."""
 
 
 class _Spaces(gymnasium.Env[Array, Array]):
@@ -60,7 +57,7 @@ class Statistics:
 
 
 class Learner:
-    """A PPO whose rollouts are whole episodes, however many decisions each has.
+    """A PPO whose rollouts come from several environments.
 
     Args:
         observation_space: Box ``(n,)``.
@@ -73,12 +70,11 @@ class Learner:
         self, observation_space: Any, action_space: Any, config: TrainConfig, board: Path | None = None
     ) -> None:
         self.config = config
-        self._spaces = _Spaces(observation_space, action_space)
         with _seeded(config.seed):
             self.ppo = PPO(
                 "MlpPolicy",
-                self._spaces,
-                n_steps=config.rollout,
+                _Spaces(observation_space, action_space),
+                n_steps=config.n_steps * config.n_envs,
                 batch_size=min(config.minibatch, config.rollout),
                 n_epochs=config.epochs,
                 learning_rate=lambda left: (
@@ -97,6 +93,15 @@ class Learner:
             )
             with torch.no_grad():
                 self.ppo.policy.action_net.bias[-1] = config.terminate_bias
+        self.ppo.rollout_buffer = RolloutBuffer(
+            config.n_steps,
+            observation_space,
+            action_space,
+            device="cpu",
+            gae_lambda=config.gae_lambda,
+            gamma=config.reward.gamma,
+            n_envs=config.n_envs,
+        )
         outputs = [TensorBoardOutputFormat(str(board))] if board is not None else []
         self.logger = Logger(None if board is None else str(board), outputs)
         self.ppo.set_logger(self.logger)
@@ -121,24 +126,42 @@ class Learner:
         """Standard deviations ``(m,)`` of the actions."""
         return np.exp(_numpy(self.ppo.policy.log_std))
 
-    def update(self, episodes: Sequence[EpisodeRollout], iteration: int, left: float) -> None:
+    def update(self, rollouts: list[EnvironmentRollout], iteration: int) -> None:
         """Learn from one rollout.
-
-        Args:
-            episodes: Its episodes.
-            iteration: Its number, from 1.
-            left: Share of the training that is left after it.
 
         Raises:
             InputError: The weights are no finite numbers any more.
         """
-        config, policy = self.config, self.ppo.policy
-        buffer = self._rollout(episodes)
-        n = buffer.buffer_size
-        self.ppo.rollout_buffer = buffer
-        self.ppo.batch_size = -(-n // max(1, round(n / config.minibatch)))  # alike, without a small rest
-        self.ppo.num_timesteps += n
-        self.ppo._current_progress_remaining = left
+        config, policy, buffer = self.config, self.ppo.policy, self.ppo.rollout_buffer
+        network = self.network
+        n = config.n_steps
+        features = np.stack([network.normalise(rollout.features) for rollout in rollouts], axis=1)
+        actions = np.stack([rollout.actions for rollout in rollouts], axis=1)
+        rewards = np.stack([rollout.rewards for rollout in rollouts], axis=1)
+        starts = np.stack([rollout.starts for rollout in rollouts], axis=1)
+        with torch.no_grad():
+            flat = torch.as_tensor(features.reshape(-1, features.shape[-1]))
+            values, log_prob, _ = policy.evaluate_actions(
+                flat, torch.as_tensor(actions.reshape(-1, actions.shape[-1]))
+            )
+            values = values.reshape(n, len(rollouts))
+            log_prob = log_prob.reshape(n, len(rollouts))
+            last = torch.zeros(len(rollouts))
+            ended = np.ones(len(rollouts), bool)
+            for k, rollout in enumerate(rollouts):
+                if len(rollout.cut):
+                    beyond = policy.predict_values(torch.as_tensor(network.normalise(rollout.cut))).flatten()
+                    for at, value in zip(rollout.cut_at.tolist(), beyond, strict=True):
+                        if at == n - 1:
+                            last[k], ended[k] = value, False
+                        else:
+                            rewards[at, k] += config.reward.gamma * float(value)
+        buffer.reset()
+        for t in range(n):
+            buffer.add(features[t], actions[t], rewards[t], starts[t], values[t], log_prob[t])
+        buffer.compute_returns_and_advantage(last_values=last, dones=ended)
+        self.ppo.num_timesteps += config.rollout
+        self.ppo._update_current_progress_remaining(iteration, max(config.rollouts, 1))
         with _seeded(config.seed, iteration + 1):
             try:
                 self.ppo.train()
@@ -146,44 +169,11 @@ class Learner:
                 raise _diverged(iteration) from error
         if not all(bool(torch.isfinite(values).all()) for values in policy.state_dict().values()):
             raise _diverged(iteration)
-        bound = config.final_log_std + min(1.0, 2.0 * left) * (config.log_std - config.final_log_std)
+        left = min(1.0, 2.0 - 2.0 * iteration / max(config.rollouts, 1))
+        bound = config.final_log_std + left * (config.log_std - config.final_log_std)
         with torch.no_grad():
             policy.log_std.clamp_(max=max(bound, config.final_log_std))
-        self.statistics.update(np.concatenate([episode.features for episode in episodes]))
-
-    def _rollout(self, episodes: Sequence[EpisodeRollout]) -> RolloutBuffer:
-        """Episodes as one row of decisions ``(n, 1)`` with values, advantages and returns."""
-        config, policy, spaces = self.config, self.ppo.policy, self._spaces
-        about = {"gae_lambda": config.gae_lambda, "gamma": config.reward.gamma, "device": "cpu"}
-        lengths = np.array([len(episode.rewards) for episode in episodes])
-        rows = RolloutBuffer(int(lengths.sum()), spaces.observation_space, spaces.action_space, **about)
-        network = self.network
-        features = network.normalise(np.concatenate([episode.features for episode in episodes]))
-        rows.observations[:, 0] = features
-        rows.actions[:, 0] = np.concatenate([episode.actions for episode in episodes])
-        rewards = np.concatenate([episode.rewards for episode in episodes])
-        cut = {k: episode.cut for k, episode in enumerate(episodes) if episode.cut is not None}
-        with torch.no_grad():
-            values, log_prob, _ = policy.evaluate_actions(
-                torch.as_tensor(rows.observations[:, 0]), torch.as_tensor(rows.actions[:, 0])
-            )
-            if cut:
-                beyond = network.normalise(np.stack(list(cut.values())))
-                worth = policy.predict_values(torch.as_tensor(beyond)).flatten().numpy()
-                rewards[np.cumsum(lengths)[list(cut)] - 1] += config.reward.gamma * worth
-        # Side by side, an episode a column, the law of advantages is stable-baselines3's own.
-        apart = RolloutBuffer(int(lengths.max()), _NOTHING, _NOTHING, n_envs=len(episodes), **about)
-        steps = np.arange(lengths.max())
-        within = steps[:, None] < lengths
-        apart.rewards.T[within.T] = rewards
-        apart.values.T[within.T] = values.flatten().numpy()
-        apart.episode_starts[:] = ~within
-        apart.compute_returns_and_advantage(torch.zeros(len(episodes)), np.ones(len(episodes), bool))
-        rows.rewards[:, 0], rows.values[:, 0] = rewards, values.flatten().numpy()
-        rows.log_probs[:, 0] = log_prob.numpy()
-        rows.advantages[:, 0], rows.returns[:, 0] = apart.advantages.T[within.T], apart.returns.T[within.T]
-        rows.full = True
-        return rows
+        self.statistics.update(np.concatenate([rollout.features for rollout in rollouts]))
 
     # ---- checkpoints ------------------------------------------------------------------------------------
 

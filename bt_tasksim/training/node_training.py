@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import logging
+import math
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
@@ -35,7 +36,7 @@ from bt_tasksim.training.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
-from bt_tasksim.training.collectors import DrawResult, DrawTask, EpisodeRollout, RolloutTask
+from bt_tasksim.training.collectors import LENGTH, DrawResult, DrawTask, EnvironmentRollout, RolloutTask
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.episode_batch import EpisodeBatch
 from bt_tasksim.training.evaluation import usual_batch
@@ -54,10 +55,8 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-LENGTH = 64.0
-"""Decisions that an episode is thought to have before any has ended."""
-WARM_UP = 8
-"""Episodes before the first rollout, from which features are normalised."""
+WARM_UP = 64
+"""Decisions of each environment before the first rollout, from which features are normalised."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,6 @@ class NodeTraining:
         self.best: tuple[float, dict[str, Array]] | None = None
         self.seconds = 0.0
         self.iteration = 0
-        self.length = LENGTH
 
     def run(self, resume: bool, report: Callable[[Progress], None] | None) -> LearnedPolicy:
         """Train, and write the policy.
@@ -135,7 +133,7 @@ class NodeTraining:
             )
 
         task, reward = self.task, self.config.reward
-        members = task.workers
+        members = min(task.workers, self.config.n_envs)
         alone = why_alone_in(task.tree, task.scene, task.options, task.build)
         worlds = 1 if alone else self._worlds(members)
         keeping = Keeping(self.node.name, task.options, reward, self.trained, worlds)
@@ -164,9 +162,10 @@ class NodeTraining:
     def _worlds(self, members: int) -> int:
         """How many worlds a member of the fleet has: as many as it has use and room for."""
         config = self.config
-        most = max(config.episodes(LENGTH), config.evaluation_draws)
+        episodes = -(-config.n_envs // members) * math.ceil(config.n_steps / LENGTH + 1.0)
+        draws = -(-config.evaluation_draws // members)
         here = 1 if self.task.cluster is not None else members
-        return min(-(-most // members), usual_batch(self.task.options, here))
+        return min(max(episodes, draws), usual_batch(self.task.options, here))
 
     def _learn(
         self, pool: Fleet[EpisodeBatch], resume: bool, report: Callable[[Progress], None] | None
@@ -194,23 +193,22 @@ class NodeTraining:
         if self.start_from is not None:
             learner.begin_with(self.start_from)
         if checkpoint is not None:
-            learner.restore(checkpoint, self._steps)
+            learner.restore(checkpoint, self.iteration * config.rollout)
         elif self.start_from is None:
             self._warm_up(pool, learner)
-        while self._steps < config.steps:
+        while self.iteration < config.rollouts:
             began = time.perf_counter()
-            episodes = self._episodes(pool, learner, config.episodes(self.length))
+            rollouts = self._collect(pool, learner, config.n_steps)
+            learner.update(rollouts, self.iteration + 1)
             self.iteration += 1
-            row = self._row(episodes)
-            last = row["steps"] >= config.steps
-            learner.update(episodes, self.iteration, max(0.0, 1.0 - row["steps"] / config.steps))
+            row = self._row(rollouts)
             learned = time.perf_counter() - began
+            last = self.iteration == config.rollouts
             if last or (config.evaluate_every and self.iteration % config.evaluate_every == 0):
                 row["held_apart"] = self._evaluate(pool, learner)
             self.seconds += time.perf_counter() - began
-            row |= {"seconds": round(self.seconds, 2), "rate": (row["steps"] - self._steps) / learned}
+            row |= {"seconds": round(self.seconds, 2), "rate": config.rollout / learned}
             self.history.append(row)
-            self.length = row["length"]
             self._next_stage()
             self._log(learner, row)
             if self.folder is not None and (last or self.iteration % config.checkpoint_every == 0):
@@ -230,24 +228,23 @@ class NodeTraining:
 
     # ---- one rollout ------------------------------------------------------------------------------------
 
-    @property
-    def _steps(self) -> int:
-        """Decisions so far."""
-        return self.history[-1]["steps"] if self.history else 0
-
-    def _warm_up(self, pool: Fleet[EpisodeBatch], learner: Learner) -> None:
-        episodes = self._episodes(pool, learner, WARM_UP, warm=True)
-        learner.statistics.update(np.concatenate([episode.features for episode in episodes]))
-        self.length = float(np.mean([episode.end.decisions for episode in episodes]))
-
-    def _episodes(
-        self, pool: Fleet[EpisodeBatch], learner: Learner, count: int, warm: bool = False
-    ) -> list[EpisodeRollout]:
+    def _collect(
+        self, pool: Fleet[EpisodeBatch], learner: Learner, decisions: int, warm: bool = False
+    ) -> list[EnvironmentRollout]:
         arrays, std = learner.network.arrays(), learner.std
         stage = self.stage if self.task.scene.stages else None
-        about = self.config.seed, int(warm), self.iteration
-        tasks = [RolloutTask(arrays, std, (*about, k), stage) for k in range(count)]
+        length = (self.history[-1]["length"] if self.history else 0.0) or LENGTH
+        tasks = [
+            RolloutTask(
+                arrays, std, (self.config.seed, int(warm), self.iteration, k), decisions, stage, length
+            )
+            for k in range(self.config.n_envs)
+        ]
         return results(pool, tasks, self._members)
+
+    def _warm_up(self, pool: Fleet[EpisodeBatch], learner: Learner) -> None:
+        rollouts = self._collect(pool, learner, WARM_UP, warm=True)
+        learner.statistics.update(np.concatenate([rollout.features for rollout in rollouts]))
 
     def _evaluate(self, pool: Fleet[EpisodeBatch], learner: Learner) -> dict[str, Any]:
         """Successes on held-apart draws, the same ones each time; keeps the best policy so far."""
@@ -262,18 +259,18 @@ class NodeTraining:
         reasons = Counter(result.reason for result in found if not result.success)
         return {"successes": wins, "draws": len(found), "failures": dict(reasons.most_common())}
 
-    def _row(self, episodes: list[EpisodeRollout]) -> dict[str, Any]:
-        ends = [episode.end for episode in episodes]
+    def _row(self, rollouts: list[EnvironmentRollout]) -> dict[str, Any]:
+        ends = [end for rollout in rollouts for end in rollout.ends]
         self.recent.extend(end.success for end in ends)
         stages = self.task.scene.stages
         return {
-            "steps": self._steps + sum(end.decisions for end in ends),
+            "steps": self.iteration * self.config.rollout,
             "episodes": len(ends),
-            "success": float(np.mean([end.success for end in ends])),
-            "return": float(np.mean([end.total for end in ends])),
-            "length": float(np.mean([end.decisions for end in ends])),
+            "success": float(np.mean([end.success for end in ends])) if ends else 0.0,
+            "return": float(np.mean([end.total for end in ends])) if ends else 0.0,
+            "length": float(np.mean([end.decisions for end in ends])) if ends else 0.0,
             "ends": dict(Counter(end.reason for end in ends).most_common()),
-            "redrawn": sum(episode.redrawn for episode in episodes),
+            "redrawn": sum(rollout.redrawn for rollout in rollouts),
             "stage": stages[self.stage].name if stages else "",
         }
 
@@ -282,8 +279,8 @@ class NodeTraining:
         if not stages or self.stage >= len(stages) - 1:
             return
         stage = stages[self.stage]
-        before = max((row["steps"] for row in self.history if row["stage"] != stage.name), default=0)
-        late = self._steps - before >= self.config.stage_share * self.config.steps
+        spent = sum(row["stage"] == stage.name for row in self.history)
+        late = spent >= self.config.stage_share * self.config.rollouts
         enough = len(self.recent) >= self.config.success_window
         if late or (enough and float(np.mean(self.recent)) >= stage.until):
             self.stage += 1
@@ -294,12 +291,12 @@ class NodeTraining:
         held = next((r["held_apart"] for r in reversed(self.history) if r.get("held_apart")), None)
         return Progress(
             train=self.node.name,
-            steps=(self._steps, max(self._steps, config.steps)),
+            steps=(self.iteration * config.rollout, config.rollouts * config.rollout),
             success=float(np.mean(self.recent)) if self.recent else row["success"],
             held_apart=None if held is None else (held["successes"], held["draws"]),
             stage=row["stage"],
             rate=row["rate"],
-            seconds_left=self.seconds / self._steps * max(0, config.steps - self._steps),
+            seconds_left=self.seconds / self.iteration * (config.rollouts - self.iteration),
         )
 
     def _log(self, learner: Learner, row: Mapping[str, Any]) -> None:
@@ -374,7 +371,6 @@ class NodeTraining:
                 raise damaged(path, "its best policy is another one's")
         self.iteration, self.stage, self.seconds = facts.iteration, facts.stage, facts.seconds
         self.history = [dict(row) for row in facts.history]
-        self.length = (self.history[-1]["length"] if self.history else 0.0) or LENGTH
         self.recent.extend(facts.recent)
         self.best = (facts.best, best) if best and facts.best is not None else None
         return tensors
@@ -394,7 +390,7 @@ class NodeTraining:
             scene=scene.name,
             noise=", ".join(sorted({n for le in scene.stages for n in le.noise})) or task.options.noise,
             algorithm="PPO (stable-baselines3)",
-            steps=self._steps,
+            steps=self.iteration * self.config.rollout,
             seeds=(self.config.seed,),
             wall_seconds=round(self.seconds, 1),
             configuration={

@@ -28,8 +28,8 @@ from bt_tasksim.training.on_cluster import check_cluster
 from bt_tasksim.training.record import Progress
 from bt_tasksim.trees.nodes.train import Train, train_nodes
 
-ACTOR_DECISIONS = 1024
-"""Decisions of a rollout for each actor of a cluster, unless somebody says how many actors there are."""
+ACTOR_ENVS = 16
+"""Environments of a rollout for each actor of a cluster, unless somebody says how many actors there are."""
 FINE_TUNING = 0.25
 """Share of the steps that a backward pass takes for each node."""
 
@@ -60,7 +60,7 @@ def train(
             ``<out>.training`` keeps checkpoint, history and TensorBoard's events. None: nothing is kept.
         config: The settings.
         workers: Worker processes; by default one for each core. Or actors of a cluster; by default of
-            ``local`` one for each core, of another one for each `ACTOR_DECISIONS` of a rollout.
+            ``local`` one for each core, of another one for each `ACTOR_ENVS` environments of a rollout.
         resume: Go on from the checkpoint.
         options: Engines; by default SAPIEN with the noise model ``original``.
         backward: Afterwards, from the last node to the first, fine-tune each to what its followers need now.
@@ -93,7 +93,7 @@ def train(
                 "actors of a cluster build the tree themselves: say by which name or file they find it, "
                 "source=NamedTree('my_tree.py')"
             )
-    workers = workers or _usual_workers(cluster, config.rollout)
+    workers = workers or _usual_workers(cluster, config.n_envs)
     find_train(tree)
     nodes = train_nodes(tree)
     for node in nodes:
@@ -103,11 +103,11 @@ def train(
         return _train(task, out, config, resume, backward, report)
 
 
-def _usual_workers(cluster: str | None, rollout: int) -> int:
+def _usual_workers(cluster: str | None, n_envs: int) -> int:
     """How many processes or actors there are where nobody says it."""
     if cluster is None:
         return os.cpu_count() or 1
-    return len(os.sched_getaffinity(0)) if cluster == LOCAL else max(1, rollout // ACTOR_DECISIONS)
+    return len(os.sched_getaffinity(0)) if cluster == LOCAL else max(1, n_envs // ACTOR_ENVS)
 
 
 def _alone_in(out: Path) -> AbstractContextManager[None]:

@@ -1,7 +1,8 @@
 """Episodes collected in batches of worlds, the same whatever their size and the number of processes.
 
-Every episode has its own seeds, in a world of its own beside others, so it does not matter when and where it
-runs.
+A rollout is a fixed number of environments, each of which is a row of episodes with a fixed number of
+decisions in all. Every episode has its own seeds, in a world of its own beside others, so it does not matter
+when and where it runs: those of one environment go on side by side, too.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ from bt_tasksim.core.fleet import Fleet
 from bt_tasksim.core.poses import Array
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import Action, split_action
-from bt_tasksim.training.collectors import Collecting, EpisodeTask
+from bt_tasksim.training.collectors import Collecting, Collector, DrawTask, RolloutTask
 from bt_tasksim.training.drawn_worlds import Draws
 from bt_tasksim.training.episode_batch import EpisodeBatch
+
+AnyTask = RolloutTask | DrawTask
 
 
 @dataclass(frozen=True)
@@ -26,66 +29,74 @@ class TaskShare:
     """What a process does side by side.
 
     Attributes:
-        tasks: The episodes.
+        tasks: The tasks.
     """
 
-    tasks: Sequence[EpisodeTask]
+    tasks: Sequence[AnyTask]
 
     def __str__(self) -> str:
-        return f"a share of {len(self.tasks)} episodes"
+        return f"a share of {len(self.tasks)} environments or draws"
 
 
-@dataclass(frozen=True)
-class _Going:
-    """An episode in a world: the index of its task, what takes note of it, and who decides."""
-
-    index: int
-    episode: Collecting
-    network: Network
-
-
-def in_batch(batch: EpisodeBatch, tasks: Sequence[EpisodeTask], /) -> Iterator[tuple[int, Any]]:
-    """Run episodes in the worlds of a batch: each that is free takes the next one.
+def in_batch(batch: EpisodeBatch, tasks: Sequence[AnyTask], /) -> Iterator[tuple[int, Any]]:
+    """Do tasks in the worlds of a batch: each that is free takes an episode of the task that is next in turn.
 
     Yields:
         The index of a task and its result, as they are done; these depend on nothing but the task.
     """
+    collectors: dict[int, Collector[Any]] = {}
     networks: dict[int, Network] = {}  # by the identity of their arrays, of which tasks share one
-    for task in tasks:
+    for index, task in enumerate(tasks):
         if id(task.network) not in networks:
             networks[id(task.network)] = Network.from_arrays(task.network)
-    waiting = iter(enumerate(tasks))
-    going: dict[int, _Going] = {}
+        collectors[index] = task.collector(networks[id(task.network)])
+    free = list(range(batch.count))[::-1]
+    going: dict[int, tuple[int, Collecting]] = {}  # by world: a task and an episode of it
 
-    def begin(rows: Sequence[int]) -> None:
-        for row, (index, task) in zip(rows, waiting):  # noqa: B905  # tasks may be fewer
-            going[row] = _Going(index, task.episode(), networks[id(task.network)])
-            wanted = going[row].episode.begin()
-            rng = np.random.default_rng(wanted.seed)
-            batch.begin(row, Draws(rng, wanted.draw, wanted.stream, wanted.stage))
+    def begin() -> None:
+        """Begin episodes as long as there are worlds, one of each task, and then the next ones."""
+        wanting = list(collectors)
+        while free and wanting:
+            for index in wanting.copy():
+                episode = collectors[index].next() if free else None
+                if episode is None:
+                    wanting.remove(index)
+                    continue
+                row, wanted = free.pop(), episode.begin()
+                going[row] = index, episode
+                rng = np.random.default_rng(wanted.seed)
+                batch.begin(row, Draws(rng, wanted.draw, wanted.stream, wanted.stage))
 
     try:
-        begin(range(batch.count))
-        while going:
+        begin()
+        while collectors:
             asked: list[tuple[int, Array]] = []
-            over: list[int] = []
+            touched: set[int] = set()
             for event in batch.go_on():
-                episode = going[event.row].episode
+                index, episode = going[event.row]
+                touched.add(index)
                 if event.error is not None:
                     episode.failed(event.error)
                 elif event.paid is None:
                     episode.began(event.redrawn)
                 else:
                     episode.paid(event.features, sum(event.paid.values()), event.ending)
-                if episode.result is None:
+                if event.error is None and event.ending is None:
                     asked.append((event.row, event.features))
-                else:
-                    over.append(event.row)
-            for row in over:
-                done = going.pop(row)
-                yield done.index, done.episode.result
-            _decide(batch, going, asked)
-            begin(over)
+            for index in sorted(touched):
+                if collectors[index].done:
+                    yield index, collectors.pop(index).result()
+            left = [
+                row
+                for row, (index, episode) in going.items()
+                if index in touched and not (index in collectors and collectors[index].counts(episode))
+            ]
+            for row in left:
+                batch.leave(row)
+                del going[row]
+            free += sorted(left, reverse=True)
+            _decide(batch, going, collectors, [(row, seen) for row, seen in asked if row in going])
+            begin()
     finally:
         for row in going:
             batch.leave(row)
@@ -98,7 +109,7 @@ def side_by_side(batch: EpisodeBatch, shares: Sequence[TaskShare], /) -> Iterato
         yield index, [done[k] for k in range(len(share.tasks))]
 
 
-def results(fleet: Fleet[EpisodeBatch], tasks: Sequence[EpisodeTask], members: int) -> list[Any]:
+def results(fleet: Fleet[EpisodeBatch], tasks: Sequence[AnyTask], members: int) -> list[Any]:
     """The results of tasks, in their order.
 
     Args:
@@ -113,17 +124,23 @@ def results(fleet: Fleet[EpisodeBatch], tasks: Sequence[EpisodeTask], members: i
     return out
 
 
-def _decide(batch: EpisodeBatch, going: Mapping[int, _Going], asked: Sequence[tuple[int, Array]]) -> None:
+def _decide(
+    batch: EpisodeBatch,
+    going: Mapping[int, tuple[int, Collecting]],
+    collectors: Mapping[int, Collector[Any]],
+    asked: Sequence[tuple[int, Array]],
+) -> None:
     """Decide in all worlds ``asked``, each with what it sees: one call for each network."""
-    groups: dict[int, list[tuple[int, Array]]] = {}
+    groups: dict[int, tuple[Network, list[tuple[int, Array]]]] = {}
     for row, features in asked:
-        groups.setdefault(id(going[row].network), []).append((row, features))
-    for group in groups.values():
-        network = going[group[0][0]].network
+        network = collectors[going[row][0]].network
+        groups.setdefault(id(network), (network, []))[1].append((row, features))
+    for network, group in groups.values():
+        rows = np.array([row for row, _ in group])
         outputs = network(np.stack([features for _, features in group]))
         actions = [
-            going[row].episode.action(features, output)
+            going[row][1].action(features, output)
             for (row, features), output in zip(group, outputs, strict=True)
         ]
         motion, terminate = split_action(np.stack(actions), network.signal_std)
-        batch.act(np.array([row for row, _ in group]), Action(motion.astype(np.float64), terminate))
+        batch.act(rows, Action(motion.astype(np.float64), terminate))

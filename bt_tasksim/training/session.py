@@ -21,7 +21,7 @@ from bt_tasksim.core.plugins import loaded
 from bt_tasksim.core.typed_file import record_model, validate
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.policy.files import CHECKPOINT, training_folder
-from bt_tasksim.training.config import TrainConfig, with_rollout
+from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.training.on_cluster import check_cluster
 from bt_tasksim.training.record import CLEARLY, HISTORY, Progress
@@ -227,8 +227,6 @@ def load_settings(path: Path | None) -> TrainConfig:
     if document.value is None:
         return TrainConfig()
     with located(document):
-        if isinstance(document.value, dict):
-            document = dataclasses.replace(document, value=with_rollout(document.value))
         return TrainConfig.from_model(validate(record_model(TrainConfig), document))
 
 

@@ -25,7 +25,7 @@ from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.learner import Learner
 from tests.attacks.mutations import Bait, Rng, damaged_bytes, damaged_data, one_of
 
-CONFIG = TrainConfig(steps=64, rollout=64, hidden=(8,), minibatch=32)
+CONFIG = TrainConfig(steps=64, n_envs=2, n_steps=32, hidden=(8,), minibatch=32)
 
 
 def learner() -> Learner:

@@ -57,7 +57,7 @@ def test_the_settings_file_chooses_and_weights_it(plugin, tmp_path):
 def test_the_command_line_takes_it(plugin, tmp_path, capsys):
     settings = tmp_path / "settings.yaml"
     settings.write_text(
-        "{steps: 16, rollout: 16, epochs: 1, minibatch: 16, evaluation_draws: 0, "
+        "{steps: 16, n_envs: 1, n_steps: 16, epochs: 1, minibatch: 16, evaluation_draws: 0, "
         "reward: {terms: {smoothness: 0.5}}}"
     )
     words = ["train", "grasp_then_pick", "--settings", str(settings), "--out", str(tmp_path / "out")]

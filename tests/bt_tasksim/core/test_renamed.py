@@ -30,14 +30,16 @@ def test_replace_takes_a_former_keyword():
 
 def test_settings_are_read_by_former_names():
     former = {
+        "lanes": 4,
+        "lane_steps": 32,
         "log_deviation": -1.0,
         "final_log_deviation": -2.0,
         "lesson_share": 0.5,
     }
-    present = {"log_std": -1.0, "final_log_std": -2.0, "stage_share": 0.5}
+    present = {"n_envs": 4, "n_steps": 32, "log_std": -1.0, "final_log_std": -2.0, "stage_share": 0.5}
     assert TrainConfig.from_dict(former) == TrainConfig.from_dict(present) == TrainConfig(**former)
     with pytest.raises(InputError, match="former name"):
-        TrainConfig.from_dict({"log_deviation": -1.0, "log_std": -1.0})
+        TrainConfig.from_dict({"lanes": 4, "n_envs": 4})
 
 
 def test_files_are_read_by_former_names():

@@ -27,7 +27,7 @@ needs_ray = pytest.mark.skipif(
     importlib.util.find_spec("ray") is None, reason="Ray is not installed: pip install 'bt-tasksim[cluster]'"
 )
 TINY = TrainConfig(
-    steps=384, rollout=96, epochs=2, minibatch=32, hidden=(8,), evaluate_every=2,
+    steps=384, n_envs=3, n_steps=32, epochs=2, minibatch=32, hidden=(8,), evaluate_every=2,
     evaluation_draws=5, checkpoint_every=1, seed=3,
 )  # fmt: skip
 TREE = """

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from bt_tasksim.policy.network import Network
-from bt_tasksim.training.collectors import EpisodeEnd, EpisodeRollout
+from bt_tasksim.training.collectors import EnvironmentRollout
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.learner import Learner, Statistics
 
@@ -17,7 +17,8 @@ torch.set_num_threads(1)
 N, M = 5, 3
 CONFIG = TrainConfig(
     steps=240,
-    rollout=60,
+    n_envs=2,
+    n_steps=30,
     epochs=2,
     minibatch=20,
     hidden=(16, 8),
@@ -31,34 +32,32 @@ def learner(**changes):
     return Learner(*boxes, TrainConfig(**{**CONFIG.to_dict(), "reward": CONFIG.reward, **changes}))
 
 
-def episodes(iteration, lengths=(10, 25, 5, 20), cut=(0, 3)):
+def environments(iteration, count=2, n=30, cut=True):
     """Made-up episodes: what is paid is how near the first action is to the first feature."""
     rng = np.random.default_rng([9, iteration])
     out = []
-    for k, n in enumerate(lengths):
+    for _ in range(count):
         features = rng.normal(2.0, 3.0, (n, N)).astype(np.float32)
         actions = rng.normal(0.0, 0.5, (n, M)).astype(np.float32)
         out.append(
-            EpisodeRollout(
+            EnvironmentRollout(
                 features=features,
                 actions=actions,
                 rewards=(-np.abs(actions[:, 0] - 0.1 * features[:, 0])).astype(np.float32),
-                cut=features[0] if k in cut else None,
-                end=EpisodeEnd(True, n, 0.0, "success"),
+                starts=np.arange(n) % 10 == 0,
+                cut=features[:2] if cut else features[:0],
+                cut_at=np.array([9, n - 1] if cut else [], np.int64),
+                ends=[],
                 redrawn=0,
             )
         )
     return out
 
 
-def left(rollout):
-    return 1.0 - rollout / 4
-
-
 def trained(rollouts=2, **changes):
     found = learner(**changes)
     for k in range(rollouts):
-        found.update(episodes(k), k + 1, left(k + 1))
+        found.update(environments(k), k + 1)
     return found
 
 
@@ -103,7 +102,7 @@ def test_learning_goes_on_from_a_checkpoint_bit_for_bit():
     later.restore(half.tensors(), timesteps=120)
     assert same(later.tensors(), half.tensors())
     for k in (2, 3):
-        later.update(episodes(k), k + 1, left(k + 1))
+        later.update(environments(k), k + 1)
     assert same(later.tensors(), straight.tensors())
     assert same(later.network.arrays(), straight.network.arrays())
     assert later.ppo.num_timesteps == straight.ppo.num_timesteps == 240
@@ -114,7 +113,7 @@ def test_a_checkpoint_is_a_copy():
     found = trained(1)
     before = found.tensors()
     kept = {k: v.copy() for k, v in before.items()}
-    found.update(episodes(1), 2, left(2))
+    found.update(environments(1), 2)
     assert same(before, kept)
 
 
@@ -134,7 +133,7 @@ def test_global_random_states_are_left_as_they_were():
 
 
 def test_it_learns_what_pays():
-    found = learner(epochs=10, rollout=400, steps=8000, log_std=-0.7)
+    found = learner(epochs=10, n_steps=200, steps=8000, log_std=-0.7)
     features = np.random.default_rng(1).normal(2.0, 3.0, (300, N)).astype(np.float32)
     wanted = 0.1 * features[:, 0]
 
@@ -143,24 +142,24 @@ def test_it_learns_what_pays():
 
     before = gap()
     for k in range(8):
-        rows = episodes(k, lengths=40 * (10,), cut=())
-        for number, row in enumerate(rows):
-            noise = np.random.default_rng([k, number]).normal(size=row.actions.shape) * found.std
+        rows = environments(k, n=200, cut=False)
+        for row in rows:
+            noise = np.random.default_rng([k, 1]).normal(size=row.actions.shape) * found.std
             row.actions[:] = found.network(row.features) + noise
             row.rewards[:] = -np.abs(row.actions[:, 0] - 0.1 * row.features[:, 0])
-        found.update(rows, k + 1, 1.0)
+        found.update(rows, k + 1)
     assert gap() < 0.7 * before
 
 
 def test_a_cut_episode_is_worth_what_may_follow():
-    """The value beyond a cut counts, in the longest episode and in others."""
+    """The value beyond a cut counts, at the end of the environment and before."""
     results = []
     for worth in (0.0, 5.0):
         found = learner()
         with torch.no_grad():
             found.ppo.policy.value_net.weight.zero_()
             found.ppo.policy.value_net.bias.fill_(worth)
-        rows = episodes(0, lengths=(10, 25, 5), cut=(0, 1))
+        rows = environments(0)
         kept = {}
 
         def keep(found=found, kept=kept):
@@ -169,37 +168,13 @@ def test_a_cut_episode_is_worth_what_may_follow():
         found.ppo.train = keep
         for row in rows:
             row.rewards[:] = 0.0
-        found.update(rows, 1, left(1))
+        found.update(rows, 1)
         results.append(kept["returns"])
     assert np.abs(results[0]).max() == 0.0
-    # The first two are cut, after decisions 9 and 34; the third ends for good.
+    # Decision 19 ends an episode for good; 9 and 29 are cut.
     worth = 5.0 * found.config.reward.gamma
-    assert results[1][9] == pytest.approx(worth) and results[1][34] == pytest.approx(worth)
-    assert results[1][39] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_advantages_are_those_of_each_episode_alone():
-    """Beside longer and shorter ones, as where nothing stands beside it."""
-    found, kept = learner(), []
-    found.ppo.train = lambda: kept.append(
-        {name: getattr(found.ppo.rollout_buffer, name)[:, 0].copy() for name in ("advantages", "returns")}
-    )
-    rows = episodes(0)
-    mean, variance, count = (np.copy(x) for x in vars(found.statistics).values())
-    for some in (rows, *([row] for row in rows)):
-        found.statistics.mean, found.statistics.variance, found.statistics.count = mean, variance, count
-        found.update(some, 1, left(1))
-    together, *apart = kept
-    for name, values in together.items():
-        assert np.allclose(values, np.concatenate([each[name] for each in apart]), atol=1e-6)
-    gamma, decay = found.config.reward.gamma, found.config.gae_lambda
-    values = together["returns"][10:35] - together["advantages"][10:35]
-    expected, later = np.zeros(26), 0.0
-    for t in reversed(range(25)):
-        beyond = values[t + 1] if t < 24 else 0.0
-        later = rows[1].rewards[t] + gamma * beyond - values[t] + gamma * decay * later
-        expected[t] = later
-    assert together["advantages"][10:35] == pytest.approx(expected[:25], abs=1e-5)
+    assert results[1][29] == pytest.approx(worth) and results[1][9] == pytest.approx(worth)
+    assert results[1][19] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_it_begins_with_what_was_trained_before():
@@ -209,7 +184,7 @@ def test_it_begins_with_what_was_trained_before():
     features = np.random.default_rng(0).normal(2.0, 4.0, (50, N)).astype(np.float32)
     assert np.abs(found.network(features) - network(features)).max() < 1e-5
     assert np.abs(torch_policy(found, features) - network(features)).max() < 1e-5
-    found.update(episodes(7), 1, left(1))
+    found.update(environments(7), 1)
     assert not np.array_equal(found.network(features), network(features))
 
 

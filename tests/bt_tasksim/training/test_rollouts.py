@@ -1,4 +1,4 @@
-"""Episodes of rollouts: the same whatever the workers, and one sentence where one of them goes wrong."""
+"""Environments: the same whatever the number of workers, and one sentence where a worker goes wrong."""
 
 import numpy as np
 import pytest
@@ -10,8 +10,10 @@ from bt_tasksim.core.workers import Workers
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import done_share
 from bt_tasksim.training.collectors import DrawTask, RolloutTask
+from bt_tasksim.training.endings import Ending
 from bt_tasksim.training.env import EpisodeEnv
 from bt_tasksim.training.episode_batch import EpisodeBatch
+from bt_tasksim.training.judge import FOLLOWED, SignalOutcome
 from bt_tasksim.training.rollouts import in_batch, results
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.nodes.train import Train
@@ -31,8 +33,8 @@ def kept(tree=None, worlds=1):
     return make(tree, EpisodeBatch, worlds=worlds)
 
 
-def task(number, network=UP, std=0.3, stage=None):
-    return RolloutTask(network, np.full(2, std, np.float32), (7, number), stage)
+def environment(number, decisions=40, network=UP, std=0.3, stage=None, **settings):
+    return RolloutTask(network, np.full(2, std, np.float32), (7, number), decisions, stage, **settings)
 
 
 def as_bytes(found):
@@ -50,53 +52,102 @@ def maker(toy_engines):
     return make
 
 
-def test_an_episode_brings_back_all_its_decisions(maker):
-    found = [alone(maker(), task(k)) for k in range(12)]
-    for episode in found:
-        n = episode.end.decisions
-        assert episode.features.shape == (n, 3) and episode.actions.shape == (n, 2)
-        assert episode.features.dtype == episode.actions.dtype == np.float32
-        assert episode.rewards.shape == (n,) and episode.cut is None
-        assert episode.end.total == pytest.approx(float(episode.rewards.sum()), abs=1e-5)
-    ends = [episode.end for episode in found]
-    assert any(end.success for end in ends) and sum(episode.redrawn for episode in found) > 0
-    assert {end.reason for end in ends} <= {"success", "follower failed", "timeout"}
-    assert len({end.decisions for end in ends}) > 1
+def test_an_environment_is_whole_episodes_in_a_row(maker):
+    found = alone(maker(), environment(0, decisions=60))
+    assert found.features.shape == (60, 3) and found.actions.shape == (60, 2)
+    assert found.features.dtype == found.actions.dtype == np.float32
+    assert found.starts[0] and int(found.starts.sum()) in (len(found.ends), len(found.ends) + 1)
+    lengths = [end.decisions for end in found.ends]
+    assert (
+        np.flatnonzero(found.starts).tolist() == [0, *np.cumsum(lengths).tolist()][: int(found.starts.sum())]
+    )
+    first = lengths[0]
+    assert found.ends[0].total == pytest.approx(float(found.rewards[:first].sum()), abs=1e-5)
+    assert len(lengths) > 3 and any(end.success for end in found.ends) and found.redrawn > 0
+    assert {end.reason for end in found.ends} <= {"success", "follower failed", "timeout"}
+    # It was cut off in the middle of an episode, or ended with one.
+    assert (found.cut_at.tolist() == [59]) == (sum(lengths) < 60)
 
 
 def test_a_truncated_episode_is_marked(maker):
+    def short():
+        return EpisodeEnv(sequence("s", Train(Raise()), Check()), SCENE, longest=0.2)
+
     still = Network(np.zeros(3), np.ones(3), [(np.zeros((2, 3)), np.zeros(2))]).arrays()
-    env = EpisodeEnv(sequence("s", Train(Raise()), Check()), SCENE, longest=0.2)
-    found = alone(env, task(0, network=still, std=0.0))
-    assert len(found.rewards) == 5 and found.end.reason == "failed"
-    assert found.cut is not None and found.cut.shape == (3,)
+    found = alone(short(), environment(0, decisions=12, network=still, std=0.0))
+    assert found.cut_at.tolist() == [4, 9, 11] and found.cut.shape == (3, 3)
+    assert [end.reason for end in found.ends] == ["failed", "failed"]
+    assert found.starts.tolist() == [k in (0, 5, 10) for k in range(12)]
 
 
-def test_episodes_are_the_same_whatever_the_workers_and_their_order(maker):
-    tasks = [task(k) for k in range(7)]
+def test_environments_are_the_same_whatever_the_workers_and_their_order(maker):
+    tasks = [environment(k) for k in range(5)]
     here = {k: as_bytes(alone(maker(), task)) for k, task in enumerate(tasks)}
     assert run(tasks, 1) == run(tasks, 2) == run(tasks, 2, lambda: kept(worlds=3)) == here
     back = run(tasks[::-1], 2)
-    assert [back[k] for k in range(7)] == [here[6 - k] for k in range(7)]
-    assert len({row["features"] for row in here.values()}) == 7, "and no two are alike"
+    assert [back[k] for k in range(5)] == [here[4 - k] for k in range(5)]
+    assert len({row["features"] for row in here.values()}) == 5, "and no two are alike"
 
 
-def test_episodes_go_on_side_by_side_and_a_free_world_takes_the_next(maker):
+@pytest.mark.parametrize("length", [1.0, 20.0, 1000.0])
+def test_how_long_episodes_are_thought_to_be_changes_nothing(maker, length):
+    expected = [as_bytes(alone(maker(), environment(k))) for k in range(2)]
+    tasks = [environment(k, length=length) for k in range(2)]
+    for worlds in (1, 7):
+        found = dict(in_batch(kept(worlds=worlds), tasks))
+        assert [as_bytes(found[k]) for k in range(2)] == expected
+
+
+def test_episodes_of_one_environment_go_on_side_by_side(maker):
     batch = kept(sequence("s", Train(Raise()), Check()), worlds=8)
-    found = dict(in_batch(batch, [task(k) for k in range(20)]))
+    ((_, found),) = in_batch(batch, [environment(0, decisions=100, length=12.0)])
     (worlds,) = toys.Worlds.made
-    decisions = sum(len(episode.rewards) for episode in found.values())
-    assert len(found) == 20 and max(worlds.sizes) == 8
-    assert len(worlds.sizes) < decisions / 3, "one after the other each would take a step at least"
-    assert len(batch.waiting) == 0
+    assert len(found.features) == 100 and max(worlds.sizes) == 8
+    assert len(worlds.sizes) < 60, "of them one after the other there would be more than 100"
+    assert len(batch.waiting) == 0, "those that go on beyond are left"
 
 
-def test_an_episode_that_there_is_not_is_an_error_and_all_others_are_left(maker):
-    batch = kept(worlds=4)
-    with pytest.raises(InputError, match="has 0 stages, and none number 3"):
-        list(in_batch(batch, [task(0), task(1), task(2, stage=3)]))
-    assert len(batch.waiting) == 0
-    assert len(dict(in_batch(batch, [task(0), task(1)]))) == 2, "and it can be used again"
+RIGHT = SignalOutcome(True, "SUCCESS", FOLLOWED(node="it"))
+GOOD = Ending("success", RIGHT.outcome, False, True, RIGHT, "SUCCESS", 1.0)
+
+
+def played(episode, decisions, ends=True):
+    """An episode of so many decisions, in no world; the number is what is seen, decided and paid."""
+    assert episode.begin().stream == "training"
+    episode.began(0)
+    for k in range(decisions):
+        episode.action(np.full(3, k, np.float32), np.zeros(2, np.float32))
+        episode.paid(np.full(3, k + 1, np.float32), float(k), GOOD if ends and k == decisions - 1 else None)
+
+
+def test_an_episode_that_ran_on_is_cut_where_the_environment_ends():
+    collector = environment(0, decisions=10, length=4.0).collector(Network.from_arrays(UP))
+    first, second, third = (collector.next() for _ in range(3))
+    played(second, 9, ends=False)
+    played(third, 3)
+    assert not collector.done and collector.counts(first) and collector.counts(second)
+    assert collector.counts(third) is False, "what it has to come after may yet be enough, and it is over"
+    played(first, 4)
+    assert collector.done
+    found = collector.result()
+    assert found.rewards.tolist() == [0, 1, 2, 3, 0, 1, 2, 3, 4, 5]
+    assert np.flatnonzero(found.starts).tolist() == [0, 4]
+    assert found.cut_at.tolist() == [9] and found.cut.tolist() == [[6.0, 6.0, 6.0]]
+    assert [end.decisions for end in found.ends] == [4]
+
+
+def test_an_episode_that_there_is_not_is_an_error_only_where_it_counts():
+    for decisions, raised in ((8, False), (9, True)):
+        collector = environment(0, decisions=decisions, length=4.0).collector(Network.from_arrays(UP))
+        first, second = collector.next(), collector.next()
+        second.failed(InputError("there is none"))
+        assert not collector.done
+        played(first, 8)
+        if raised:
+            with pytest.raises(InputError, match="there is none"):
+                _ = collector.done
+        else:
+            assert collector.done and len(collector.result().rewards) == 8
 
 
 def test_held_apart_draws_are_judged_without_noise_and_apart(maker):
@@ -122,6 +173,6 @@ def test_in_a_held_apart_draw_each_leaf_adds_up_its_own_signals(maker):
 
 def test_a_worker_that_finds_an_error_says_it(maker):
     with pytest.raises(InputError, match="leaf 'first' has no policy yet"):
-        run([task(0)], 1, lambda: kept(sequence("s", Unprogrammed(name="first"), Train(Raise()))))
+        run([environment(0)], 1, lambda: kept(sequence("s", Unprogrammed(name="first"), Train(Raise()))))
     with pytest.raises(InputError, match="has 0 stages, and none number 3"):
-        run([task(0, stage=3)], 1)
+        run([environment(0, stage=3)], 1)

@@ -21,7 +21,7 @@ from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.training.record import Progress
 
 TINY = {
-    "steps": 128, "rollout": 64, "epochs": 1, "minibatch": 32, "evaluate_every": 1,
+    "steps": 128, "n_envs": 2, "n_steps": 32, "epochs": 1, "minibatch": 32, "evaluate_every": 1,
     "evaluation_draws": 2, "checkpoint_every": 1,
 }  # fmt: skip
 TWO = """

@@ -107,8 +107,8 @@ TREES = {
 }  # fmt: skip
 
 
-def task(number, std=0.3, stage=None):
-    return RolloutTask(NETWORK, np.full(2, std, np.float32), (7, number), stage)
+def task(number, decisions=40, std=0.3, stage=None):
+    return RolloutTask(NETWORK, np.full(2, std, np.float32), (7, number), decisions, stage)
 
 
 def as_bytes(found):

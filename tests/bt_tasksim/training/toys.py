@@ -315,22 +315,27 @@ def play(env: Any, decide: Any, seed: int | None = 0) -> tuple[list[float], bool
 
 def alone(env: Any, task: Any) -> Any:
     """The result of a task of `bt_tasksim.training.collectors`, in an environment of its own."""
-    episode, network = task.episode(), Network.from_arrays(task.network)
-    wanted = episode.begin()
-    env.stream, env.stage = wanted.stream, wanted.stage
-    draw = {} if wanted.draw is None else {"draw": wanted.draw}
-    try:
-        features, info = env.reset(seed=wanted.seed, options=draw)
-    except InputError as error:
-        episode.failed(error)
-        return episode.result
-    episode.began(info["redrawn"])
-    while episode.result is None:
-        action = episode.action(features, network(features))
-        motion, done = split_action(np.asarray(action)[None], network.signal_std)
-        features, reward, terminated, truncated, _ = env.act(Action(np.asarray(motion, float), done))
-        episode.paid(features, reward, env.ending if terminated or truncated else None)
-    return episode.result
+    collector = task.collector(Network.from_arrays(task.network))
+    while not collector.done:
+        episode = collector.next()
+        wanted = episode.begin()
+        env.stream, env.stage = wanted.stream, wanted.stage
+        draw = {} if wanted.draw is None else {"draw": wanted.draw}
+        try:
+            features, info = env.reset(seed=wanted.seed, options=draw)
+        except InputError as error:
+            episode.failed(error)
+            continue
+        episode.began(info["redrawn"])
+        over = False
+        while not over:
+            action = episode.action(features, collector.network(features))
+            motion, done = split_action(np.asarray(action)[None], collector.network.signal_std)
+            features, reward, terminated, truncated, _ = env.act(Action(np.asarray(motion, float), done))
+            ended = terminated or truncated
+            episode.paid(features, reward, env.ending if ended else None)
+            over = ended or collector.done
+    return collector.result()
 
 
 def activations(env: Any, leaf: Any) -> Any:
