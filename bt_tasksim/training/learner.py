@@ -89,6 +89,7 @@ class Learner:
                     "net_arch": {"pi": list(config.hidden), "vf": list(config.hidden)},
                     "activation_fn": torch.nn.Tanh,
                     "log_std_init": config.log_std,
+                    "optimizer_kwargs": {"eps": 1e-5, "fused": True},  # eps as of stable-baselines3's own
                 },
             )
             with torch.no_grad():
