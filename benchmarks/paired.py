@@ -1,10 +1,22 @@
-"""Two codes on the same draws: what a pair of outcomes for each draw says."""
+"""Two codes on the same draws: what a pair of outcomes for each draw says.
+
+    python -m benchmarks.paired OLD NEW
+
+takes two folders of result files and pairs those of the same name, draw by draw: of any benchmark that
+writes its ``outcomes`` with ``seed`` and ``success``, such as `benchmarks.gap`.
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
+from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.training.evaluation_outcomes import wilson
 
 LEVEL = 0.01
@@ -160,3 +172,48 @@ def _line(row: Paired) -> str:
         f"| {row.name} | {row.draws} | {' | '.join(cells)} | {difference([row]):+.1f} | {lost}, {won} "
         f"| {p:.3g} | {one:.3g} | {mark} |"
     )
+
+
+def of_folders(old: Path, new: Path) -> list[Paired]:
+    """Results of the same name in two folders.
+
+    Raises:
+        InputError: No name is in both, or two results of a name share no draw.
+    """
+    rows = []
+    for path in sorted(new.glob("*.json")):
+        sides = [_outcomes(folder / path.name) for folder in (old, new)]
+        if all(sides):
+            rows.append(Paired(path.stem.split("-")[0], path.stem, *sides))
+    if not rows:
+        raise InputError(f"no result file with outcomes has the same name in '{old}' and '{new}'")
+    apart = [row.name for row in rows if not row.draws]
+    if apart:
+        raise InputError(f"the two results of {', '.join(apart)} are of other draws")
+    return rows
+
+
+def _outcomes(path: Path) -> dict[str, bool]:
+    try:
+        content: Any = json.loads(path.read_text(encoding="utf-8"))
+        return {str(o["seed"]): bool(o["success"]) for o in content["outcomes"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}  # not there, or a result of another kind
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description="Two folders of results on the same draws, in pairs.")
+    parser.add_argument("old", type=Path, help="folder of the older code's results")
+    parser.add_argument("new", type=Path, help="folder of the new code's results")
+    options = parser.parse_args(arguments)
+    try:
+        print(markdown(of_folders(options.old, options.new)))
+    except BtTasksimError as error:
+        print(f"paired: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -11,7 +11,7 @@ import pytest
 from benchmarks import compare, sealed
 from benchmarks.compare import Outcomes, Setting
 from benchmarks.compare_rows import GRASPS, LOGS, SUCCESSES, Row, chunks, rows
-from benchmarks.paired import Paired, difference, markdown, mcnemar, report, worse
+from benchmarks.paired import Paired, difference, main, markdown, mcnemar, report, worse
 from bt_tasksim.core.errors import MachineError
 
 
@@ -148,3 +148,27 @@ def test_a_checkout_that_changes_ends_it_at_once(tmp_path: Path, monkeypatch: An
     with pytest.raises(compare.InputError, match="changed"):
         compare.compare(setting(tmp_path), [ROW], 1)
     assert not (tmp_path / "outcomes.jsonl").exists()
+
+
+def test_results_of_two_folders_are_paired_by_seed(tmp_path, capsys):
+    outcomes = {"old": {1: True, 2: True, 3: False}, "new": {2: False, 3: True, 4: True}}
+    for side, seeds in outcomes.items():
+        (tmp_path / side).mkdir()
+        rows = [{"seed": seed, "success": success} for seed, success in seeds.items()]
+        (tmp_path / side / "gap-x-twin.json").write_text(json.dumps({"outcomes": rows}))
+        (tmp_path / side / "speed.json").write_text("[1]")
+    assert main([str(tmp_path / "old"), str(tmp_path / "new")]) == 0
+    line = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("| gap-x-twin"))
+    assert [cell.strip() for cell in line.split("|")][2:7] == [
+        "2", "1 (9.5 to 90.5 %)", "1 (9.5 to 90.5 %)", "+0.0", "1, 1"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("seeds", [[], [9]])
+def test_results_that_share_no_draw_are_no_pair(seeds, tmp_path, capsys):
+    for side, own in (("old", [1]), ("new", seeds)):
+        (tmp_path / side).mkdir()
+        rows = [{"seed": seed, "success": True} for seed in own]
+        (tmp_path / side / "gap-x-twin.json").write_text(json.dumps({"outcomes": rows}))
+    assert main([str(tmp_path / "old"), str(tmp_path / "new")]) == 2
+    assert ("gap-x-twin" in capsys.readouterr().err) == bool(seeds)
