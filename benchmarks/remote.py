@@ -44,7 +44,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="What another process costs.")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, and nothing is written")
     options = parser.parse_args()
-    found = measure(rounds=2 if options.quick else 9, episodes=2 if options.quick else 6)
+    found = measure(rounds=1 if options.quick else 9, episodes=1 if options.quick else 6)
     print(json.dumps(found, indent=2))
     if not options.quick:
         write_text(RESULTS / "remote.json", json.dumps(found, indent=2) + "\n")

@@ -63,7 +63,9 @@ def throughput(quick: bool) -> dict[str, Any]:
             if processes > (os.cpu_count() or 1) or (quick and (worlds > 64 or processes > 1)):
                 continue
             options = argparse.Namespace(threads=1, processes=processes, quick=quick)
-            out[f"{worlds}_{processes}"] = episodes.measured(worlds, options, peer, apart=False)
+            out[f"{worlds}_{processes}"] = episodes.measured(
+                worlds, options, peer, apart=False, rounds=1 if quick else 5
+            )
     finally:
         peer.close()
     return {"episodes": out, "maniskill_missing": peer.missing}

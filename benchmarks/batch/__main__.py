@@ -39,6 +39,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar="D",
         help="what torch (sections executor, laws) and MuJoCo Warp (device) run on: cpu, cuda, cuda:N",
     )
+    parser.add_argument(
+        "--worlds", type=_positive, metavar="N", help="so many alone, instead of a section's own series"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
     for section in SECTIONS.values():
         section.options(parser)
@@ -59,6 +62,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         write_text(options.json, json.dumps(found, indent=2) + "\n")
         print(f"wrote {options.json}")
     return int(any("differs" in numbers for numbers in found.values()))
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"should be a positive whole number, found {text}")
+    return value
 
 
 if __name__ == "__main__":

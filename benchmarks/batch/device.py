@@ -33,7 +33,6 @@ SLICES = 3
 
 def options(parser: argparse.ArgumentParser) -> None:
     """What the section takes."""
-    parser.add_argument("--worlds", type=_positive, metavar="N", help="how many, in the section device")
     parser.add_argument(
         "--laws", choices=LAWS, default="auto", help="what concepts and joints are computed with (device)"
     )
@@ -79,13 +78,6 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         "episodes": 2 * worlds,
         "parts": parts,
     }
-
-
-def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"should be a positive whole number, found {text}")
-    return value
 
 
 def _threads() -> int:

@@ -65,7 +65,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         f"{'outside':>10}{'bar':>7}"
     )
     try:
-        for worlds in WORLDS:
+        for worlds in (options.worlds,) if options.worlds else WORLDS:
             found = out[str(worlds)] = measured(worlds, options, peer)
             ratio = f"{found['ratio']:8.2f}" if "ratio" in found else f"{'':>8}"
             print(
@@ -133,13 +133,15 @@ def split(kept: Episodes, shares: Sequence[int], /) -> Iterator[tuple[int, dict[
         yield index, _split(kept, steps)
 
 
-def measured(worlds: int, options: argparse.Namespace, peer: Peer, apart: bool = True) -> dict[str, float]:
+def measured(
+    worlds: int, options: argparse.Namespace, peer: Peer, apart: bool = True, rounds: int | None = None
+) -> dict[str, float]:
     """Medians over rounds, both sides in turns; ``apart``: and then where the time goes."""
     processes, threads = options.processes, options.threads
     episodes, steps, rows = max(2 * worlds, 8), 150 * max(worlds, 16), []
     with Workers(partial(Episodes, worlds, threads), processes, "spawn") as fleet:
         list(fleet.spread(whole, [range(2)] * processes))  # whatever is made but once
-        for k in range(2 if options.quick else 5):
+        for k in range(rounds or (2 if options.quick else 5)):
             first = k * processes * episodes
             seeds = [range(first + n * episodes, first + (n + 1) * episodes) for n in range(processes)]
             rows.append({"steps_per_s": _rate(fleet.spread(whole, seeds))})

@@ -88,6 +88,7 @@ def build() -> Behaviour:
 def measure(options: argparse.Namespace) -> dict[str, Any]:
     """One tick of many trees, in milliseconds, by library, how worlds stand, and their number."""
     rounds, counts = (3, (1, 256, 4096)) if options.quick else (7, WORLDS)
+    counts = (options.worlds,) if options.worlds else counts
     out: dict[str, Any] = {"nodes": len(nodes_of(build())), "ms": {}}
     for spread in (False, True):
         table = out["ms"]["spread" if spread else "in step"] = {}

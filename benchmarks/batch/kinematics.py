@@ -46,7 +46,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     print(f"{'worlds':>8}{'solve':>9}{'observe':>9}{'visual':>9}")
     print(f"{'before':>8}" + "".join(f"{value:9.1f}" for value in BEFORE_US.values()))
     out: dict[str, Any] = {"before": BEFORE_US}
-    for worlds in WORLDS:
+    for worlds in (options.worlds,) if options.worlds else WORLDS:
         found = out[str(worlds)] = {"solve": _solving(worlds, repeats), **_observing(worlds, repeats)}
         print(f"{worlds:8}" + "".join(f"{found[name]:9.2f}" for name in BEFORE_US), flush=True)
     print(f"bars: {BARS_US}")

@@ -45,7 +45,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     print("\nall but physics, us of a control step and world")
     print(f"{'worlds':>8}  {'laws':8}" + "".join(f"{part:>9}" for part in (*PARTS, "all")))
     recorded = Recorded()
-    for worlds in WORLDS[:2] if options.quick else WORLDS:
+    counts = WORLDS[:2] if options.quick else WORLDS
+    for worlds in (options.worlds,) if options.worlds else counts:
         for laws in ("numpy", "torch"):
             try:
                 like = laws_of(_no_check(laws, options.device))

@@ -53,6 +53,7 @@ class Told:
 def measure(options: argparse.Namespace) -> dict[str, Any]:
     """Microseconds by engine and number of worlds."""
     counts, budget = (WORLDS[:2], 2000) if options.quick else (WORLDS, 20000)
+    counts = (options.worlds,) if options.worlds else counts
     out: dict[str, Any] = {}
     for engine in (options.engine,) if options.engine else ENGINES:
         told = [_record(engine, seed) for seed in SEEDS]
