@@ -122,7 +122,7 @@ class Behaviours(Sayings[Behaviour]):
         """See `Sayings.says`."""
         if isinstance(node, Reporting) and node.outcome is not None:
             return node.outcome
-        return as_statement(node.feedback_message)
+        return as_statement(str(node.feedback_message or ""))  # py_trees keeps whatever it is given
 
     def below(self, node: Behaviour) -> Sequence[Behaviour]:
         """See `Sayings.below`."""

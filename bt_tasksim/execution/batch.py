@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -17,7 +18,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.context import Context
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, PENDING, RUNNING, BatchLeaf
-from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.batch_reasons import BatchReasons
@@ -150,6 +151,7 @@ class BatchTree:
         """End all nodes in worlds that begin anew, as the root's ``stop(INVALID)``.
 
         Ticks that stand still are dropped, and all their nodes end, also those that py_trees would forget.
+        What a behaviour raises as it is ended changes nothing any more.
         """
         if not len(rows):
             return
@@ -157,11 +159,16 @@ class BatchTree:
             at = self.waits_at[rows]
             waiting = self.arrays.where(at >= 0)
             for node, there in self.arrays.groups(at[waiting], rows[waiting]):
-                self._leaf(node).stop(there)
+                with suppress(LeafError):
+                    self._leaf(node).stop(there)
                 self._status_of[node][there] = INVALID
                 self.waits_at[there] = -1
                 self._waiting -= len(there)
-        self.stop_node(0, rows)
+        ended = False
+        while not ended:
+            with suppress(LeafError):  # the node that raised has ended: the others are next
+                self.stop_node(0, rows)
+                ended = True
 
     def renew(self, rows: Array) -> None:
         """Give worlds that begin anew new copies of what py_trees ticks: such nodes may remember things.
@@ -242,7 +249,10 @@ class BatchTree:
         if listener is not None:
             heard = self.arrays.where((status != INVALID) & (status <= most))
             if len(heard):
-                listener(rows[heard])
+                try:
+                    listener(rows[heard])
+                finally:
+                    self._status_of[node][rows] = INVALID
         self._status_of[node][rows] = INVALID
 
     def _send(self, event: int, parcel: tuple[Array, ...]) -> None:
@@ -288,7 +298,8 @@ class BatchTree:
         self._inbox.clear()
         if self._at is not None:
             node, there = self._at
-            self._leaf(node).stop(there)
+            with suppress(LeafError):  # one error is told
+                self._leaf(node).stop(there)
             self._status_of[node][there] = INVALID
         self.reset(rows)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 from collections.abc import Generator
 from typing import Any
@@ -53,14 +54,41 @@ def ticking(tree: Behaviour) -> Generator[Behaviour, None, None]:
         raise leaf_error(error, tree if culprit is None else culprit) from error
 
 
+def stop(tree: Behaviour) -> None:
+    """End a tree whose episode goes on, as `Behaviour.stop` does.
+
+    Raises:
+        LeafError: A node raised as it was ended; every node has ended.
+    """
+    try:
+        tree.stop(Status.INVALID)
+    except BaseException as error:
+        culprit = _raising_leaf(error, tree)
+        end_all(tree, culprit)
+        if isinstance(error, BtTasksimError) or not is_leafs(error):
+            raise
+        raise leaf_error(error, tree if culprit is None else culprit) from error
+
+
+def clear(tree: Behaviour) -> None:
+    """End a tree whose episode is over: a node that raises as it is ended changes nothing any more."""
+    with contextlib.suppress(BtTasksimError):
+        stop(tree)
+
+
 def end_all(tree: Behaviour, culprit: Behaviour | None = None) -> None:
-    """End every running node and the one that raised; py_trees' own `stop` misses some of them."""
+    """End every running node and the one that raised; py_trees' own `stop` misses some of them.
+
+    Something is wrong already: what a node raises as it is ended is not told besides.
+    """
     for node in tree.iterate():
         if node.status == Status.RUNNING or node is culprit:
-            if not node.children:
-                node.stop(Status.INVALID)
-            else:
-                node.terminate(Status.INVALID)
+            try:
+                (node.terminate if node.children else node.stop)(Status.INVALID)
+            except BaseException as error:
+                if not is_leafs(error):
+                    raise
+            finally:
                 node.status = Status.INVALID
                 node.iterator = node.tick()
 

@@ -32,7 +32,7 @@ from bt_tasksim.core.units import SECONDS
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
 from bt_tasksim.execution.blackboard import WorldBlackboard
-from bt_tasksim.execution.leaf_errors import end_all, no_status, set_up, ticking
+from bt_tasksim.execution.leaf_errors import clear, end_all, no_status, set_up, ticking
 from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
 from bt_tasksim.execution.result import Result
 from bt_tasksim.hardware.safety.stop import SafetyStop
@@ -135,7 +135,7 @@ class Runner:
         self.configuration, self._began = configuration, time.perf_counter()
         world = configuration.world_model([tip.name for tip in self.robot.tips], self.robot.opening)
         with self.blackboard:
-            self.tree.stop(Status.INVALID)
+            clear(self.tree)
         self.blackboard = WorldBlackboard(self._planted)
         self.context.ask_hidden = self._hidden
         self.context.begin([world])
@@ -277,7 +277,7 @@ class Runner:
             if tree.status != Status.RUNNING:
                 return steps, None, None
             if steps >= limit:
-                tree.stop(Status.INVALID)
+                clear(tree)
                 return steps, TIME_OVER(limit=self.longest), None
             try:
                 self.step(command)

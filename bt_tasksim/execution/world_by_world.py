@@ -13,11 +13,11 @@ from py_trees.common import Status
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.reporting import outcome_of
 from bt_tasksim.core.batch_leaf import FAILURE, INVALID, RUNNING, SUCCESS, BatchLeaf
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.blackboard import WorldBlackboard
-from bt_tasksim.execution.leaf_errors import set_up, ticking
+from bt_tasksim.execution.leaf_errors import set_up, stop, ticking
 from bt_tasksim.trees.nodes.batch import Arrays
 from bt_tasksim.trees.walk import nodes_of
 
@@ -66,10 +66,20 @@ class WorldByWorld(BatchLeaf):
         return self._codes([self._tick(row) for row in rows.tolist()])
 
     def stop(self, rows: Array) -> None:
-        """See `BatchLeaf.stop`; called too where it has ended, as py_trees does."""
+        """See `BatchLeaf.stop`; called too where it has ended, as py_trees does.
+
+        Raises:
+            LeafError: A behaviour raised as it was ended; those of all worlds have ended.
+        """
+        wrong: list[BtTasksimError] = []
         for row in rows.tolist():
             with self._boards[row]:
-                self.copies[row].stop(Status.INVALID)
+                try:
+                    stop(self.copies[row])
+                except BtTasksimError as error:
+                    wrong.append(error)
+        if wrong:
+            raise wrong[0]
 
     def outcome(self, row: int) -> Outcome | None:
         """See `BatchLeaf.outcome`."""

@@ -38,7 +38,7 @@ def _cause(leaf: str, outcome: Outcome | None) -> Cause | None:
     if outcome is None:
         return None
     cause = outcome.cause
-    return Cause(leaf, cause.reason.name, cause.own_sentence)
+    return Cause(leaf, cause.reason.name, cause.own_sentence or cause.sentence)
 
 
 def summary(causes: Sequence[Cause]) -> str:
@@ -48,7 +48,8 @@ def summary(causes: Sequence[Cause]) -> str:
         first.setdefault(cause[:2], cause)
     often = Counter(cause[:2] for cause in causes)
     said = [
-        f"{cause.leaf}: {cause.sentence}{f', {often[kind]} times' if often[kind] > 1 else ''}"
+        ": ".join(filter(None, (cause.leaf, cause.sentence)))
+        + (f", {often[kind]} times" if often[kind] > 1 else "")
         for kind, cause in first.items()
     ]
     return "; ".join(said)

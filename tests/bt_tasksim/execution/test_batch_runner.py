@@ -22,7 +22,7 @@ from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.execution.worlds import most_worlds, why_alone
-from bt_tasksim.trees import parallel, retry, sequence, timeout
+from bt_tasksim.trees import force_failure, parallel, retry, sequence, timeout
 from bt_tasksim.trees.load import load_source
 from tests.unlike_worlds import holding, mixed
 
@@ -262,6 +262,62 @@ def test_a_leaf_that_would_end_python_is_a_leaf_that_raised(error):
     for runner in (Runner, BatchRunner):
         with pytest.raises(InputError, match=r"'exits' cannot be set up: (System|Gen)\w+ in test_batch"):
             runner(lambda: sequence("root", Exits(error, early=True)), scene)
+
+
+class RaisesAtTheEnd(Behaviour):
+    """Raises as it is ended, in every other activation or whenever it is interrupted."""
+
+    def __init__(self, interrupted):
+        super().__init__("raises")
+        self.interrupted, self.ended = interrupted, 0
+
+    def update(self):
+        return Status.RUNNING if self.interrupted else Status.SUCCESS
+
+    def terminate(self, new_status):
+        if self.status == Status.RUNNING or not self.interrupted:
+            self.ended += 1
+            if self.interrupted or self.ended % 2:
+                raise ValueError("no end")
+
+
+@pytest.mark.parametrize("how", ["update", "timeout", "below"])
+def test_a_leaf_that_raises_as_it_is_ended_ends_its_episode_alone(how):
+    scene, seeds = load_source("pick_and_place").scene, (0, 1, 2)
+
+    def build():
+        raises = RaisesAtTheEnd(interrupted=how != "update")
+        under = timeout(0.2, raises) if how != "below" else parallel("both", force_failure(Wait(0.2)), raises)
+        return sequence("root", Wait(0.1), under)
+
+    alone = one_by_one(build, scene, seeds)
+    assert all(kind is LeafError and "leaf 'raises' raised" in said for kind, said in alone.values())
+    assert in_batch(build, scene, seeds, 2) == alone
+
+
+def test_a_leaf_that_raises_as_its_episode_is_cleared_away_changes_nothing():
+    scene = load_source("pick_and_place").scene
+
+    def build():
+        return sequence("root", RaisesAtTheEnd(interrupted=True))
+
+    with BatchRunner(build, scene, worlds=2, longest=0.2) as batch:
+        found = dict(batch.run((0, 1, 2)))
+    runner = Runner(build, scene, longest=0.2)
+    assert [found[seed].reason for seed in (0, 1, 2)] == 3 * ["time_over"]
+    assert [runner.run(seed).reason for seed in (0, 1)] == 2 * ["time_over"]
+
+
+def test_a_feedback_message_may_be_anything():
+    class Says(Behaviour):
+        def update(self):
+            self.feedback_message = ("nothing", 3)
+            return Status.FAILURE
+
+    scene = load_source("pick_and_place").scene
+    alone = one_by_one(lambda: sequence("root", Says("says")), scene, (0,))
+    assert "('nothing', 3)" in str(alone[0])
+    assert in_batch(lambda: sequence("root", Says("says")), scene, (0,), 1) == alone
 
 
 def test_an_interrupt_stays_one_and_so_does_the_exit_of_a_signals_handler():
