@@ -47,7 +47,7 @@ PARSED = {
 """Commands that are only parsed, and why."""
 
 QUICK = {
-    "benchmarks.batch": "--quick --worlds 4",
+    "benchmarks.batch": "--quick --worlds 4 --episodes 2 --trees 40",
     "benchmarks.cluster": "--times 1 --episodes 12",
     "benchmarks.decomposition": "--seeds 1",
     "benchmarks.experiments": "--pictures pictures",

@@ -18,8 +18,8 @@ SHOWN = 40
 """Characters of a wrong word that a sentence repeats."""
 
 
-def whole(text: str | int, least: int, most: int) -> int:
-    """A whole number within bounds.
+def whole(text: str | int, least: int, most: int | None = None) -> int:
+    """A whole number within bounds; without ``most`` none above.
 
     Raises:
         BadParameter: It is none.
@@ -31,7 +31,7 @@ def whole(text: str | int, least: int, most: int) -> int:
     if value < least:
         kind = "a positive whole number" if least == 1 else "zero or a positive whole number"
         raise typer.BadParameter(f"should be {kind}, found {_shown(text)}")
-    if value > most:
+    if most is not None and value > most:
         raise typer.BadParameter(f"should be at most {most}, found {_shown(text)}")
     return value
 
@@ -52,8 +52,8 @@ def workers(text: str | int) -> int:
 
 
 def batch(text: str | int) -> int:
-    """How many worlds at once."""
-    return whole(text, 1, MOST_EPISODES)
+    """How many worlds at once; what memory has no room for is refused where it is known what runs."""
+    return whole(text, 1)
 
 
 def steps(text: str | int) -> int:

@@ -160,8 +160,15 @@ class ClusterDriver:
         elif now - self._alone_since > ROOM:
             raise MachineError(
                 f"the Ray cluster has had no room for an actor (one processor and "
-                f"{self._settings.memory / 1e9:.1f} GB) for {ROOM:.0f} s: 'ray status' shows what uses it"
+                f"{self._settings.memory / 1e9:.1f} GB) for {ROOM:.0f} s, and its largest node has "
+                f"{self._largest() / 1e9:.1f} GB: 'ray status' shows what uses them, and a smaller batch "
+                "needs less"
             )
+
+    def _largest(self) -> float:
+        """Bytes that the largest node lends to actors."""
+        living = (node["Resources"] for node in self._ray.nodes() if node["Alive"])
+        return max((node.get("memory", 0.0) for node in living), default=0.0)
 
     def _answered(self, call: Any, shares: Shares) -> None:
         actor = self._calls.pop(call)

@@ -78,9 +78,7 @@ class EngineOptions:
         engine_class("physics", self.engines).check_device(self.device)
         noise_model(self.noise)
         if self.laws not in LAWS:
-            raise InputError(
-                f"unknown laws '{self.laws}'{nearest(self.laws, LAWS)}: there are {', '.join(LAWS)}"
-            )
+            raise InputError(f"unknown laws '{self.laws}'{nearest(self.laws, LAWS)}")
         for limit in (self.timeout, self.connect_timeout):
             if not 0.0 < limit < 3600.0:
                 raise InputError(f"a time-out is a positive number of seconds below 3600, found {limit:g}")

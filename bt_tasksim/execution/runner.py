@@ -125,6 +125,16 @@ class Runner:
             set_up(self.tree, context=self.context)
         self._planted = self.blackboard
 
+    def close(self) -> None:
+        """Close the engines."""
+        self.pipeline.close()
+
+    def __enter__(self) -> Runner:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
     def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:
         """Draw a world, reset the engines and the tree."""
         configuration = self.scene.sample(seed, stream)

@@ -233,7 +233,7 @@ class Copies:
         with self.boards[world]:
             copy = build()
         if copy is self._tree or any(copy is nodes[0] for nodes in self._nodes):
-            raise InputError("build=... gives the same tree again: it should make a new one at each call")
+            raise InputError("build() gives the same tree again: it should make a new one at each call")
         nodes, wanted = nodes_of(copy), nodes_of(self._tree)
         if [_shape(n) for n in nodes] != [_shape(n) for n in wanted]:
             raise InputError(

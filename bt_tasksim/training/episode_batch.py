@@ -83,6 +83,11 @@ class EpisodeBatch:
         build: Callable[[], Behaviour] | None = None,
     ) -> None:
         options = options or EngineOptions(noise="original")
+        if not isinstance(tree, Behaviour):
+            raise InputError(
+                f"the first argument should be a tree, such as build(), found a {type(tree).__name__}; "
+                "what makes one is given beside it, as build=build"
+            )
         self.tree, self.longest = tree, longest
         self.reward = reward or Reward()
         self.robot = load_robot(scene.robot)

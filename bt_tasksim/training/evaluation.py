@@ -20,6 +20,7 @@ from py_trees.common import Status
 from bt_tasksim.concept.batch_leaves import leaf_in_batch
 from bt_tasksim.concept.plugins import load_all
 from bt_tasksim.core.cluster import Cluster
+from bt_tasksim.core.cluster_process import LOCAL
 from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
 from bt_tasksim.core.fleet import Fleet, Here
 from bt_tasksim.core.identity import differing, identity
@@ -174,10 +175,12 @@ def evaluate(
     versions = identity()  # before anybody edits a file
     batch = usual_batch(job.options, 1 if cluster else workers or 1) if job.batch is None else job.batch
     job = replace(job, batch=batch)
+    pictures = job.options.rendering or job.options.perception != "state"
     if cluster is None:
         processes = min(workers or 1, len(seeds))
-        pictures = job.options.rendering or job.options.perception != "state"
         check_memory(batch * processes, processes if processes > 1 else 0, pictures)
+    elif cluster == LOCAL:
+        check_memory(batch, 1, pictures)
     player = Player(job)  # errors show here, before any process starts
     runner = player.runner
     with player:

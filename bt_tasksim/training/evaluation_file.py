@@ -209,7 +209,11 @@ def read_kept(path: str | Path, versions: Mapping[str, str]) -> KeptEvaluation:
 
 
 def _from_file(path: Path, versions: Mapping[str, str]) -> KeptEvaluation:
-    content = parse_json_object(read_bytes(path, f"'{path}'", LARGEST), f"'{path}'")
+    text = read_bytes(path, f"'{path}'", LARGEST)
+    try:
+        content = parse_json_object(text, f"'{path}'")
+    except InputError as error:
+        raise InputError(f"{error}; remove it and evaluate anew") from error
     subject = _about(path, content, versions)
     episodes, seconds = content.get("outcomes"), content.get("seconds")
     if not isinstance(episodes, list) or outcomes_hash(episodes) != content.get("sha256"):

@@ -12,6 +12,7 @@ from bt_tasksim.cli.options.engines import EngineFlags, policies
 from bt_tasksim.cli.options.film import FilmFlags
 from bt_tasksim.cli.options.tree import TreeOptions
 from bt_tasksim.cli.streams import say
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.registry import register
 
 
@@ -34,6 +35,8 @@ def run(
 
     tree.load_nodes()
     options = engines.options(rendering=film.video, real_time=real_time)
+    if options.laws == "torch":
+        raise InputError("run: --laws torch is for batches of worlds, see 'evaluate'; a single run has NumPy")
     source = tree.load(policies(engines.policy), options.own_world())
     parts = [source.name, Path(source.scene.robot).stem, str(seed)]
     if options.perception != "state":

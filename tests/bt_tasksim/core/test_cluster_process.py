@@ -29,6 +29,10 @@ class PlayedRay:
         assert options == {"num_cpus": 1, "memory": 5, "max_restarts": 0, "max_task_retries": 0}
         return lambda kind: SimpleNamespace(remote=lambda: self._actor(kind()))
 
+    def nodes(self):
+        gigabytes = [(True, 2), (True, 3), (False, 9)]
+        return [{"Alive": alive, "Resources": {"memory": 1e9 * size}} for alive, size in gigabytes]
+
     def _actor(self, member):
         number = len(self.made)
         self.made.append(member)
@@ -117,7 +121,7 @@ def test_actors_that_cannot_begin_are_an_error_where_no_other_lives():
 
 def test_where_there_is_no_room_it_is_said(monkeypatch):
     monkeypatch.setattr(cluster_process, "ROOM", 0.05)
-    with pytest.raises(MachineError, match=r"no room for an actor.*ray status"):
+    with pytest.raises(MachineError, match=r"no room for an actor.*largest node has 3\.0 GB.*ray status"):
         spread(PlayedRay(room=0), [1])
 
 

@@ -303,9 +303,9 @@ def test_a_leaf_that_raises_as_its_episode_is_cleared_away_changes_nothing():
 
     with BatchRunner(build, scene, worlds=2, longest=0.2) as batch:
         found = dict(batch.run((0, 1, 2)))
-    runner = Runner(build, scene, longest=0.2)
     assert [found[seed].reason for seed in (0, 1, 2)] == 3 * ["time_over"]
-    assert [runner.run(seed).reason for seed in (0, 1)] == 2 * ["time_over"]
+    with Runner(build, scene, longest=0.2) as runner:
+        assert [runner.run(seed).reason for seed in (0, 1)] == 2 * ["time_over"]
 
 
 def test_a_feedback_message_may_be_anything():

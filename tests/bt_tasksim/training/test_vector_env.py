@@ -307,6 +307,8 @@ def test_what_is_asked_wrongly_is_one_sentence(vector_of):
     never = vector_of(sequence("s", Below(0.1), Train(Raise(), "mine")), num_envs=2)
     with pytest.raises(InputError, match=f"'mine' was not reached in {REDRAWS} draws; the last one"):
         never.reset(seed=0)
+    with pytest.raises(InputError, match=r"should be a tree, such as build\(\), found a function.*build="):
+        vector_of(simple)
     with pytest.raises(InputError, match="see or do different things"):
         vector_of(Train(sequence("s", Raise(name="a"), Turn(name="b"))))
     with pytest.raises(InputError, match="has no form for many worlds"):

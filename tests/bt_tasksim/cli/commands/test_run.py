@@ -101,3 +101,8 @@ def test_a_run_is_replayed_with_any_kind_of_tree(call, kind):
     assert call("run", tree, "--seed", 3, "--out", "here")[0] in (0, 1)
     code, out, _ = call("replay", "here", "--tree", tree)
     assert code == 0 and out.startswith("identical"), out
+
+
+def test_laws_of_batches_are_refused_for_a_single_run(call):
+    code, _, err = call("run", "pick_and_place", "--laws", "torch")
+    assert code == 2 and "evaluate" in err and not Path("runs").exists()
