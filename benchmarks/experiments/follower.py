@@ -33,7 +33,7 @@ def tree(follower: str, grip: float) -> Behaviour:
     root = FOLLOWERS[follower].build()
     for leaf in root.iterate():
         if isinstance(leaf, ConceptNode) and isinstance(leaf.model, Grasp):
-            leaf.model.grip = grip
+            leaf.model = Grasp.value(**{**leaf.model.arguments(), "grip": grip})
     return root
 
 

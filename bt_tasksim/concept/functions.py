@@ -65,6 +65,11 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
     tolerance: float
     """Metres within which its goal counts as reached."""
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "carry_out" not in vars(cls) and {"command", "advance"} & vars(cls).keys():
+            cls.carry_out = ConceptFunctions.carry_out  # type: ignore[method-assign]  # asks what is its own
+
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
         """The declared parameters, by name, in the order of the constructor's arguments."""
@@ -122,7 +127,10 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
         """The command for an action ``(N, actions)`` of offsets on the reference motion."""
 
     def carry_out(self, action: Array, seen: Seen, memory: MemoryT) -> tuple[Command, MemoryT]:
-        """What `command` and `advance` say, of one action; to override where both need the same numbers."""
+        """What `command` and `advance` say, of one action; to override where both need the same numbers.
+
+        This is what a run asks. A class that overrides one of the two again is asked for them, in a run too.
+        """
         return self.command(action, seen, memory), self.advance(action, seen, memory)
 
     def programmed_motion(self, seen: Seen, memory: MemoryT) -> Array:

@@ -61,16 +61,28 @@ class LeafModel(metaclass=ModelType):
         self.values = bind_arguments(self.parameters(), args, kwargs, owner)
         vars(self).update(self.values)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in vars(self).get("values", ()):
+            made = type(self).__name__
+            raise AttributeError(
+                f"{name} of a {made} cannot be changed: a model is a value, make another one: {made}(...)"
+            )
+        super().__setattr__(name, value)
+
     def arguments(self) -> dict[str, Any]:
         """Keyword arguments that build an equal model: parameters that are not defaults."""
         declared = self.parameters()
         return {k: v for k, v in self.values.items() if (p := declared[k]).required or v != p.default}
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and other.arguments() == self.arguments()
+        return type(other) is type(self) and other._compared() == self._compared()
 
     def __hash__(self) -> int:
         return hash((type(self), tuple(self.values.items())))
+
+    def _compared(self) -> tuple[Any, ...]:
+        """What makes a model equal to another one of its class."""
+        return (dict(self.values),)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self.arguments().items())})"
@@ -114,8 +126,11 @@ class ConceptModel(ConceptFunctions[MemoryT], LeafModel, _CalledConcept):
             raise InputError(f"{owner}: {contradiction}")
 
     def arguments(self) -> dict[str, Any]:
-        """Keyword arguments that build an equal model: parameters and settings that are not defaults."""
+        """Keyword arguments that build an equal model: parameters that are not defaults, settings given."""
         return super().arguments() | {k: v for k, v in self._settings.items() if v not in (None, {})}
+
+    def _compared(self) -> tuple[Any, ...]:
+        return (*super()._compared(), self.timeout, self.tolerance, self.uncertainty)
 
 
 def _positive(value: Any, default: float, owner: str, what: str) -> float:

@@ -21,6 +21,10 @@ PACKAGES = (
     "mujoco",
     "mujoco-warp",
     "warp-lang",
+    "coal",
+    "scipy",
+    "torch",
+    "array-api-compat",
     "opencv-python-headless",
 )
 """Packages whose versions a log names, where they are installed."""

@@ -29,15 +29,13 @@ from bt_tasksim.execution.laws import laws_of
 from bt_tasksim.execution.leaf_errors import no_status, set_up
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
-from bt_tasksim.execution.runner import LONGEST, NOT_JUDGED, SETTLE, Runner
+from bt_tasksim.execution.runner import LONGEST, NOT_JUDGED, QUIET, SETTLE, Runner
 from bt_tasksim.execution.worlds import BatchWorlds, Unreached, hidden_of
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.scene import WorldSource
-from bt_tasksim.scene.success import AT_REST, evaluate_success
+from bt_tasksim.scene.success import at_rest, evaluate_success
 
-QUIET = 4
-"""Control periods in a row in which everything is at rest, after which an outcome is judged."""
 IDLE, TICKING, SETTLING = range(3)
 
 
@@ -234,11 +232,8 @@ class BatchRunner:
         rows = np.flatnonzero(self._phase == SETTLING)
         if not len(rows):
             return rows
-        velocities = self.worlds.hidden(rows).velocities
-        fast = (np.linalg.norm(velocities[..., :3], axis=-1) >= AT_REST[0] / 2) | (
-            np.linalg.norm(velocities[..., 3:], axis=-1) >= AT_REST[1] / 2
-        )
-        self._quiet[rows] = np.where(fast.any(axis=1), 0, self._quiet[rows] + 1)
+        quiet = at_rest(self.worlds.hidden(rows).velocities)
+        self._quiet[rows] = np.where(quiet, self._quiet[rows] + 1, 0)
         return rows[(self._quiet[rows] >= QUIET) | (self._left[rows] <= 0)]
 
     def _judged(self, rows: Array) -> Iterator[tuple[int, Result | BtTasksimError]]:

@@ -47,6 +47,8 @@ SAFETY_STOP = register_reason("safety_stop", "safety stop, {arm}")
 
 LONGEST = 120.0
 """Seconds of an episode after which it is stopped."""
+QUIET = 4
+"""Control periods in a row in which everything is at rest, after which an outcome is judged."""
 SETTLE = 4.0
 """Longest time in seconds for which things may come to rest after the tree has ended."""
 
@@ -353,8 +355,8 @@ class Runner:
             return None
         quiet = 0
         for _ in range(round(SETTLE * configuration.control_frequency)):
-            quiet = quiet + 1 if at_rest(hidden) else 0
-            if quiet >= 4:
+            quiet = quiet + 1 if at_rest(hidden.velocities) else 0
+            if quiet >= QUIET:
                 break
             try:
                 self._observed(pipeline.step(Command()))

@@ -15,6 +15,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Outcome, register_reason
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.units import METRES, METRES_PER_SECOND, RADIANS, RADIANS_PER_SECOND
 from bt_tasksim.core.world import Hidden, WorldModel
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -133,10 +134,12 @@ def _knocked_over(goal: Goal, final: FinalState) -> Iterator[Outcome]:
             yield KNOCKED_OVER(object=actor.name, shift=shift, tilt=tilted)
 
 
-def at_rest(hidden: Hidden) -> bool:
-    """Every object is at rest."""
-    v = hidden.velocities
-    return bool(
-        np.all(np.linalg.norm(v[:, :3], axis=-1) < AT_REST[0] / 2)
-        and np.all(np.linalg.norm(v[:, 3:], axis=-1) < AT_REST[1] / 2)
-    )
+def at_rest(velocities: Array) -> Array:
+    """Every object is at rest: boolean ``(...)``.
+
+    Args:
+        velocities: Of the objects ``(..., objects, 6)`` in m/s and rad/s; NaN where there is none.
+    """
+    fast, spins = (np.linalg.norm(v, axis=-1) for v in (velocities[..., :3], velocities[..., 3:]))
+    found: Array = ~((fast >= AT_REST[0] / 2) | (spins >= AT_REST[1] / 2)).any(axis=-1)
+    return found

@@ -21,7 +21,7 @@ class Ending:
     Attributes:
         end: What is paid for it.
         outcome: Why; None where nobody says.
-        truncated: It was cut off from outside, or its judgement was spoiled; else it is terminated.
+        truncated: It was cut off from outside, or an error spoiled it; else it is terminated.
         kept: Its last state counts as one from which things could have gone on, so its potential stays.
         judged: What became of the completion signal; None without one.
         status: Status of the subtree.
@@ -38,12 +38,12 @@ class Ending:
 
     @property
     def is_success(self) -> bool:
-        """The completion signal was right, and nothing spoiled the judgement."""
+        """The completion signal was right, and nothing spoiled the episode."""
         return self.judged is not None and self.judged.success and not self.judged.discarded
 
     @property
     def discarded(self) -> bool:
-        """An error spoiled the judgement."""
+        """An error spoiled the episode."""
         return self.judged is not None and self.judged.discarded
 
     @property

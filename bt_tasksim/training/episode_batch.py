@@ -15,7 +15,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING, SUCCESS
-from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError
+from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, LostEngine
 from bt_tasksim.core.outcomes import INTERRUPTED, TIME_OVER, Outcome, outcome_of_error
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.pipeline_worlds import worlds_for
@@ -41,6 +41,8 @@ BEFORE = -1
 """Number of the activation before the first decision."""
 REDRAWS = 50
 """Draws in a row in which the subtree may stay inactive."""
+FAILURES = 50
+"""Episodes in a row in which an engine may fail in a world; with more, it is not what was drawn."""
 
 
 class EpisodeBatch:
@@ -116,6 +118,7 @@ class EpisodeBatch:
         self._transitions: dict[int, Transitions] = {}
         self._happened: list[Happened] = []
         self._over: list[int] = []
+        self._failed = np.zeros(worlds, np.int64)
         self._closed = False
 
     # ---- from outside -----------------------------------------------------------------------------------
@@ -186,7 +189,8 @@ class EpisodeBatch:
         """Until something has happened in a world at least; nothing where all wait or are idle.
 
         Raises:
-            BtTasksimError: An engine or a leaf has failed, outside of a judgement.
+            BtTasksimError: A leaf has failed, an engine in another process is gone, or an engine fails in
+                episode after episode.
         """
         try:
             while True:
@@ -275,10 +279,18 @@ class EpisodeBatch:
         return rows
 
     def _spoiled(self, row: int, error: BtTasksimError) -> None:
-        """An engine has failed in a world: where it is being judged, the judgement is spoiled."""
-        if not self._following[row] or isinstance(error, (InputError, LeafError)):
+        """An engine has failed in a world: its episode is discarded or, where none has begun, drawn again.
+
+        Raises:
+            BtTasksimError: It is not what was drawn in this world.
+        """
+        self._failed[row] += 1
+        if isinstance(error, (InputError, LeafError, LostEngine)) or self._failed[row] > FAILURES:
             raise error
-        self._end(row, SignalOutcome(False, "INVALID", outcome_of_error(error), discarded=True))
+        if self._activation[row] == BEFORE:
+            self._draw_again(row, error)
+        else:
+            self._end(row, SignalOutcome(False, "INVALID", outcome_of_error(error), discarded=True))
 
     # ---- within a tick ----------------------------------------------------------------------------------
 
@@ -402,21 +414,24 @@ class EpisodeBatch:
             STATUSES[int(self.batch.status[row, self._judgement.train])].name,
             float(self.context.times[row]),
         )
+        if not ending.discarded:
+            self._failed[row] = 0
         paid = self.reward.pay(transitions.to_end(ending.end, ending.kept))
         draw, redrawn = int(self._drawn.seeds[row]), int(self._redrawn[row])
         self._happened.append(Happened(row, self._features[row].copy(), paid, ending, draw, redrawn))
         self._phase[row] = IDLE
         self._over.append(row)
 
-    def _draw_again(self, row: int) -> None:
-        """The subtree was never active in the world of a draw."""
+    def _draw_again(self, row: int, error: BtTasksimError | None = None) -> None:
+        """The subtree was never active in the world of a draw, in which an engine may have failed."""
         self._redrawn[row] += 1
         self._phase[row] = DRAWING
         self._over.append(row)
         if self._redrawn[row] < REDRAWS and not self._drawn.has_one_draw(row):
             return
         redrawn, draw = int(self._redrawn[row]), int(self._drawn.seeds[row])
-        self._none(row, not_reached(self.train.name, self.batch, row, redrawn, draw))
+        why = error or not_reached(self.train.name, self.batch, row, redrawn, draw)
+        self._none(row, why)
 
     def _leave(self) -> None:
         """End all nodes in worlds whose episode is over."""

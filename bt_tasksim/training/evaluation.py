@@ -79,6 +79,8 @@ class Job:
 
     def __post_init__(self) -> None:
         batch = 1 if self.batch is None else self.batch
+        if self.batch == 1 and self.options.laws == "torch":
+            raise InputError("--laws torch is for batches of worlds: give a --batch of 2 or more, or none")
         if batch < 1 or self.threads < 1:
             raise InputError(f"a batch has one world and one thread at least, found {batch}, {self.threads}")
         if batch > 1 and (alone := why_alone(self.options)):
@@ -96,16 +98,19 @@ def usual_batch(options: EngineOptions, processes: int = 1) -> int:
     return 1 if why_alone(options) else max(1, min(BATCH, most_worlds(begun) // processes))
 
 
-def usual_workers(options: EngineOptions, episodes: int) -> int:
+def usual_workers(options: EngineOptions, episodes: int, batch: int | None = None) -> int:
     """How many processes run an evaluation where nobody says it: more than one where that pays.
+
+    Worlds on a device of their own (a GPU) are one process's.
 
     Args:
         options: The engines.
         episodes: How many episodes there are.
+        batch: How many worlds each runs at once; None: as many as is usual.
     """
-    if episodes < MANY or why_alone(options):
+    if episodes < MANY or options.device != "cpu" or why_alone(options):
         return 1
-    return min(os.cpu_count() or 1, most_processes(BATCH))
+    return min(os.cpu_count() or 1, most_processes(batch or BATCH))
 
 
 class EvaluationInterrupted(KeyboardInterrupt):  # as KeyboardInterrupt, which it is
@@ -320,7 +325,7 @@ class Player:
             MachineError: A robot has failed.
         """
         batch = usual_batch(self._job.options) if self._job.batch is None else self._job.batch
-        if batch == 1 or len(seeds) == 1:
+        if batch == 1:
             for index, seed in enumerate(seeds):
                 if self._remembers:
                     self.runner.plant(self._build)

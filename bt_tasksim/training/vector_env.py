@@ -97,7 +97,7 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
         self.redrawn = 0
         """Draws so far in which the subtree was never active."""
         self.discarded = 0
-        """Episodes so far whose judgement an error spoiled."""
+        """Episodes so far that an error spoiled."""
         self._rngs: list[np.random.Generator | None] = [None] * num_envs
         self._ended: dict[int, Happened] = {}
 
@@ -111,17 +111,18 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
         Args:
             seed: Of the first world's draws, one more for each further world; or one for each.
             options: ``reset_mask``: boolean ``(N,)``, the worlds that begin; the others stay as they are, and
-                must wait for an action.
+                must wait for an action. ``draw``: ``(N,)``, the seed of each world's draw, instead of a
+                random one; those of later episodes are random again.
 
         Raises:
-            InputError: The seeds are not as many as the worlds, or a world had no episode in many draws.
+            InputError: Seeds or draws are not as many as the worlds, or a world had no episode in many draws.
             ClosedEnvironmentError: It is closed.
         """
         rows = np.arange(self.num_envs)
         mask = None if options is None else options.get("reset_mask")
         if mask is not None:
             rows = np.flatnonzero(np.asarray(mask, bool))
-        self.begin(rows, seed)
+        self.begin(rows, seed, None if options is None else options.get("draw"))
         ready = self.wait(rows)
         return ready.features, self._told(ready)
 
@@ -144,21 +145,31 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
 
     # ---- those that are ready ---------------------------------------------------------------------------
 
-    def begin(self, rows: Array, seed: int | Sequence[int | None] | None = None) -> None:
+    def begin(
+        self,
+        rows: Array,
+        seed: int | Sequence[int | None] | None = None,
+        draw: Sequence[int] | None = None,
+    ) -> None:
         """Begin episodes in worlds ``(k,)``, whatever goes on there; `recv` gives their first decisions.
 
         Args:
             rows: Which worlds.
             seed: As of `reset`.
+            draw: As of the options of `reset`.
+
+        Raises:
+            InputError: They are not as many as the worlds.
         """
-        seeds = self._seeds(seed)
-        if len(seeds) != self.num_envs:
-            raise InputError(f"there are {self.num_envs} worlds, and {len(seeds)} seeds")
+        seeds, draws = self._seeds(seed), [None] * self.num_envs if draw is None else np.ravel(draw).tolist()
+        for what, found in (("seeds", seeds), ("draws", draws)):
+            if len(found) != self.num_envs:
+                raise InputError(f"there are {self.num_envs} worlds, and {len(found)} {what}")
         for row in np.asarray(rows).tolist():
             if seeds[row] is not None or self._rngs[row] is None:
                 self._rngs[row], _ = seeding.np_random(seeds[row])
             self._ended.pop(row, None)
-            self._begin(row)
+            self._begin(row, draws[row])
 
     def send(self, rows: Array, actions: Array) -> None:
         """Give worlds that wait for one an action.
@@ -187,9 +198,10 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
             happened = self.batch.go_on()
             if not happened:
                 break
+            failed = [event.error for event in happened if event.error is not None]
             for event in happened:
                 if event.error is not None:
-                    raise event.error
+                    continue
                 if event.ending is not None:
                     self.discarded += event.ending.discarded
                     self._ended[event.row] = event
@@ -197,6 +209,8 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
                 else:
                     self.redrawn += event.redrawn if event.paid is None else 0
                     found[event.row] = event
+            if failed:
+                raise failed[0]
         rows = sorted(found)
         return np.array(rows, int), self._ready([found[row] for row in rows])
 
@@ -259,7 +273,7 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
             return [int(seed) + k for k in range(self.num_envs)]
         return seed
 
-    def _begin(self, row: int) -> None:
+    def _begin(self, row: int, draw: int | None = None) -> None:
         rng = self._rngs[row]
         assert rng is not None
-        self.batch.begin(row, Draws(rng, None, self.stream, self.stage))
+        self.batch.begin(row, Draws(rng, draw, self.stream, self.stage))

@@ -76,7 +76,7 @@ def evaluate(
     chosen = policies(engines.policy)
     options = engines.options()
     if cluster is None and workers is None:
-        workers = evaluation.usual_workers(options, episodes)
+        workers = evaluation.usual_workers(options, episodes, batch)
     alone_here = cluster is None and workers == 1
     job = evaluation.Job(
         tree.tree,

@@ -127,6 +127,15 @@ def careful(monkeypatch):
     return Careful("cup")
 
 
+asked: list[str] = []
+
+
+class Both(Careful):
+    def carry_out(self, action, seen, memory):
+        asked.append("both")
+        return Careful.command(self, action, seen, memory), memory
+
+
 def test_an_unmet_precondition_is_a_failure_without_a_command(toy, careful):
     stage = toy(careful)
     stage.world.put(tool_pose=stage.world.now.tool_pose + np.array([0, 0, 0.3, 0, 0, 0, 0]))
@@ -384,6 +393,36 @@ def test_arguments_make_an_equal_model_and_are_as_few_as_will_do():
     leaf = Careful("cup", policy="programmed")
     assert leaf.arguments() == {"target": "cup", "policy": "programmed"}
     assert Careful(**leaf.arguments()).model == leaf.model
+
+
+def test_a_default_that_is_named_changes_nothing():
+    plain = Grasp.value("cup")
+    named = Grasp.value("cup", timeout=plain.timeout, speed=plain.speed)
+    assert named == plain and hash(named) == hash(plain)
+    assert Grasp.value("cup", timeout=plain.timeout + 1.0) != plain
+
+
+def test_parameters_cannot_be_changed():
+    """Files and hashes would tell of another model than the one that runs."""
+    model = Grasp.value("cup")
+    with pytest.raises(AttributeError, match=r"speed of a Grasp cannot be changed: .*make another"):
+        model.speed = 9.0
+    assert model == Grasp.value("cup")
+
+
+def test_a_command_of_ones_own_is_carried_out_below_a_class_that_computes_both_at_once(toy):
+    class Hasty(Both):
+        def command(self, action, seen, memory):
+            asked.append("command")
+            return super().command(action, seen, memory)
+
+    class Other(Hasty):
+        timeout_s = 1.0
+
+    for kind in (Both, Hasty, Other):
+        asked.clear()
+        toy(kind("cup")).tick(1)
+        assert asked == (["both"] if kind is Both else ["command"])
 
 
 def test_neither_a_name_nor_a_policy_is_the_models():

@@ -5,6 +5,7 @@ import json
 import math
 import os
 
+import numpy as np
 import pytest
 
 from bt_tasksim.concept_nodes.holding import NOT_HELD
@@ -20,6 +21,7 @@ from bt_tasksim.training.evaluation import (
     EvaluationInterrupted,
     EvaluationTerminated,
     Job,
+    Player,
     episode,
     evaluate,
     usual_batch,
@@ -143,6 +145,23 @@ def test_many_episodes_have_a_process_for_each_core(monkeypatch):
     monkeypatch.setattr("os.cpu_count", lambda: 6)
     assert [usual_workers(EngineOptions(), n) for n in (1, 199, 200)] == [1, 1, 6]
     assert usual_workers(EngineOptions(perception="camera"), 10**6) == 1, "pictures take much memory"
+
+
+def test_worlds_on_a_gpu_are_one_process(monkeypatch):
+    monkeypatch.setattr("os.cpu_count", lambda: 16)
+    monkeypatch.setattr("bt_tasksim.engines.physics.mujoco_warp.MujocoWarpPhysics.check_device", str)
+    assert usual_workers(EngineOptions(engines="mujoco_warp", device="cuda"), 20_000, 4096) == 1
+    assert usual_workers(EngineOptions(engines="mujoco_warp"), 20_000) == 16
+
+
+def test_laws_on_a_device_are_those_of_every_share(policy):
+    """The last shares are of one episode; a batch of one would be computed otherwise."""
+    with pytest.raises(InputError, match="--laws torch is for batches of worlds"):
+        Job("pick_and_place", options=EngineOptions(laws="torch"), batch=1)
+    with Player(Job("pick_and_place", options=EngineOptions(laws="torch"))) as player:
+        (found,) = player.play([3], "evaluation")
+        assert found[1].success and player._batch is not None
+        assert not isinstance(player._batch.context.like, np.ndarray)
 
 
 def test_processes_count_in_what_memory_has_room_for(monkeypatch):

@@ -191,12 +191,54 @@ def test_an_error_while_it_is_judged_discards_this_world_alone(env_of, vector_of
     assert not any(found[row][1] or found[row][2] for row in (0, 2))
 
 
-def test_an_error_before_is_an_error(vector_of):
+def test_an_engine_that_fails_before_ends_that_worlds_episode_alone(vector_of):
+    vector, alone = vector_of(simple(), num_envs=2), vector_of(simple(), num_envs=2)
+    for some in (vector, alone):
+        some.reset(seed=0)
+    vector.batch.worlds.each[1].error = MachineError("the engine stopped")
+    vector.send(np.arange(2), np.array([UP, UP]))
+    rows, ready = vector.recv()
+    vector.batch.worlds.each[1].error = None
+    while 1 not in rows:
+        rows, ready = vector.recv()
+    told = ready.infos[rows.tolist().index(1)]["final_info"]
+    assert told["discarded"] and told["reason"] == "machine_failed" and vector.discarded == 1
+    alone.step(np.array([UP, UP]))
+    features = [some.step(np.array([UP, UP]))[0][0].tolist() for some in (vector, alone)]
+    assert features[0] == features[1], "the other world goes on as ever"
+
+
+def test_worlds_begin_with_given_draws(vector_of):
+    vector, other = vector_of(simple(), num_envs=2), vector_of(simple(), num_envs=2)
+    _, told = vector.reset(seed=0, options={"draw": [7, 9]})
+    assert told["draw"].tolist() == [7, 9]
+    with pytest.raises(InputError, match="2 worlds, and 1 draws"):
+        other.reset(seed=0, options={"draw": [7]})
+
+
+def test_an_engine_that_fails_before_the_first_decision_is_given_another_world(vector_of):
+    vector = vector_of(sequence("s", Move(0.3), simple()), num_envs=2)
+    vector.begin(np.arange(2), 0)
+    vector.batch.worlds.each[1].error = MachineError("the engine stopped")
+    step = vector.batch.worlds.step
+
+    def once(*about):
+        found = step(*about)
+        vector.batch.worlds.each[1].error = None
+        return found
+
+    vector.batch.worlds.step = once
+    ready = vector.wait(np.arange(2))
+    assert [info["redrawn"] for info in ready.infos] == [0, 1] and vector.discarded == 0
+
+
+def test_an_engine_that_always_fails_is_an_error(vector_of):
     vector = vector_of(simple(), num_envs=2)
     vector.reset(seed=0)
     vector.batch.worlds.each[1].error = MachineError("the engine stopped")
     with pytest.raises(MachineError, match=r"^the engine stopped$"):
-        vector.step(np.array([UP, UP]))
+        for _ in range(200):
+            vector.step(np.array([DONE, UP]))
     vector.batch.worlds.each[1].error = None
     with pytest.raises(RuntimeError, match="does not wait for one"):
         vector.step(np.array([UP, UP]))
