@@ -94,7 +94,7 @@ def _settled(evaluation: EvaluationClient) -> Hidden:
     end, quiet = time.monotonic() + SETTLE, 0
     while True:
         truth = evaluation.truth()
-        quiet = quiet + 1 if at_rest(truth) else 0
+        quiet = quiet + 1 if at_rest(truth.velocities) else 0
         if quiet >= 4 or time.monotonic() > end:
             return truth
         time.sleep(0.05)
