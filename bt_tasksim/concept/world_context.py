@@ -46,6 +46,12 @@ class WorldContext(Context):
         return {} if found is None else {0: found}
 
     @property
+    def looked(self) -> Observation | None:
+        """See `Context.looked`."""
+        found = self._batch.looked
+        return None if found is None else only_world(found, int(self._row[0]))
+
+    @property
     def observation(self) -> Observation:
         """See `Context.observation`."""
         looked, facts, known = self._batch.looked, self.facts_table, self._arranged
@@ -64,6 +70,10 @@ class WorldContext(Context):
     def written(self) -> Written:
         """See `Context.written`."""
         return self._batch.written_in(int(self._row[0]))
+
+    def written_in(self, world: int) -> Written:
+        """See `Context.written_in`."""
+        return self._batch.written_in(int(self._row[world]))
 
     def begin(self, models: Sequence[WorldModel], rows: Array | None = None) -> None:
         """Not here: episodes begin in the batch.

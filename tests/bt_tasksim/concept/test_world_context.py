@@ -59,6 +59,7 @@ def test_it_sees_its_world_as_if_it_were_alone(second):
     np.testing.assert_array_equal(view.hidden().objects, hidden(None).objects[1:, :1])
     context.advance(observed(5.0))
     assert view.now == 6.0 and view.observation.tool_pose.shape == (1, 7)
+    np.testing.assert_array_equal(view.looked.tool_pose, context.looked.tool_pose[1:])
     context.begin([world("cup")], np.array([1]))
     assert list(view.world.columns) == ["cup"]
 
@@ -81,6 +82,7 @@ def test_what_it_writes_is_its_worlds_command(second, act):
     view.write(tools(0.2), ONE, b)
     assert context.written.tool[:, 2].tolist() == [0.1, 0.2] and context.tool_writer(1) is b
     assert view.command.tool[2] == 0.2 and view.tool_writer() is b
+    assert view.written_in(0).tool[0, 2] == view.written.tool[0, 2] == 0.2
     with pytest.raises(CommandConflictError, match="'b' and 'a'"):
         context.write(tools(0.3), ONE + 1, a)
     view.withdraw(b, ONE)
