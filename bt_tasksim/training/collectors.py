@@ -23,6 +23,9 @@ LENGTH = 64.0
 """Decisions that an episode is thought to have before any has ended."""
 LACK = 0.25
 """Share of an episode that may be thought to lack before one more begins: else much would go to waste."""
+GOES_ON = 0.8
+"""Share of the usual length that an episode is thought to go on for at least, however long it is: lengths
+scatter by some 0.8 of their mean."""
 NOISE = 64
 """Decisions for which noise is drawn at a time."""
 
@@ -224,10 +227,10 @@ class RolloutCollector(Collector[EnvironmentRollout]):
 
     def next(self) -> Collecting | None:
         """See `Collector.next`."""
-        length = self._before / self._front if self._front else self._task.length
-        others = self._episodes[self._front :]
+        length, others = self._task.length, self._episodes[self._front :]
         expected = self._before + sum(
-            len(episode.rewards) if episode.over else max(length, len(episode.rewards)) for episode in others
+            len(episode.rewards) + (0.0 if episode.over else _to_come(len(episode.rewards), length))
+            for episode in others
         )
         going = any(not episode.over for episode in others)
         if going and expected >= self._task.decisions - LACK * length:
@@ -280,6 +283,11 @@ class RolloutCollector(Collector[EnvironmentRollout]):
             ends=[e.end for e, n in parts if e.end is not None and n == len(e.rewards)],
             redrawn=sum(e.redrawn for e, _ in parts),
         )
+
+
+def _to_come(decisions: int, length: float) -> float:
+    """How many more decisions an episode is thought to have after so many."""
+    return max(length - decisions, GOES_ON * length)
 
 
 class RolloutEpisode(Collecting):
