@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from py_trees.behaviour import Behaviour
 
 from benchmarks import sealed
 from benchmarks.success import RESULTS
@@ -116,10 +117,12 @@ class GivenGrasp(Grasp):
         path = plan([*_way_out(seen, back), back, goal], self.speed, blend=0.03)
         return memory._replace(path=path, begins=_approach_begins(path, self.standoff), goal=goal)
 
-    def take(self, change: Change) -> None:
-        """Do it this way from the next activation on."""
-        self.change = change
-        self.grip = change.grip
+
+def tree_of(change: Change) -> Behaviour:
+    """The tree with a grasp that is changed so."""
+    leaf = GivenGrasp("target", grip=change.grip, timeout=6.0, policy="programmed")
+    leaf.model.change = change
+    return sequence("given grasp", leaf, Pick("target", distance=grasp_then_pick.LIFT, speed=0.5))
 
 
 class Oracle:
@@ -130,10 +133,7 @@ class Oracle:
     """
 
     def __init__(self, robot: str) -> None:
-        leaf = GivenGrasp("target", timeout=6.0, policy="programmed")
-        self.grasp: GivenGrasp = leaf.model
-        tree = sequence("given grasp", leaf, Pick("target", distance=grasp_then_pick.LIFT, speed=0.5))
-        self.runner = Runner(tree, grasp_then_pick.scene(robot), EngineOptions(noise="none"))
+        self.runner = Runner(tree_of(Change()), grasp_then_pick.scene(robot), EngineOptions(noise="none"))
         self.changes = changes()
 
     def search(self, seed: int) -> dict[str, Any]:
@@ -165,7 +165,7 @@ class Oracle:
 
     def _try(self, configuration: ActorConfiguration, change: Change) -> str:
         """Why a grasp does not hold; empty when it does."""
-        self.grasp.take(change)
+        self.runner.plant(functools.partial(tree_of, change))
         try:
             result = self.runner.finish(configuration, self.runner.reset(configuration))
         except InputError:

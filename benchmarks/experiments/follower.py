@@ -16,8 +16,6 @@ from py_trees.behaviour import Behaviour
 from benchmarks.experiments import judged, pictures
 from benchmarks.experiments.common import Request, policy_of, share
 from benchmarks.experiments.training import POLICIES, learn
-from bt_tasksim.concept.leaf import ConceptNode
-from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.policy.policy import PROGRAMMED
 from bt_tasksim.training.config import TrainConfig
 from bt_tasksim.trees.scenarios import grasp_fast_heavy, grasp_gentle_lift
@@ -30,11 +28,7 @@ LESS = 0.7
 
 def tree(follower: str, grip: float) -> Behaviour:
     """A follower's tree, with a grasp that closes to ``grip``."""
-    root = FOLLOWERS[follower].build()
-    for leaf in root.iterate():
-        if isinstance(leaf, ConceptNode) and isinstance(leaf.model, Grasp):
-            leaf.model = Grasp.value(**{**leaf.model.arguments(), "grip": grip})
-    return root
+    return FOLLOWERS[follower].build(grip)
 
 
 def train(request: Request) -> None:

@@ -36,10 +36,10 @@ def scene(robot: str = "panda") -> Scene:
     )
 
 
-def build() -> Behaviour:
-    """The tree."""
+def build(grip: float = 1.0) -> Behaviour:
+    """The tree, with a grasp that closes to ``grip``."""
     return sequence(
         "grasp, gentle lift",
-        Train(Grasp("target", tightening=TIGHTENING, timeout=TIMEOUT)),
+        Train(Grasp("target", grip=grip, tightening=TIGHTENING, timeout=TIMEOUT)),
         Pick("target", distance=LIFT, speed=SPEED, squeeze=SQUEEZE),
     )
