@@ -42,7 +42,7 @@ test-perturbed: setup
 	done; exit $$failed
 
 # Damaged inputs of every kind, some seconds of each; python -m tests.attacks KIND --cases N counts more.
-SECONDS_EACH ?= 60
+SECONDS_EACH ?= 30
 ATTACKS := logs trajectories replays yaml_files settings checkpoints ros_messages
 
 attacks: setup

@@ -24,7 +24,7 @@ from bt_tasksim.core.errors import BtTasksimError
 from bt_tasksim.core.outcomes import outcome_of_error
 from bt_tasksim.core.world import Hidden
 from bt_tasksim.execution.pipelines import EngineOptions
-from bt_tasksim.execution.runner import SETTLE, Runner
+from bt_tasksim.execution.runner import QUIET, SETTLE, Runner
 from bt_tasksim.hardware.twin.evaluation import EvaluationClient
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.success import at_rest, evaluate_success
@@ -69,7 +69,7 @@ def on_the_twin(
         try:
             return [_one(runner, robot, bench.evaluation, seed) for seed in seeds]
         finally:
-            runner.pipeline.close()
+            runner.close()
 
 
 def _one(runner: Runner, robot: Any, evaluation: EvaluationClient, seed: int) -> Episode:
@@ -95,7 +95,7 @@ def _settled(evaluation: EvaluationClient) -> Hidden:
     while True:
         truth = evaluation.truth()
         quiet = quiet + 1 if at_rest(truth.velocities) else 0
-        if quiet >= 4 or time.monotonic() > end:
+        if quiet >= QUIET or time.monotonic() > end:
             return truth
         time.sleep(0.05)
 

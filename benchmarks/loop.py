@@ -38,7 +38,7 @@ def measure(minutes: float, rate: int, domain: int) -> tuple[str, str, Timing, f
             engine: Any = runner.pipeline.physics
             way = shortest_way(engine.engine.joints.offset)
         finally:
-            runner.pipeline.close()
+            runner.close()
     return result.status.name, result.why, with_way(result.timing, way), way
 
 

@@ -61,7 +61,7 @@ def measure(environment: str, episodes: int, noise: str = "fine") -> dict[str, f
         result = runner.run(seed)
         whole, n = time.perf_counter() - started - reset.seconds, max(result.control_steps, 1)
         rows.append((step.seconds / n, (whole - step.seconds) / n, kinematics.seconds / n, reset.seconds))
-    runner.pipeline.close()
+    runner.close()
     theirs, ours, solving, resets = (statistics.median(column) for column in zip(*rows[1:], strict=True))
     return {
         "ManiSkill's step, us": 1e6 * theirs,

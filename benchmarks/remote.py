@@ -112,7 +112,7 @@ def compared(ways: dict[str, EngineOptions], rounds: int, episodes: int, picture
                 rates[name].append(rate(runner, seeds, pictures))
     finally:
         for runner in runners.values():
-            runner.pipeline.close()
+            runner.close()
     first, *others = ways
     out = {f"{name}_steps_per_s": statistics.median(values) for name, values in rates.items()}
     for name in others:
@@ -154,7 +154,7 @@ def step_times(options: EngineOptions, steps: int = 2000) -> float:
         started = time.perf_counter()
         runner.pipeline.physics.step(target)
         times.append(time.perf_counter() - started)
-    runner.pipeline.close()
+    runner.close()
     return 1e6 * statistics.median(times)
 
 

@@ -12,6 +12,7 @@ number is typed by hand. Results are what the measurements write:
 - ``experiment-<letter>.json`` by ``python -m benchmarks.experiments <letter>``;
 - ``speed.json`` by ``bt-tasksim bench --json``;
 - ``remote.json`` by ``python -m benchmarks.remote``;
+- ``planning.json`` by ``python -m benchmarks.planning``, which stands in docs/planning.md;
 - ``gap-<scenario>-<grasp>-<engines>.json`` by ``python -m benchmarks.gap``, ``faults.json`` by
   ``python -m benchmarks.faults``, ``loop.json`` by ``python -m benchmarks.loop``;
 - ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
@@ -47,7 +48,7 @@ PAGES = (
 ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
 KINDS = ("camera", "fromlogs")
-OTHER = ("speed", "decomposition", "learning", "remote", "faults", "loop")
+OTHER = ("speed", "decomposition", "learning", "remote", "faults", "loop", "planning")
 APART = ("oracle-", "grasp-", "experiment-", "training-", "gap-", "logs-", "decomposition-")
 """How results begin whose tables are made in `learned_tables`, `robot_tables` and `experiments.pages`."""
 NOT_YET = "not measured yet"

@@ -13,6 +13,7 @@ from bt_tasksim import _names
 
 if TYPE_CHECKING:
     from bt_tasksim.concept.condition import Condition
+    from bt_tasksim.concept.declared import ConditionOf
     from bt_tasksim.concept.limit import Limit
     from bt_tasksim.concept.model import ConceptModel
     from bt_tasksim.concept.parameters import (
@@ -41,14 +42,17 @@ if TYPE_CHECKING:
     from bt_tasksim.execution.pipelines import EngineOptions
     from bt_tasksim.execution.result import Result
     from bt_tasksim.execution.runner import Runner
+    from bt_tasksim.execution.session import Session
     from bt_tasksim.planning import reference_motion
     from bt_tasksim.report.launch import run
     from bt_tasksim.robot.description import RobotDescription, load_robot
     from bt_tasksim.scene.scene import CurriculumStage, Lesson, Scene
     from bt_tasksim.scene.scene_file import load_scene
+    from bt_tasksim.scene.specs import FixtureSpec as Fixture
     from bt_tasksim.scene.specs import Goal, HandStart, ObjectSpec, SpotSpec
     from bt_tasksim.training.config import TrainConfig
     from bt_tasksim.training.env import EpisodeEnv
+    from bt_tasksim.training.launch import evaluate
     from bt_tasksim.training.ppo import train
     from bt_tasksim.training.sb3_vector_env import SB3VectorEnv
     from bt_tasksim.training.vector_env import EpisodeVectorEnv
@@ -59,6 +63,7 @@ _names.install()
 _HOMES = {
     "bt_tasksim.concept.condition": ("Condition",),
     "bt_tasksim.concept.seen": ("Known", "Seen"),
+    "bt_tasksim.concept.declared": ("ConditionOf",),
     "bt_tasksim.concept.limit": ("Limit",),
     "bt_tasksim.concept.model": ("ConceptModel",),
     "bt_tasksim.concept.parameters": (
@@ -86,9 +91,11 @@ _HOMES = {
     "bt_tasksim.report.launch": ("run",),
     "bt_tasksim.execution.result": ("Result",),
     "bt_tasksim.execution.runner": ("Runner",),
+    "bt_tasksim.execution.session": ("Session",),
     "bt_tasksim.robot": ("RobotDescription", "load_robot"),
     "bt_tasksim.scene": (
         "CurriculumStage",
+        "Fixture",
         "Goal",
         "HandStart",
         "Lesson",
@@ -100,6 +107,7 @@ _HOMES = {
     "bt_tasksim.training.config": ("TrainConfig",),
     "bt_tasksim.trees.nodes.train": ("Train",),
     "bt_tasksim.training.env": ("EpisodeEnv",),
+    "bt_tasksim.training.launch": ("evaluate",),
     "bt_tasksim.training.ppo": ("train",),
     "bt_tasksim.training.sb3_vector_env": ("SB3VectorEnv",),
     "bt_tasksim.training.vector_env": ("EpisodeVectorEnv",),
@@ -109,6 +117,8 @@ _MODULES = {
     "reference_motion": "bt_tasksim.planning.reference_motion",
     "units": "bt_tasksim.core.units",
 }
+_CALLED = {"Fixture": "FixtureSpec"}
+"""Names that are longer where they are at home."""
 _HOME = {name: home for home, names in _HOMES.items() for name in names} | _MODULES
 
 __all__ = [
@@ -118,10 +128,12 @@ __all__ = [
     "Command",
     "ConceptModel",
     "Condition",
+    "ConditionOf",
     "Direction",
     "EngineOptions",
     "EpisodeEnv",
     "EpisodeVectorEnv",
+    "Fixture",
     "Flag",
     "Form",
     "Goal",
@@ -153,12 +165,14 @@ __all__ = [
     "Scene",
     "Seconds",
     "Seen",
+    "Session",
     "SpotSpec",
     "Statement",
     "Text",
     "Train",
     "TrainConfig",
     "array_namespace",
+    "evaluate",
     "load_robot",
     "load_scene",
     "poses",
@@ -176,7 +190,7 @@ def __getattr__(name: str) -> Any:
         if "IPython" in sys.modules:  # a notebook: trees and graphs show themselves
             importlib.import_module("bt_tasksim.report.notebook").install()
         home = importlib.import_module(_HOME[name])
-        return home if name in _MODULES else getattr(home, name)
+        return home if name in _MODULES else getattr(home, _CALLED.get(name, name))
     raise AttributeError(f"module 'bt_tasksim' has no attribute '{name}'")
 
 

@@ -5,28 +5,42 @@ from __future__ import annotations
 from bt_tasksim._names import one_module
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept_nodes.arrangement import Beside, Clear, Inside, StandsOn
 from bt_tasksim.concept_nodes.bring import Bring
 from bt_tasksim.concept_nodes.conditions import AtPose, Holding, TimePassed, Upright
 from bt_tasksim.concept_nodes.grasp import Grasp
+from bt_tasksim.concept_nodes.hand_conditions import HandEmpty, Lifted, Over, OverBeside
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
 from bt_tasksim.concept_nodes.release import Release
+from bt_tasksim.concept_nodes.settle import Settle
 from bt_tasksim.concept_nodes.wait import Wait
+from bt_tasksim.concept_nodes.withdraw import Withdraw
 from bt_tasksim.core.registry import parts
 
 one_module(__name__)
 
 __all__ = [
     "AtPose",
+    "Beside",
     "Bring",
+    "Clear",
     "Grasp",
+    "HandEmpty",
     "Holding",
+    "Inside",
+    "Lifted",
+    "Over",
+    "OverBeside",
     "Pick",
     "Place",
     "Release",
+    "Settle",
+    "StandsOn",
     "TimePassed",
     "Upright",
     "Wait",
+    "Withdraw",
     "catalogue",
 ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from bt_tasksim.concept.limit import Limit
@@ -10,15 +11,19 @@ from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held, tool_distance
 from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
+from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Possible, Statement
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.units import METRES, NEWTONS
 from bt_tasksim.core.world import Command
-from bt_tasksim.planning.reference_motion import Path, sample
+from bt_tasksim.planning.arm import FULL, arm_of
+from bt_tasksim.planning.reference_motion import Path, plan, posture, sample, searched_for
+from bt_tasksim.planning.route import Pace, followed
+from bt_tasksim.planning.routes import SAMPLES, in_postures, with_routes
 
 CARRIED = Form(
-    "tool {tool_to_goal} from its goal, {object} {object_to_tool} from the tool, {force} at the wrist",
+    "tool {tool_to_goal} from its goal, {object} {object_to_tool} from the tool, {force} at the wrist{touch}",
     {"tool_to_goal": METRES, "object_to_tool": METRES, "force": NEWTONS},
 )
 SLIP = 0.03
@@ -32,6 +37,29 @@ class MoveMemory(NamedTuple):
     """A path that the tool follows."""
 
     path: Path
+
+
+def straight_path(
+    seen: Seen, goal: Array, speed: float, joints: Sequence[Array], before: Sequence[Array] = ()
+) -> Path:
+    """The tool's paths straight to goals ``(N, 7)``, in the postures in which the arm was looked at.
+
+    An arm of few joints turns its tool on the way as far as it must, so its way is that of its joints.
+
+    Args:
+        seen: Where the tool is.
+        goal: Where it goes.
+        speed: Its peak speed, m/s.
+        joints: Joints ``(n, n_arm)`` evenly along the way, in each world; none where it stays where it is.
+        before: The same for a way that comes first, if any does: the arm comes to rest after it.
+    """
+    ways, arm = {k: way for k, way in enumerate(joints) if len(way)}, arm_of(seen.robot)
+    path = plan([seen.tool, goal], speed, samples=SAMPLES)
+    if len(seen.robot.arm_joints) >= FULL and not len(before):
+        return in_postures(with_routes(path, {}, len(seen.robot.arm_joints)), ways)
+    pieces = {k: [before[k], way] if len(before) and len(before[k]) else [way] for k, way in ways.items()}
+    routes = {k: [followed(arm, piece, Pace(speed)) for piece in found] for k, found in pieces.items()}
+    return with_routes(path, routes, len(seen.robot.arm_joints))
 
 
 class Carry(ConceptModel[MoveMemory]):
@@ -48,7 +76,12 @@ class Carry(ConceptModel[MoveMemory]):
 
     def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
         """Follow the path; the hand keeps its grip."""
-        return Command(tool=sample(memory.path, seen.elapsed))
+        path = memory.path
+        return Command(tool=sample(path, seen.elapsed), posture=posture(path, seen.elapsed))
+
+    def planned(self, memory: MoveMemory) -> Array | float:
+        """How long the way takes, where it was searched for."""
+        return searched_for(memory.path)
 
     def limits(self, seen: Seen, memory: MoveMemory) -> tuple[Limit, ...]:
         """The force at the wrist."""
@@ -91,6 +124,7 @@ class Carry(ConceptModel[MoveMemory]):
             object=self.target,
             object_to_tool=tool_distance(seen, self.target),
             force=force_at_wrist(seen),
+            touch=touched(seen, self.target),
         )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.parameters import Metres, ObjectName, PlaceName, Radians, Seconds
 from bt_tasksim.concept.seen import Seen
@@ -12,6 +14,7 @@ from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS, SECONDS
+from bt_tasksim.scene.specs import Goal
 
 FROM_TOOL = Form("{object} is {distance} from the tool", {"distance": METRES})
 OFF = Form("{object} is {distance} and {angle:.0f} off", {"distance": METRES, "angle": RADIANS})
@@ -28,6 +31,8 @@ class Holding(Condition):
     """
 
     target: ObjectName
+
+    in_hand = True
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
@@ -53,6 +58,18 @@ class AtPose(Condition):
     on: PlaceName
     tolerance: Metres = 0.02
     angle: Radians = 0.2
+
+    relation = "on"
+
+    @classmethod
+    def from_goal(cls, goal: Goal) -> dict[str, Any]:
+        """See `Condition.from_goal`; a goal's own tolerances count where they are tighter."""
+        asked: dict[str, Any] = {"target": goal.object, "on": goal.place}
+        if goal.position_tolerance != Goal.position_tolerance:
+            asked["tolerance"] = min(goal.position_tolerance, cls.tolerance)
+        if goal.angle_tolerance != Goal.angle_tolerance:
+            asked["angle"] = min(goal.angle_tolerance, cls.angle)
+        return asked
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""

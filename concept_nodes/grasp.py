@@ -6,7 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.demonstrated import coming_from, snapped
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
@@ -15,19 +18,42 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes import grasp_features
-from bt_tasksim.concept_nodes.grasp_features import ALONG, CLOSE, HASTE
+from bt_tasksim.concept_nodes.closer import with_room
+from bt_tasksim.concept_nodes.grasp_candidates import Candidates, candidates, narrowest_grip
+from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, rooms
+from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, CLOSE, EAGER, HASTE
+from bt_tasksim.concept_nodes.grasp_firmness import SLANTED
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
-from bt_tasksim.concept_nodes.grasp_pose import grasp_pose, half_extent, resting_place
+from bt_tasksim.concept_nodes.grasp_pose import (
+    grasp_pose,
+    half_extent,
+    neutral_rotation,
+    on_object,
+    resting_place,
+)
 from bt_tasksim.concept_nodes.holding import HOLDING, tool_distance
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
+from bt_tasksim.concept_nodes.touching import touched
+from bt_tasksim.concept_nodes.view import WorldView, host_numbers, put_down, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
-from bt_tasksim.planning.reference_motion import Path, minimum_jerk_time, plan, sample
+from bt_tasksim.planning.arm import arm_of
+from bt_tasksim.planning.reference_motion import (
+    Path,
+    minimum_jerk_time,
+    plan,
+    posture,
+    sample,
+    searched_for,
+)
+from bt_tasksim.planning.route import Pace, Route
+from bt_tasksim.planning.routes import SAMPLES, in_postures, joints_along, with_routes
 from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.hand import standing_side, tips_in_tool
 
 NOT_SEEN = register_reason("not_seen", "{object} is not seen")
 TOO_WIDE = register_reason(
@@ -46,7 +72,7 @@ TIPPED_OVER = register_reason(
     "tipped_over", "{object} was tipped by {value}, more than {limit}", value=RADIANS, limit=RADIANS
 )
 GRASPING = Form(
-    "hand {closure} closed, {contact}, tool {distance} from {object}, {force} at the wrist",
+    "hand {closure} closed, {contact}, tool {distance} from {object}, {force} at the wrist{touch}",
     {"closure": SHARE, "distance": METRES, "force": NEWTONS},
 )
 SETTLED = 3
@@ -58,15 +84,78 @@ TIGHTENING = 0.2
 """The Panda's fingers press 1 N more in each control period. Measured with the middle of the action and a
 fixed number of control periods from opposing contacts on: the Ability hand holds 143 of 150 objects, and at
 its full speed 137 to 140, since what is light tilts in it; the Panda 187 and 186 of 200."""
-SLANTED = 0.01
-"""Metres by which the middle of an action is deeper for a horizontal approach than for one from above: where
-a slanted hand meets an object's edge first, its fingers are still before the object's middle."""
+FLATTEST = 0.3
+"""Cosine between an approach and straight down onto a support below which a wrong height is corrected less
+and less."""
 EMPTY = 0.97
 """Share of its grip beyond which a hand has nothing between its fingers."""
 PUSHED = 0.06
 """Metres by which a grasp may push the object, as it is seen."""
 TIPPED = math.radians(10.0)
-"""Radians by which a grasp may tip the object over, as it is seen."""
+"""Radians by which a grasp may tip the object over, as it is seen, before it holds it."""
+TURNED = math.radians(25.0)
+"""The same for an object that the hand holds by then: it does not fall, and is set upright where it is put
+down."""
+SEARCHING = 0.2
+"""Share of the largest action with which it then goes aside, 1 mm in a control period, as it goes back: any
+faster, the finger takes the object's rim with it and tips it over."""
+
+
+LAG = 0.1
+"""Seconds by which an arm is behind its targets: the damping of the shipped robots' drives over their
+stiffness."""
+SWAY = 0.012
+"""Metres by which it may be aside of them when the straight approach begins."""
+
+
+VARIED = 4
+"""Grasps that are tried in turn by a leaf that is begun again after it has failed; the usual one is the
+first."""
+AS_GIVEN = math.cos(math.radians(20.0))
+"""Cosine of the angle by which a grasp may differ from the approach or closing axis that its author gave."""
+
+
+FEELING = 0.05
+"""Speed in m/s at which a programmed grasp feels its way where it has little room: a finger that meets an
+edge at 0.18 m/s presses 78 N before it can be stopped."""
+
+
+class _Asked(NamedTuple):
+    """What the choice of a grasp begins with, in one world.
+
+    Attributes:
+        usual: Tool pose ``(7,)`` of the usual grasp.
+        way: Tool poses ``(7,)`` of the usual way to where its straight approach begins.
+        approach: Unit vector ``(3,)`` in which the hand usually comes.
+        neutral: The tool's orientation ``(4,)`` in which the arm is at ease there.
+        failed: How many grasps are to be passed over.
+    """
+
+    usual: Array
+    way: list[Array]
+    approach: Array
+    neutral: Array
+    failed: int
+
+
+class _Chosen(NamedTuple):
+    """The grasps of ``N`` worlds.
+
+    Attributes:
+        goal: Tool poses ``(N, 7)``.
+        standoff: Metres ``(N,)`` before them from which the hand comes straight on.
+        tight: Numbers ``(N,)``, 1 where the hand has little room there, see `Choice.tight`.
+        known: Numbers ``(N,)``, 1 for a grasp at a known grip, 0 for the usual one.
+        closure: How far ``(N,)`` the hand is closed as it comes.
+        routes: The motions that lead there, in the worlds where the usual way does not serve.
+    """
+
+    goal: Array
+    standoff: Array
+    tight: Array
+    known: Array
+    closure: Array
+    routes: dict[int, Sequence[Route]]
 
 
 class GraspMotion(NamedTuple):
@@ -78,6 +167,7 @@ class GraspMotion(NamedTuple):
         middle: Offsets that the middle of an action stands for from now on.
         target: Tool pose ``(N, 7)`` to command.
         closed: Closure to command.
+        posture: Joints ``(N, n_arm)`` of the arm to command, NaN where they may be any.
     """
 
     delay: Array
@@ -85,6 +175,7 @@ class GraspMotion(NamedTuple):
     middle: Array
     target: Array
     closed: Array
+    posture: Array | None
 
 
 @register("concept")
@@ -123,6 +214,8 @@ class Grasp(ConceptModel[GraspMemory]):
     force_limit: Newtons = FORCE_LIMIT
 
     reaches = (HOLDING,)
+    establishes = (ConditionOf("Holding", target="target"),)
+    requires = (ConditionOf("Clear", place="target"),)
     default_timeout = 12.0
     is_task_model = False
     contact = ContactChange(ContactState.NC, ContactState.FT, to="hand")
@@ -153,24 +246,37 @@ class Grasp(ConceptModel[GraspMemory]):
         if self.closing is not None:
             return (unseen,)
         width, opening = xp.min(seen.model(self.target).grasp_widths, axis=-1), seen.world.opening
+        if bool(xp.any(width > opening)):
+            narrowest = [narrowest_grip(view, self.target) for view in views(seen)]
+            width = xp.minimum(width, constant(np.array(narrowest), width))
         return unseen, TOO_WIDE.where(width > opening, object=self.target, width=width, opening=opening)
 
     def begin(self, seen: Seen) -> GraspMemory:
         """Choose the grasp pose and plan the way to it."""
-        goal = grasp_pose(seen, self.target, self.approach, self.closing)
+        stand = put_down(seen)  # nothing is in the hand
+        usual, found = grasp_pose(stand, self.target, self.approach, self.closing), views(stand)
+        goal, standoff, tight, known, closure, routes = self._chosen(stand, usual, found)
         approach = poses.z_axis(goal[:, 3:])
-        back = poses.shifted(goal, -self.standoff * approach)
+        estimate, xp = self._estimate(seen, goal, approach), array_namespace(goal)
+        # Going along a level approach brings the hand no nearer to the height of what stands on its support.
+        steep, scale = poses.clip(estimate[:, 3] / FLATTEST, 0.0, 1.0), grasp_features.SCALE[ALONG]
+        searched = constant(np.isin(np.arange(len(found)), list(routes)).astype(float), goal)
+        support = poses.clip(0.02 * steep * estimate[:, 4] / scale, -1.0, 1.0) * (1.0 - searched)
+        # The reference motion goes to where the object is seen, and an action's middle to where it stands.
+        goal = poses.shifted(goal, -(scale * support)[:, None] * approach)
+        back = poses.shifted(goal, -standoff[:, None] * approach)
         way = [*_way_out(seen, back), back, goal]
-        path = plan(way, self.speed, blend=0.03, acceleration=ACCELERATION)
-        estimate = self._estimate(seen, goal, approach)
-        xp = array_namespace(goal)
+        path = plan(way, self.speed, blend=0.03, acceleration=ACCELERATION, samples=SAMPLES)
+        path = with_routes(path, routes, len(seen.robot.arm_joints))
+        usual_ways = {k: view.arm for k, view in enumerate(found) if k not in routes}
+        path = in_postures(path, joints_along(path, arm_of(seen.robot), usual_ways))
         nothing = xp.zeros_like(path.duration)
         offset = nothing[:, None] * xp.ones((CLOSE + 1,), dtype=goal.dtype, device=goal.device)
-        deeper = SLANTED * xp.sqrt(poses.clip(1.0 - estimate[:, 3] ** 2, 0.0, 1.0))
-        along = poses.clip((0.02 * estimate[:, 4] + deeper) / grasp_features.SCALE[ALONG], -1.0, 1.0)
+        slanted = xp.sqrt(poses.clip(1.0 - estimate[:, 3] ** 2, 0.0, 1.0))
+        along = poses.clip(support + SLANTED * (1.0 - known) * slanted / scale, -1.0, 1.0)
         return GraspMemory(
             path=path,
-            begins=_approach_begins(path, self.standoff),
+            begins=_approach_begins(path, standoff),
             goal=goal,
             delay=nothing,
             middle=along[:, None] * grasp_features.axis(ALONG, goal),
@@ -180,27 +286,86 @@ class Grasp(ConceptModel[GraspMemory]):
             closed=nothing,
             closure=seen.closure,
             settled=xp.astype(nothing, xp.int64),
-            preshape=nothing,
+            preshape=closure,
+            tight=tight > 0.5,
             touched=xp.zeros_like(xp.astype(seen.contacts, goal.dtype)),
             first=nothing,
             estimate=estimate,
-            start=seen.object(self.target),
-            now=seen.object(self.target),
+            start=seen.observed(self.target),
+            now=seen.observed(self.target),
         )
 
+    def _chosen(self, seen: Seen, usual: Array, found: Sequence[WorldView]) -> _Chosen:
+        """The grasps, and motions where the usual way does not serve.
+
+        Raises:
+            NoWayError: No grasp serves in one of the worlds.
+        """
+        approach = poses.z_axis(usual[:, 3:])
+        back = poses.shifted(usual, -self.standoff * approach)
+        neutral = neutral_rotation(seen, approach, usual[:, :3])
+        arrays = [usual, back, approach, neutral, *_way_out(seen, back)]
+        goals, backs, comes, eases, *ways = host_numbers(arrays)
+        routes: dict[int, Sequence[Route]] = {}
+        standoffs, tight, known, closure = np.empty((4, len(goals)))
+        for k, view in enumerate(found):
+            failed = 0 if seen.failures is None else int(seen.failures[k])
+            asked = _Asked(
+                goals[k], [*(way[k] for way in ways), backs[k]], comes[k], eases[k], failed % VARIED
+            )
+            choice = self._choice(view, asked, seen.later)
+            goals[k], standoffs[k] = choice.goal, choice.standoff
+            tight[k], known[k], closure[k] = choice.tight, not choice.usual, choice.closure
+            if choice.routes:
+                routes[k] = choice.routes
+            elif _sways(way := [*(way[k] for way in ways), backs[k]], goals[k], self.speed):
+                routes[k] = [_at_rest(way, self.speed), _at_rest([backs[k], goals[k]], self.speed, GENTLE)]
+        goal, standoff = constant(goals, usual), constant(standoffs, usual)
+        room, known, closed = (constant(values, usual) for values in (tight, known, closure))
+        return _Chosen(goal, standoff, room, known, closed, routes)
+
+    def _choice(self, view: WorldView, asked: _Asked, later: Sequence[Any]) -> Choice:
+        """The grasp in one world, see `_chosen`."""
+
+        def find(room: tuple[float, bool]) -> Choice:
+            closer, firmly = room
+            pace = Pace(self.speed)
+            chooser = Chooser(view, self.target, self.standoff, pace, later, closer, firmly)
+            usual = chooser.usual(asked.usual, asked.way)
+            if usual is not None and not asked.failed:
+                return usual
+            others = candidates(view, self.target, asked.approach, asked.neutral)
+            swings = firmly and standing_side(view.robot) is not None
+            others = others.keeping(~others.poor) if swings else others
+            return chooser.other(self._as_given(others, view), asked.failed, usual)
+
+        return with_room(rooms(view.robot), find)
+
+    def _as_given(self, others: Candidates, view: WorldView) -> Candidates:
+        """Those that have the approach and the closing axis that the author gave, if any."""
+        given = np.ones(len(others.tools), bool)
+        if self.approach is not None:
+            given &= poses.z_axis(others.tools[:, 3:]) @ np.array(self.approach) >= AS_GIVEN
+        if self.closing is not None:
+            axis = poses.rotate(view.objects[self.target][3:], np.array(self.closing))
+            across = poses.rotate(others.tools[:, 3:], np.array([0.0, 1.0, 0.0]))
+            given &= abs(across @ axis) >= AS_GIVEN
+        return others.keeping(given)
+
     def _estimate(self, seen: Seen, goal: Array, approach: Array) -> Array:
-        pose, stands = seen.object(self.target), resting_place(seen, self.target)
+        pose, stands = seen.observed(self.target), resting_place(seen, self.target)
         xp, place = array_namespace(goal), stands.place
         beyond = poses.dot(pose[:, :3] - goal[:, :3], approach)
         up = poses.z_axis(place.pose[:, 3:])
         onto = -poses.dot(up, approach)
         above_goal, height = (poses.dot(p[:, :3] - place.pose[:, :3], up) for p in (goal, pose))
         standing = half_extent(pose, seen.model(self.target), up)
-        above = (height - standing) / poses.clip(onto, 0.3, math.inf)
+        above = (height - standing) / poses.clip(onto, FLATTEST, math.inf)
         nothing = xp.zeros_like(onto)
         known = xp.stack([above_goal / 0.05, height / 0.05, beyond / 0.05, onto, above / 0.02], axis=-1)
         unknown = xp.stack([nothing, nothing, beyond / 0.05, nothing + 1.0, nothing], axis=-1)
-        return xp.where(stands.found[:, None], known, unknown)
+        known_support = stands.found & ~on_object(seen, self.target)
+        return xp.where(known_support[:, None], known, unknown)
 
     @classmethod
     def layout(cls, robot: RobotDescription) -> dict[str, int]:
@@ -242,7 +407,7 @@ class Grasp(ConceptModel[GraspMemory]):
         go_on = memory.closing + seen.world.control_period
         begins = xp.where(arrived, xp.zeros_like(go_on), memory.closing)
         return memory._replace(
-            now=seen.object(self.target),
+            now=seen.observed(self.target),
             delay=motion.delay,
             offset=motion.offset,
             middle=motion.middle,
@@ -263,8 +428,9 @@ class Grasp(ConceptModel[GraspMemory]):
         offset = grasp_features.moved_offset(action, met, seen, memory)
         middle = grasp_features.found_middle(offset, met, memory)
         target = grasp_features.displaced(sample(memory.path, seen.elapsed - delay), offset)
+        arm = posture(memory.path, seen.elapsed - delay)
         closed = grasp_features.closed(scaling, self._asked(offset), self.tightening, seen, memory)
-        return GraspMotion(delay, offset, middle, target, closed)
+        return GraspMotion(delay, offset, middle, target, closed, arm)
 
     def _asked(self, offset: Array) -> Array:
         """The closure ``(N,)`` that offsets ``(N, 5)`` ask for in the end."""
@@ -274,26 +440,49 @@ class Grasp(ConceptModel[GraspMemory]):
         """The middle of an action, at the reference motion's own speed.
 
         So it has what a learned grasp begins with: an object stands on its support, and where the estimate
-        says otherwise, the support is right (`GraspMemory.middle`).
+        says otherwise, the support is right (`GraspMemory.middle`). Where the fingers have little room beside
+        the object it comes no faster than `FEELING`, and a finger that stands on something goes outwards.
         """
         xp = array_namespace(memory.middle)
         still = xp.zeros_like(memory.middle)
-        return xp.concat([still, xp.full_like(still[..., :1], HASTE)], axis=-1)
+        usual = xp.concat([still, xp.full_like(still[..., :1], HASTE)], axis=-1)
+        if not bool(xp.any(memory.tight)):
+            return usual
+        return xp.where(memory.tight[:, None], self._feeling(seen, memory), usual)
+
+    def _feeling(self, seen: Seen, memory: GraspMemory) -> Array:
+        """Actions ``(N, 6)`` of a hand that feels its way, see `programmed_motion`."""
+        xp = array_namespace(memory.middle)
+        touching = xp.astype(seen.contacts, memory.middle.dtype)
+        outwards = poses.clip(xp.sum(touching * constant(_sides(seen.robot), touching), axis=-1), -1.0, 1.0)
+        now, period = seen.elapsed - memory.delay, seen.world.control_period
+        ahead = sample(memory.path, now + period)[:, :3] - sample(memory.path, now)[:, :3]
+        share = poses.clip(FEELING * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), CAREFUL, 1.0)
+        pace = xp.where(xp.any(seen.contacts, axis=-1), xp.zeros_like(share), (share - CAREFUL) / EAGER)
+        aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)
+        return xp.concat([aside, pace[:, None]], axis=-1)
 
     def done(self, seen: Seen, memory: GraspMemory) -> Array:
         """Opposing contacts and a still hand, some ticks long, that presses as hard as it is to."""
-        return (memory.settled >= SETTLED) & (memory.closed >= self._asked(memory.offset))
+        between = seen.closure <= EMPTY * self.grip
+        return (memory.settled >= SETTLED) & (memory.closed >= self._asked(memory.offset)) & between
+
+    def planned(self, memory: GraspMemory) -> Array | float:
+        """How long the way takes, where it was searched for."""
+        return searched_for(memory.path)
 
     def limits(self, seen: Seen, memory: GraspMemory) -> tuple[Limit, ...]:
         """The hand has closed on nothing, presses too hard, or has pushed the object away or over."""
-        now, names = seen.object(self.target), {"object": self.target}
+        now, names = seen.observed(self.target), {"object": self.target}
         pushed = poses.norm(now[:, :3] - memory.start[:, :3])
         tipped = poses.tilt(now[:, 3:], memory.start[:, 3:])
+        xp, held = array_namespace(tipped), seen.opposed()
+        most = xp.where(held, xp.full_like(tipped, TURNED), xp.full_like(tipped, TIPPED))
         return (
             Limit(CLOSED_ON_NOTHING, seen.closure, EMPTY * self.grip, counts=memory.closing > 0.8),
             strain(seen, self.force_limit),
             Limit(PUSHED_AWAY, pushed, PUSHED, names),
-            Limit(TIPPED_OVER, tipped, TIPPED, names),
+            Limit(TIPPED_OVER, tipped, most, names),
         )
 
     def necessary_cost(self, seen: Seen, memory: GraspMemory) -> Array:
@@ -304,7 +493,7 @@ class Grasp(ConceptModel[GraspMemory]):
         """
         gap = poses.norm(seen.observation.tips - seen.observation.contact_points)
         xp = array_namespace(gap)
-        pushed = poses.norm(seen.object(self.target)[:, :3] - memory.start[:, :3])
+        pushed = poses.norm(seen.observed(self.target)[:, :3] - memory.start[:, :3])
         apart = 0.3 * xp.astype(~seen.opposed(), gap.dtype)
         return poses.mean(gap) / 0.1 + apart + pushed / 0.05
 
@@ -325,20 +514,59 @@ class Grasp(ConceptModel[GraspMemory]):
             distance=tool_distance(seen, self.target),
             object=self.target,
             force=force_at_wrist(seen),
+            touch=touched(seen, self.target),
         )
 
 
+def _sides(robot: RobotDescription) -> Array:
+    """On which side ``(n_tips,)`` along the closing axis each fingertip of the open hand is, -1 or 1."""
+    found: Array = robot.derived("sides", lambda robot: np.sign(tips_in_tool(robot, robot.hand_open)[:, 1]))
+    return found
+
+
 def _commanded(motion: GraspMotion) -> Command:
-    return Command(tool=motion.target, hand=motion.closed[:, None])
+    return Command(tool=motion.target, hand=motion.closed[:, None], posture=motion.posture)
 
 
-def _approach_begins(path: Path, standoff: float) -> Array:
-    """Seconds ``(N,)`` after which no more than ``standoff`` metres are left of a path."""
+def _approach_begins(path: Path, standoff: Array) -> Array:
+    """Seconds ``(N,)`` after which no more than ``standoff (N,)`` metres are left of a path."""
     xp, n = array_namespace(path.table), path.table.shape[1]
     left = poses.norm(path.table[:, :, :3] - path.table[:, -1:, :3])
     numbers = xp.astype(xp.arange(1, n + 1, device=left.device), left.dtype)
-    fraction = xp.max(xp.astype(left > standoff, left.dtype) * numbers, axis=-1) / (n - 1)
-    return minimum_jerk_time(fraction) * path.duration
+    fraction = xp.max(xp.astype(left > standoff[:, None], left.dtype) * numbers, axis=-1) / (n - 1)
+    share = minimum_jerk_time(fraction)
+    return (share if path.even is None else xp.where(path.even, fraction, share)) * path.duration
+
+
+def _sways(way: Sequence[Array], goal: Array, speed: float) -> bool:
+    """Whether a hand that does not stop before the straight approach would still sway aside on it.
+
+    An arm lags behind its targets by `LAG`; what it lags aside by at the corner it has to make up for while
+    it goes down beside the object.
+
+    Args:
+        way: Tool poses ``(7,)`` to where the approach begins.
+        goal: The grasp ``(7,)``.
+        speed: Peak speed of the tool, m/s.
+    """
+    corner, approach = way[-1], poses.z_axis(goal[3:])
+    before = next((p for p in reversed(way[:-1]) if np.linalg.norm(p[:3] - corner[:3]) > 1e-3), None)
+    if before is None:
+        return False
+    along = (corner[:3] - before[:3]) / np.linalg.norm(corner[:3] - before[:3])
+    aside = float(np.linalg.norm(along - approach * float(along @ approach)))
+    points = np.array([p[:3] for p in (*way, goal)])
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=-1)
+    done = np.array(1.0 - lengths[-1] / max(float(lengths.sum()), 1e-9))
+    fraction = float(minimum_jerk_time(done[None])[0])
+    there = 16.0 * fraction**2 * (1.0 - fraction) ** 2 * speed
+    return there * aside * LAG > SWAY
+
+
+def _at_rest(way: Sequence[Array], speed: float, acceleration: float = ACCELERATION) -> Route:
+    """A motion of the tool through poses ``(7,)``, from rest to rest, in whatever posture."""
+    path = plan([p[None] for p in way], speed, blend=0.03, acceleration=acceleration, samples=SAMPLES)
+    return Route(path.table[0], np.full((SAMPLES, 0), np.nan), float(path.duration[0]))
 
 
 def _way_out(seen: Seen, goal: Array) -> list[Array]:

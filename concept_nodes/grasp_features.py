@@ -11,6 +11,7 @@ from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.hand import standing_side
 
 SIDE, ACROSS, ALONG, TURN, CLOSE, TIME_SCALING = range(6)
 ACTIONS = (
@@ -45,6 +46,10 @@ BACK_RATE = 0.001
 """The same, metres, for the way back against the approach: a finger that stands on an edge is wedged, and
 springing free it hits harder than it stood. Measured: of 13 hands that met an edge, 3 exceeded 60 N when they
 went back 1 mm in a control period, and 5 or 6 with 2 and 3 mm."""
+PUSHING = 0.4
+"""Share of its speed at which a hand closes one finger of which stands still: the other one pushes what it
+meets up to that one, and at its full speed of 0.15 m/s a jaw of the SO-100 strains the wrist with 60 to 120 N
+then."""
 PERIOD = 0.05
 """Seconds that `RATE` refers to."""
 
@@ -138,7 +143,8 @@ def moved_offset(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Ar
     They grow with the square of the action: around its middle a hand that should go straight does, to within
     a fraction of a millimetre, and is not led astray by exploration either. While a finger stands on
     something the hand goes back, towards `WITHDRAWS`. While it searches, the action across the fingers says
-    how fast it goes aside, and what it has gone stays (`found_middle`).
+    how fast it goes aside, and what it has gone stays (`found_middle`). A way that was searched for is left
+    by nothing before the straight approach.
     """
     share = seen.world.control_period / PERIOD
     asked = poses.clip(action[:, :TIME_SCALING], -1.0, 1.0)
@@ -147,6 +153,9 @@ def moved_offset(action: Array, met: Met, seen: Seen, memory: GraspMemory) -> Ar
     gap = (asked * abs(asked) + memory.middle) * constant(SCALE, like) - memory.offset
     gap = gap - xp.astype(met.stands, gap.dtype)[:, None] * (WITHDRAWS * axis(ALONG, gap))
     gap = xp.where(met.searches[:, None] & (axis(ACROSS, gap) > 0.0), asked * rate, gap)
+    if memory.path.even is not None:
+        coming = memory.path.even & (seen.elapsed - memory.delay < memory.begins)
+        gap = xp.where(coming[:, None], xp.zeros_like(gap), gap)
     return memory.offset + poses.clip(gap, -back_rate, rate)
 
 
@@ -181,12 +190,16 @@ def closed(scaling: Array, asked: Array, tightening: float, seen: Seen, memory: 
 
     At a time scaling below 1 the fingers come as much slower than the hand can, and from contact of
     opposing ones on the hand tightens at ``tightening`` of its speed: force grows bit by bit until the
-    grasp is done.
+    grasp is done. One finger that comes alone never comes faster than `PUSHING`.
     """
     xp = array_namespace(memory.closed)
     share = xp.where(seen.opposed(), xp.zeros_like(scaling) + tightening, scaling)
+    slow = (scaling < 1.0) & (share < 1.0)
+    if standing_side(seen.robot) is not None:
+        usual = xp.where(slow, share, xp.ones_like(share))
+        share, slow = xp.minimum(usual, xp.full_like(share, PUSHING)), slow | (scaling > 0.0)
     step = share * (seen.robot.hand_speed * seen.world.control_period)
-    reached = xp.where((scaling < 1.0) & (share < 1.0), xp.minimum(asked, memory.closed + step), asked)
+    reached = xp.where(slow, xp.minimum(asked, memory.closed + step), asked)
     return xp.where(memory.closing >= 0.0, reached, memory.preshape)
 
 

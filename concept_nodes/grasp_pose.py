@@ -10,8 +10,14 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core import poses
 from bt_tasksim.core.fact_arrays import ObjectFacts, PlaceFacts, take_rows
 from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.robot.kinematics.hand import depth_at, standing_side
 
 DOWN = (0.0, 0.0, -1.0)
+UNSUPPORTED = 0.006
+"""Metres less deep that a hand reaches to what stands on no known place, whose height is an estimate
+alone."""
+ON_TOP = 0.02
+"""Metres between the bottom of an object and the top of another one within which it stands on that."""
 _SAME = 1e-9
 """Cost by which a candidate has to be better than one before it."""
 _WORST = 1e9
@@ -35,6 +41,21 @@ def resting_place(seen: Seen, target: str) -> FoundPlace:
     local = _in_places(seen, target)
     gap = abs(local[..., 2] - half[:, None])
     return nearest_place(seen, _above(seen, local, 0.02) & (gap < 0.05), gap)
+
+
+def on_object(seen: Seen, target: str) -> Array:
+    """Boolean ``(N,)``: an object seems to stand on another one, whose top is nearer than any place below."""
+    pose, model, facts = seen.object(target), seen.model(target), seen.world.object_facts
+    xp = array_namespace(pose)
+    others = seen.objects
+    bottom = pose[:, 2] - model.extent[:, 2] / 2
+    tops = others[..., 2] + facts.extent[..., 2] / 2
+    aside = poses.norm(others[..., :2] - pose[:, None, :2])
+    over = aside < xp.max(facts.extent[..., :2], axis=-1) / 2
+    near = xp.abs(bottom[:, None] - tops) < ON_TOP
+    higher = others[..., 2] < pose[:, None, 2] - ON_TOP  # not itself, and nothing beside it
+    found = over & near & higher & facts.present
+    return xp.any(found, axis=-1)
 
 
 def place_below(seen: Seen, target: str, highest: float = 0.4) -> FoundPlace:
@@ -100,8 +121,27 @@ def grasp_pose(
     cost = poses.angle_between(neutral[:, None, :], rotations) + 0.3 * xp.repeat(rank, 2, axis=1)
     best = _first_best(xp.where(xp.repeat(counts, 2, axis=1), cost, xp.full_like(cost, _WORST)), _SAME)
     reach = half_extent(pose, model, a)
-    position = pose[:, :3] - poses.clip(reach - seen.robot.depth, 0.0, math.inf)[:, None] * a
-    return xp.concat([position, take_rows(rotations, best)], axis=-1)
+    stands = resting_place(seen, target).found & ~on_object(seen, target)
+    less = xp.where(stands, xp.zeros_like(reach), xp.full_like(reach, UNSUPPORTED))
+    rotation = take_rows(rotations, best)
+    y = poses.rotate(rotation, constant([0.0, 1.0, 0.0], pose))
+    half = half_extent(pose, model, y)
+    depth = depth_at(seen.robot, 2.0 * half)
+    position = pose[:, :3] - poses.clip(reach - (depth - less), 0.0, math.inf)[:, None] * a
+    side = standing_side(seen.robot)
+    if side is not None:
+        position = position - beside_standing(side, half)[:, None] * y
+    return xp.concat([position, rotation], axis=-1)
+
+
+def beside_standing(side: float, half_width: Array) -> Array:
+    """How far ``(N,)`` along the tool's y axis the middle of an object belongs, metres.
+
+    Args:
+        side: Where its face belongs, see `standing_side`.
+        half_width: Half of its width ``(N,)``.
+    """
+    return side - math.copysign(1.0, side) * half_width
 
 
 def _approach(seen: Seen, target: str, given: tuple[float, float, float] | None) -> Array:

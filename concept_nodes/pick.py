@@ -5,18 +5,29 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.demonstrated import rounded, snapped, straight_words
 from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
-from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
+from bt_tasksim.concept_nodes.carry import Carry, MoveMemory, straight_path
+from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING, VERY_CLOSE
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
-from bt_tasksim.planning.reference_motion import plan
+
+ROOMS = (CLOSER, VERY_CLOSE, TOUCHING)
+"""How much closer than usual one may come to things, tried one after the other."""
+SHARES = (1.0, 0.7, 0.5, 0.3, 0.2)
+"""Shares of the distance that are tried where not all of it is clear."""
 
 
 @register("concept")
@@ -40,6 +51,7 @@ class Pick(Carry):
     force_limit: Newtons = FORCE_LIMIT
     squeeze: Newtons | None = None
 
+    establishes = (ConditionOf("Lifted", target="target", height="distance"),)
     contact = ContactChange(ContactState.PC, ContactState.NC)
     presentation = Presentation(
         colour="#2f8f6b",
@@ -65,9 +77,37 @@ class Pick(Carry):
         }
 
     def begin(self, seen: Seen) -> MoveMemory:
-        """A straight path."""
-        goal = poses.shifted(seen.tool, self.distance * poses.constant(self.direction, seen.tool))
-        return MoveMemory(plan([seen.tool, goal], self.speed, samples=2))
+        """A straight path, as far as it is clear.
+
+        Raises:
+            NoWayError: Something is in the way at once in one of the worlds.
+        """
+        found = [self._clear(view) for view in views(seen)]
+        far = constant(np.array([share for share, _ in found]), seen.tool)
+        goal = poses.shifted(seen.tool, far[:, None] * constant(self.direction, seen.tool))
+        return MoveMemory(straight_path(seen, goal, self.speed, [joints for _, joints in found]))
+
+    def aim(self, view: WorldView) -> Aim | None:
+        """Above where it stands, as far as it is lifted, or as far as will do."""
+        now = view.objects[self.target]
+        up = np.array(self.direction)
+        lifted = np.array([poses.shifted(now, share * self.distance * up) for share in (1.0, 0.5, 0.2)])
+        return Aim(lifted, "be lifted", on_the_way=True)
+
+    def _clear(self, view: WorldView) -> tuple[float, Array]:
+        """How far the way is clear in metres, and the joints ``(n, n_arm)`` along it."""
+        for closer in ROOMS:
+            finder = view.finder([self.target], held=view.held(self.target), closer=closer)
+            for share in SHARES:
+                end = poses.shifted(view.tool, share * self.distance * np.array(self.direction))
+                joints = finder.straight([view.tool, end], leans=finder.leanings[-1])
+                if joints is not None:
+                    return share * self.distance, np.concatenate([finder.start[None], joints])
+        touches = finder.touched(end)
+        why = f"{touches[0][0]} would touch {touches[0][1]}" if touches else "the arm cannot follow"
+        raise NoWayError(
+            f"{self.target} cannot be lifted by {1000 * SHARES[-1] * self.distance:.0f} mm: {why}"
+        )
 
     def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
         """As in `Carry`; or the hand's force on the object over ``squeeze``, where that is larger."""

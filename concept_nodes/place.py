@@ -2,34 +2,107 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.demonstrated import position_words, straight_words
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
-from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
+from bt_tasksim.concept.parameters import (
+    Direction,
+    Flag,
+    Metres,
+    MetresPerSecond,
+    Newtons,
+    ObjectName,
+    PlaceName,
+)
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
+from bt_tasksim.concept_nodes.closer import DROPPED, PUT_DOWN, TOUCHING, with_room
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
+from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
+from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of
+from bt_tasksim.concept_nodes.surface import (
+    NEAR,
+    apart,
+    beyond_edges,
+    edges,
+    level_of,
+    straight_down,
+)
+from bt_tasksim.concept_nodes.touching import touched
+from bt_tasksim.concept_nodes.view import WorldView, host_numbers, views
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import Form, Possible, Statement
+from bt_tasksim.core.errors import InputError, NoWayError
+from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.units import METRES, NEWTONS
+from bt_tasksim.core.units import METRES, NEWTONS, RADIANS
 from bt_tasksim.core.world import Command
-from bt_tasksim.planning.reference_motion import Path, plan, sample
+from bt_tasksim.planning.arm import FULL, LEANS, SET_DOWN
+from bt_tasksim.planning.reference_motion import Path, plan, posture, sample, searched_for
+from bt_tasksim.planning.route import Pace, Route, followed
+from bt_tasksim.planning.routes import SAMPLES, with_routes
+from bt_tasksim.planning.things import Leave
 
-FELT_AND_MISSED = Form(
-    "{felt:.1f} felt, {object} {distance} from its spot", {"felt": NEWTONS, "distance": METRES}
+NOT_ABOVE = register_reason("not_above", "{object} is {aside} beyond the edge of {place}", aside=METRES)
+NOT_BESIDE = register_reason(
+    "not_beside", "{object} is {gap} from {other}, more than {limit}", gap=METRES, limit=METRES
 )
+FELT_AND_MISSED = Form(
+    "{felt:.1f} felt, {object} {distance} from its spot{touch}", {"felt": NEWTONS, "distance": METRES}
+)
+LEANS_ON = register_reason(
+    "leans",
+    "{object} leans by {value} on what it was put down on, more than {limit}",
+    value=RADIANS,
+    limit=RADIANS,
+)
+NOT_THERE = register_reason(
+    "not_there",
+    "{object} is {value:.3g} from where it should stand, more than {limit:.3g}",
+    value=METRES,
+    limit=METRES,
+)
+MISSED, LATE = 0.03, 1.0
+"""Metres from where it should stand at which an object was not put down there; and seconds after the way's
+end until which it may still come there."""
+AROUND = 0.2
+"""Peak speed of the tool where it cannot come straight down, m/s."""
+LEANING = math.radians(10.0)
+"""Lean against its support with which an object does not stand on it: it lies on something else, too. An arm
+of few joints may lean it by `SET_DOWN` more, and it stands up when it is let go."""
+ACCELERATION = 0.5
+"""Peak acceleration of the tool on its way down, m/s^2."""
+EARLY, UNEXPECTED = 0.03, 5
+"""Metres above where the object should stand from which on its support has to be felt for so many times as
+long: a hand that has just come to rest shakes, and so does what it holds."""
+ROOMS = ((PUT_DOWN, 0.0), (TOUCHING, 0.0), (TOUCHING, DROPPED))
+"""What is tried one after the other: how much closer than usual one may come to things, and metres above its
+support where the way may end."""
+SLOWLY, GENTLY = 0.02, 0.4
+"""Metres above where the object should stand below which it goes slower, and the least share of the path's
+speed: what meets its support at 80 mm/s in the hand of a stiff arm strains the wrist with 60 to 80 N."""
+FIRM = 0.3
+"""Metres between the arm's base and its tool within which it goes slower still, in proportion: the same
+drives press harder there. The SO-100, 0.14 m from its base, meets a table at 24 mm/s with 71 N."""
 FELT = 2
 """Ticks in a row for which the support must be felt."""
+
+
+HARD = 5.0
+"""Times `press` from which a force counts as felt for `FELT` ticks at once: what hits its support bounces,
+and is felt no more a tick later."""
 
 
 class PlaceMemory(NamedTuple):
@@ -53,11 +126,14 @@ class Place(ConceptModel[PlaceMemory]):
     """Put a held object down on a place or on another object (makes contact: NC to PC).
 
     The object goes over the place's origin and down along ``direction``, slowly, and stops when the wrist
-    feels the support, or ``overshoot`` below where the support should be.
+    feels the support, or ``overshoot`` below where the support should be. With ``anywhere`` or ``beside`` it
+    goes straight down from where it is.
 
     Args:
         target: The held object.
         on: The place, or the object to put it on.
+        anywhere: Anywhere on the place will do.
+        beside: The object next to which it is put, on what that stands on; instead of ``on``.
         direction: Direction in which it is put down, robot base frame.
         distance: How far it is put down at most; by default to where the support should be.
         overshoot: How much deeper is tried.
@@ -67,7 +143,9 @@ class Place(ConceptModel[PlaceMemory]):
     """
 
     target: ObjectName
-    on: PlaceName
+    on: PlaceName | None = None
+    anywhere: Flag = False
+    beside: ObjectName | None = None
     direction: Direction = (0.0, 0.0, -1.0)
     distance: Metres | None = None
     overshoot: Metres = 0.006
@@ -76,6 +154,16 @@ class Place(ConceptModel[PlaceMemory]):
     force_limit: Newtons = FORCE_LIMIT
 
     maintains = (HOLDING,)
+    establishes = (
+        ConditionOf("AtPose", target="target", on="on", given={"anywhere": False}),
+        ConditionOf("StandsOn", target="target", place="on", given={"anywhere": True}),
+        ConditionOf("Beside", target="target", other="beside"),
+    )
+    requires = (
+        ConditionOf("Over", target="target", place="on", anywhere="anywhere"),
+        ConditionOf("OverBeside", target="target", other="beside"),
+        ConditionOf("Clear", place="on", target="target", anywhere="anywhere"),
+    )
     contact = ContactChange(ContactState.NC, ContactState.PC)
     presentation = Presentation(
         colour="#8a56a8",
@@ -89,6 +177,7 @@ class Place(ConceptModel[PlaceMemory]):
     def describe_task(cls, parameters: Mapping[str, Any]) -> str:
         """Onto what, and how far which way."""
         said = [f"onto {parameters['on']}"] if "on" in parameters else []
+        said += [f"beside {parameters['beside']}"] if "beside" in parameters else []
         if "position" in parameters:
             said.append(f"to {position_words(parameters['position'])}")
         return ", ".join([*said, *([straight_words(parameters)] if "distance" in parameters else [])])
@@ -108,43 +197,181 @@ class Place(ConceptModel[PlaceMemory]):
             )
         return {"target": given["target"], "on": given["on"]}
 
-    def initial_state(self, seen: Seen) -> Possible:
-        """The object must be in the hand."""
-        return not_held(seen, self.target)
+    def contradiction(self) -> str:
+        """One place, neither none nor two."""
+        if (self.on is None) == (self.beside is None):
+            return "give either 'on' or 'beside'"
+        return "'anywhere' goes with 'on', a place" if self.anywhere and self.on is None else ""
+
+    def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
+        """The object must be in the hand, and above where it is to be put."""
+        held = not_held(seen, self.target)
+        now = seen.object(self.target)
+        if self.on is None:
+            assert self.beside is not None
+            gap, _ = apart(seen, self.target, self.beside)
+            far = NOT_BESIDE.where(gap > NEAR, object=self.target, other=self.beside, gap=gap, limit=NEAR)
+            return held, far
+        if not self.anywhere:
+            return (held,)
+        aside = beyond_edges(destination(seen, self.on)[0], *edges(seen, self.on), now)
+        return held, NOT_ABOVE.where(aside > 0.0, object=self.target, place=self.on, aside=aside)
 
     def begin(self, seen: Seen) -> PlaceMemory:
-        """A straight path down to the place's origin."""
+        """A path down to the place's origin, or to what is right below.
+
+        Raises:
+            NoWayError: It is not clear in one of the worlds.
+        """
         xp, now = array_namespace(seen.tool), seen.object(self.target)
-        frame, _ = destination(seen, self.on)
         d = poses.constant(self.direction, now)
-        goal = poses.shifted(standing_pose(frame, now, seen.model(self.target)), self.overshoot * d)
+        goal = poses.shifted(self._standing(seen), self.overshoot * d)
         if self.distance is not None:
             along = poses.dot(goal[:, :3] - now[:, :3], d)
             beyond = xp.minimum(self.distance + self.overshoot - along, xp.zeros_like(along))
             goal = poses.shifted(goal, beyond[:, None] * d)
         tool_goal = poses.multiply(goal, poses.relative(now, seen.tool))
-        path = plan([seen.tool, tool_goal], self.speed, samples=2)
+        (goals,) = host_numbers([tool_goal])
+        routes = {k: [self._down(view, goals[k])] for k, view in enumerate(views(seen))}
+        path = plan([seen.tool, tool_goal], self.speed, samples=SAMPLES)
+        path = with_routes(path, routes, len(seen.robot.arm_joints))
         nothing = xp.zeros_like(path.duration)
         felt = xp.astype(nothing, xp.int64)
         return PlaceMemory(path, self._force(seen), felt, nothing - seen.world.control_period)
 
+    def _standing(self, seen: Seen) -> Array:
+        """Poses ``(N, 7)`` of the object where it should stand."""
+        now, model = seen.object(self.target), seen.model(self.target)
+        if self.on is None:
+            assert self.beside is not None
+            return straight_down(level_of(seen, self.beside), now, model)
+        frame, _ = destination(seen, self.on)
+        if self.anywhere:
+            return straight_down(frame, now, model, edges(seen, self.on))
+        return standing_pose(frame, now, model)
+
+    def _down(self, view: WorldView, goal: Array) -> Route:
+        """The way down to a tool pose ``(7,)``: straight where the arm can go straight, else as it can.
+
+        Raises:
+            NoWayError: There is none; says what would touch what.
+        """
+
+        def find(room: tuple[float, float, float]) -> Route:
+            closer, above, leans = room
+            end = goal - (self.overshoot + above) * self._along
+            return self._down_to(view, end, closer, None if above else goal, leans)
+
+        slanted = ROOMS if len(view.arm) < FULL else ()
+        return with_room(
+            [*((*room, LEANS) for room in ROOMS), *((*room, SET_DOWN) for room in slanted)], find
+        )
+
+    def _down_to(
+        self, view: WorldView, standing: Array, closer: float, deeper: Array | None, leans: float
+    ) -> Route:
+        """The way to a tool pose ``(7,)`` in which the object stands, and on to a deeper one, if any.
+
+        Args:
+            view: The world.
+            standing: The pose.
+            closer: How much closer than usual one may come to things.
+            deeper: A deeper one ``(7,)``.
+            leans: Radians by which an arm of few joints may turn its tool from them.
+        """
+        leave = Leave(held=self._supports(view))
+        finder = view.finder([self.target], held=view.held(self.target), leave=leave, closer=closer)
+        pace = Pace(self.speed, acceleration=ACCELERATION)
+        straight = finder.straight([view.tool, standing], spacing=0.02, leans=leans)
+        if straight is not None:
+            way = np.concatenate([finder.start[None], straight])
+        else:
+            pace = Pace(AROUND)
+            try:
+                way = finder.search(standing[None], pace, leans=leans).joints
+            except NoWayError:
+                touches = finder.touched(standing)
+                why = f"{touches[0][0]} would touch {touches[0][1]}" if touches else "the arm cannot follow"
+                raise NoWayError(f"no way straight down {self._where}: {why}") from None
+        end = None if deeper is None else finder.arm.along(way[-1], deeper[None], leans)
+        return followed(finder.arm, way if end is None else np.concatenate([way, end]), pace)
+
+    @property
+    def _along(self) -> Array:
+        return np.array([*self.direction, 0.0, 0.0, 0.0, 0.0])
+
+    @property
+    def _where(self) -> str:
+        return f"onto {self.on}" if self.on is not None else f"beside {self.beside}"
+
+    def _supports(self, view: WorldView) -> frozenset[str]:
+        """Names of what the object touches when it stands."""
+        if self.on is not None:
+            return supports_of(view, self.on)
+        assert self.beside is not None
+        return supports_beside(view, self.target, self.beside)
+
+    def aim(self, view: WorldView) -> Aim | None:
+        """Where it is put down."""
+        if self.on is not None and not self.anywhere:
+            options = standing_options(view, self.target, self.on)
+            options = nearest_first(options, view.objects[self.target][3:])
+            return Aim(options, f"be put down on {self.on}", supports_of(view, self.on))
+        if self.on is not None:
+            spots = spots_on(view, self.target, self.on)
+        else:
+            assert self.beside is not None
+            spots = spots_beside(view, self.target, self.beside)
+        return Aim(spots.poses[spots.few], f"be put down {self._where}", spots.supports)
+
     def command(self, action: Array, seen: Seen, memory: PlaceMemory) -> Command:
         """Follow the path, and stop on it as long as the support is felt; the hand keeps its grip."""
-        return Command(tool=sample(memory.path, self._progress(seen, memory)))
+        return self._commanded(memory, self._progress(seen, memory))
 
     def advance(self, action: Array, seen: Seen, memory: PlaceMemory) -> PlaceMemory:
         """Count the ticks at which the support is felt."""
+        return self._after(seen, memory, self._progress(seen, memory))
+
+    def carry_out(self, action: Array, seen: Seen, memory: PlaceMemory) -> tuple[Command, PlaceMemory]:
+        """Both, of the same progress."""
+        progress = self._progress(seen, memory)
+        return self._commanded(memory, progress), self._after(seen, memory, progress)
+
+    def _commanded(self, memory: PlaceMemory, progress: Array) -> Command:
+        return Command(tool=sample(memory.path, progress), posture=posture(memory.path, progress))
+
+    def _after(self, seen: Seen, memory: PlaceMemory, progress: Array) -> PlaceMemory:
         xp = array_namespace(seen.tool)
-        felt = xp.where(self._supported(seen, memory), memory.felt + 1, xp.zeros_like(memory.felt))
-        return memory._replace(felt=felt, progress=self._progress(seen, memory))
+        hard = self._force(seen) - memory.baseline > HARD * self.press
+        more = xp.where(hard, xp.full_like(memory.felt, FELT), xp.ones_like(memory.felt))
+        felt = xp.where(self._supported(seen, memory), memory.felt + more, xp.zeros_like(memory.felt))
+        return memory._replace(felt=felt, progress=progress)
+
+    def planned(self, memory: PlaceMemory) -> Array | float:
+        """How long the way takes, where it was searched for."""
+        return searched_for(memory.path)
 
     def limits(self, seen: Seen, memory: PlaceMemory) -> tuple[Limit, ...]:
-        """The force at the wrist."""
-        return (strain(seen, self.force_limit),)
+        """The force at the wrist; and in the end the object should be there, unless a distance was given."""
+        if self.distance is not None:
+            return (strain(seen, self.force_limit),)
+        now, standing = seen.object(self.target), self._standing(seen)
+        missed, leans = poses.norm(now[:, :3] - standing[:, :3]), poses.tilt(now[:, 3:], standing[:, 3:])
+        names = {"object": self.target}
+        most = LEANING + (SET_DOWN if len(seen.robot.arm_joints) < FULL else 0.0)
+        ended = (memory.felt >= self._surely(seen)) | (memory.progress >= memory.path.duration + LATE)
+        return (
+            strain(seen, self.force_limit),
+            Limit(NOT_THERE, missed, MISSED, names, counts=ended),
+            Limit(LEANS_ON, leans, most, names, counts=ended),
+        )
 
     def done(self, seen: Seen, memory: PlaceMemory) -> Array:
-        """The support is felt, or the object is where it should stand."""
-        return (memory.felt >= FELT) | (memory.progress >= memory.path.duration + 0.2)
+        """The support is felt, or the object is where it should stand, or as far down as it should go."""
+        ended = memory.progress >= memory.path.duration + 0.2
+        if self.distance is None:
+            ended = ended & (self.necessary_cost(seen, memory) <= MISSED)
+        return (memory.felt >= self._surely(seen)) | ended
 
     def maintained(self, goal: str, seen: Seen, memory: PlaceMemory) -> Array:
         """The object is still in the hand."""
@@ -152,9 +379,7 @@ class Place(ConceptModel[PlaceMemory]):
 
     def necessary_cost(self, seen: Seen, memory: PlaceMemory) -> Array:
         """Distance of the object from where it should stand, metres."""
-        frame, _ = destination(seen, self.on)
-        now = seen.object(self.target)
-        return poses.norm(now[:, :3] - standing_pose(frame, now, seen.model(self.target))[:, :3])
+        return poses.norm(seen.object(self.target)[:, :3] - self._standing(seen)[:, :3])
 
     def sufficient_cost(self, known: Known, memory: PlaceMemory) -> Array:
         """1 unless the object touches its support."""
@@ -167,6 +392,7 @@ class Place(ConceptModel[PlaceMemory]):
             felt=self._force(seen) - memory.baseline,
             object=self.target,
             distance=self.necessary_cost(seen, memory),
+            touch=touched(seen, self.target),
         )
 
     def _force(self, seen: Seen) -> Array:
@@ -176,8 +402,22 @@ class Place(ConceptModel[PlaceMemory]):
 
     def _progress(self, seen: Seen, memory: PlaceMemory) -> Array:
         xp = array_namespace(seen.tool)
-        on = memory.progress + seen.world.control_period
+        gently = GENTLY * poses.clip(poses.norm(seen.tool[:, :2]) / FIRM, 0.0, 1.0)
+        pace = xp.minimum(xp.maximum(self._above(seen) / SLOWLY, gently), xp.ones_like(gently))
+        on = memory.progress + seen.world.control_period * pace
         return xp.where(self._supported(seen, memory), memory.progress, on)
 
     def _supported(self, seen: Seen, memory: PlaceMemory) -> Array:
         return (self._force(seen) - memory.baseline > self.press) & (seen.elapsed > 0.25)
+
+    def _above(self, seen: Seen) -> Array:
+        """How far ``(N,)`` the object is above where it should stand, metres."""
+        now, d = seen.object(self.target), poses.constant(self.direction, seen.tool)
+        return poses.dot(self._standing(seen)[:, :3] - now[:, :3], d)
+
+    def _surely(self, seen: Seen) -> Array:
+        """Ticks ``(N,)`` in a row for which the support must be felt here."""
+        above = self._above(seen)
+        xp = array_namespace(above)
+        usual = xp.full(above.shape, FELT, dtype=xp.int64, device=above.device)
+        return xp.where(above > EARLY, usual * UNEXPECTED, usual)

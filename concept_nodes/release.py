@@ -6,26 +6,63 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Seconds
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes.carry import straight_path
+from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING
 from bt_tasksim.concept_nodes.holding import HOLDING
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
+from bt_tasksim.concept_nodes.touching import touched
+from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
-from bt_tasksim.core.outcomes import Form, Statement
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.outcomes import Form, Statement, register_reason
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.units import COUNT, NEWTONS, SHARE
+from bt_tasksim.core.units import COUNT, METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
-from bt_tasksim.planning.reference_motion import Path, plan, sample
+from bt_tasksim.planning.reference_motion import Path, posture, sample
+from bt_tasksim.planning.things import Leave
+from bt_tasksim.planning.ways import WayFinder
+from bt_tasksim.robot.kinematics.hand import SLIDE, SPARE, opened_about, standing_side, wide_at
 
 OPENED = Form(
-    "hand {opening} open, {contacts} fingertips in contact, {force} at the wrist",
+    "hand {opening} open, {contacts} fingertips in contact, {force} at the wrist{touch}",
     {"opening": SHARE, "contacts": COUNT, "force": NEWTONS},
 )
+
+
+FELL_OVER = register_reason(
+    "fell_over",
+    "{object} fell over: it is tilted by {value}, more than {limit}",
+    value=RADIANS,
+    limit=RADIANS,
+)
+FELL_BESIDE = register_reason(
+    "fell_beside",
+    "{object} lies {value} beside or above {place}, more than {limit}",
+    value=METRES,
+    limit=METRES,
+)
+FALLEN = math.radians(40.0)
+"""Radians of tilt from which on something that was let go has fallen over."""
+STANDS = 0.01
+"""Metres above a container's floor within which something stands on it, as goals have it."""
+FALLING = 0.6
+"""Seconds after the hand has drawn back within which something has fallen."""
+OPEN = 0.15
+"""Closure, beyond that to which it opens, below which a hand is open; at most a quarter of its way."""
+UP = np.array([0.0, 0.0, 1.0])
+SPARES = (0.006, 0.010, 0.014, 0.018, SPARE)
+"""Metres by which a jaw that swings opens wider than what it lets go of, the last where there is room."""
+SHARES = (1.0, 0.75, 0.5, 0.25)
+"""Shares of the retreat that are tried where not all of it is clear."""
 
 
 class ReleaseMemory(NamedTuple):
@@ -34,12 +71,30 @@ class ReleaseMemory(NamedTuple):
     Attributes:
         path: Tool path away from the object.
         start: Closure ``(N,)`` at the begin.
+        end: Closure ``(N,)`` to which it opens.
         opened: Seconds ``(N,)`` since the hand was seen open; negative before.
+        start_pose: Estimated pose ``(N, 7)`` of the object at the begin.
     """
 
     path: Path
     start: Array
+    end: Array
     opened: Array
+    start_pose: Array
+
+
+class _Back(NamedTuple):
+    """How a hand draws back.
+
+    Attributes:
+        away: Displacement ``(3,)`` in all, metres.
+        joints: Joints ``(n, n_arm)`` along the way; none where it stays.
+        aside: The same for what comes first: a finger that stands still goes away from what it touches.
+    """
+
+    away: Array
+    joints: Array
+    aside: Array
 
 
 @register("concept")
@@ -48,7 +103,7 @@ class Release(ConceptModel[ReleaseMemory]):
 
     Args:
         target: The held object.
-        into: Where it falls, when it is let go above a container; for the record.
+        into: Where it falls, when it is let go above a container; it has to be seen there, if it is seen.
         retreat: How far the tool draws back, against its approach.
         opening: Time in which the hand opens.
         speed: Peak speed of the tool.
@@ -63,6 +118,8 @@ class Release(ConceptModel[ReleaseMemory]):
     force_limit: Newtons = FORCE_LIMIT
 
     ends = (HOLDING,)
+    establishes = (ConditionOf("Inside", target="target", place="into"), ConditionOf("HandEmpty"))
+    requires = (ConditionOf("Over", target="target", place="into"),)
     contact = ContactChange(ContactState.FT, ContactState.NC, to="hand")
     presentation = Presentation(
         colour="#c0504d",
@@ -78,34 +135,85 @@ class Release(ConceptModel[ReleaseMemory]):
         return f"into {parameters['into']}" if "into" in parameters else ""
 
     def begin(self, seen: Seen) -> ReleaseMemory:
-        """A straight path back."""
-        back = poses.shifted(seen.tool, -self.retreat * poses.z_axis(seen.tool[:, 3:]))
-        path = plan([seen.tool, back], self.speed, samples=2)
-        return ReleaseMemory(path, seen.closure, -array_namespace(seen.tool).ones_like(path.duration))
+        """A straight path back in the arm's own posture, as far as it is clear; or up, where none is."""
+        worlds = views(seen)
+        opened = [_opened(view, self.target) for view in worlds]
+        found = [self._clear(view, hand) for view, hand in zip(worlds, opened, strict=True)]
+        goal = poses.shifted(seen.tool, constant(np.array([way.away for way in found]), seen.tool))
+        aside = [] if standing_side(seen.robot) is None else [way.aside for way in found]
+        path = straight_path(seen, goal, self.speed, [way.joints for way in found], aside)
+        before = -array_namespace(seen.tool).ones_like(path.duration)
+        ends = constant(np.array([float(seen.robot.closure(hand)) for hand in opened]), seen.tool)
+        return ReleaseMemory(path, seen.closure, ends, before, seen.object(self.target))
+
+    def _clear(self, view: WorldView, hand: Array) -> _Back:
+        """Where the open hand draws back to, touching nothing; where nothing is clear it stays."""
+        for closer in (CLOSER, TOUCHING):
+            finder = view.finder(hand=hand, leave=Leave(hand={self.target}), closer=closer)
+            beside = _beside(finder, view)
+            begin = finder.start if beside is None else beside.joints[-1]
+            tool = view.tool if beside is None else poses.shifted(view.tool, beside.away)
+            for direction in (-poses.z_axis(view.tool[3:]), UP):
+                for share in SHARES:
+                    end = poses.shifted(tool, share * self.retreat * direction)
+                    joints = finder.straight([tool, end], start=begin, leans=finder.leanings[-1])
+                    if joints is not None:
+                        aside = begin[None][:0] if beside is None else beside.joints
+                        return _Back(end[:3] - view.tool[:3], np.concatenate([begin[None], joints]), aside)
+        nothing = finder.start[None][:0]
+        return _Back(np.zeros(3), nothing, nothing)
 
     def command(self, action: Array, seen: Seen, memory: ReleaseMemory) -> Command:
         """Open, then draw back."""
         share = poses.clip(1.0 - seen.elapsed / self.opening, 0.0, 1.0)
         since = poses.clip(memory.opened, 0.0, math.inf)
-        return Command(tool=sample(memory.path, since), hand=(memory.start * share)[:, None])
+        arm = posture(memory.path, since)
+        hand = memory.end + (memory.start - memory.end) * share
+        return Command(tool=sample(memory.path, since), hand=hand[:, None], posture=arm)
 
     def advance(self, action: Array, seen: Seen, memory: ReleaseMemory) -> ReleaseMemory:
         """Notice when the hand is open."""
         xp = array_namespace(seen.tool)
-        open_now = (seen.elapsed > self.opening) & (seen.closure < 0.15)
+        slack = poses.clip(memory.start - memory.end, 0.0, 4.0 * OPEN) / 4.0
+        slack = xp.where(memory.end > 0.0, slack, xp.full_like(slack, OPEN))
+        open_now = (seen.elapsed > self.opening) & (seen.closure < memory.end + slack)
         begun = xp.where(open_now, xp.zeros_like(memory.opened), memory.opened)
         going = memory.opened >= 0.0
         return memory._replace(opened=xp.where(going, memory.opened + seen.world.control_period, begun))
 
     def limits(self, seen: Seen, memory: ReleaseMemory) -> tuple[Limit, ...]:
-        """The force at the wrist."""
-        return (strain(seen, self.force_limit),)
+        """The force at the wrist; and the object has fallen over, or beside what it was to fall into."""
+        now, names = seen.object(self.target), {"object": self.target}
+        if self.into is None:
+            tilted = poses.tilt(now[:, 3:], memory.start_pose[:, 3:])
+            gone = Limit(FELL_OVER, tilted, FALLEN, names, counts=memory.opened >= 0.0)
+        else:
+            late = memory.opened > memory.path.duration + FALLING
+            gone = Limit(FELL_BESIDE, self._beside(seen), 0.0, {**names, "place": self.into}, counts=late)
+        return strain(seen, self.force_limit), gone
+
+    def _beside(self, seen: Seen) -> Array:
+        """Metres ``(N,)`` by which the object's middle is outside what it was to fall into; 0 where unseen.
+
+        What lies on other things above its rim is not in it, unless it stands on its floor.
+        """
+        xp = array_namespace(seen.tool)
+        if self.into is None or self.into not in seen.world.place_columns:
+            return xp.zeros_like(seen.tool[:, 0])
+        place = seen.place(self.into)
+        local = poses.localise(place.pose, seen.object(self.target)[:, :3])
+        beyond = xp.abs(local[:, :2] - place.centre) - place.extent / 2
+        tall = seen.model(self.target).standing_height + STANDS
+        above = local[:, 2] - xp.maximum(place.height, tall)
+        far = xp.maximum(xp.maximum(xp.max(beyond, axis=-1), above), xp.zeros_like(above))
+        return xp.where(xp.isfinite(far), far, xp.zeros_like(far))
 
     def done(self, seen: Seen, memory: ReleaseMemory) -> Array:
-        """The hand is open, touches nothing, and has drawn back."""
+        """The hand is open, touches nothing and has drawn back; what was to fall into something is in it."""
         gap = poses.norm(seen.tool[:, :3] - memory.path.table[:, -1, :3])
         free = ~array_namespace(gap).any(seen.contacts, axis=-1)
-        return (memory.opened >= memory.path.duration) & (gap < self.tolerance) & free
+        done = (memory.opened >= memory.path.duration) & (gap < self.tolerance) & free
+        return done if self.into is None else done & (self._beside(seen) <= 0.0)
 
     def necessary_cost(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """Share of the fingertips that still touch something."""
@@ -123,4 +231,35 @@ class Release(ConceptModel[ReleaseMemory]):
             opening=1.0 - seen.closure,
             contacts=array_namespace(seen.tool).count_nonzero(seen.contacts, axis=-1),
             force=force_at_wrist(seen),
+            touch=touched(seen, self.target),
         )
+
+
+def _opened(view: WorldView, target: str) -> Array:
+    """Joints ``(n_hand,)`` of the hand that has let go of what it holds.
+
+    One with a jaw that swings opens as wide as it may without touching anything else.
+    """
+    robot = view.robot
+    wide = wide_at(robot, float(robot.closure(view.hand)))
+    found = [opened_about(robot, wide, spare) for spare in SPARES]
+    for k, hand in enumerate(found[1:] if standing_side(robot) is not None else []):
+        finder = view.finder(hand=hand, leave=Leave(hand={target}), closer=TOUCHING)
+        if not finder.collisions.free(finder.start):
+            return found[k]
+    return found[-1]
+
+
+def _beside(finder: WayFinder, view: WorldView) -> _Back | None:
+    """How a finger that stands still goes away from what it touches; None where none does, or has no room.
+
+    Opened by the other finger alone, a hand takes along what leans on this one when it draws back.
+    """
+    side = standing_side(view.robot)
+    if side is None:
+        return None
+    away = math.copysign(SLIDE, side) * poses.to_matrix(view.tool[3:])[:, 1]
+    joints = finder.straight([view.tool, poses.shifted(view.tool, away)])
+    if joints is None:
+        return None
+    return _Back(away, np.concatenate([finder.start[None], joints]), joints[:0])

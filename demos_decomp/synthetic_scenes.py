@@ -27,7 +27,7 @@ def places_of(*fixtures: str) -> dict[str, Surface]:
 
 
 @dataclass(frozen=True)
-class Thing:
+class DrawnThing:
     """An object as it stands at the beginning: ``(7,)`` pose, kind, ``(3,)`` full size in metres."""
 
     pose: Floats
@@ -53,7 +53,7 @@ class Performance:
     """
 
     hand: Hand
-    objects: dict[str, Thing]
+    objects: dict[str, DrawnThing]
     places: dict[str, Surface]
     target: str
     destination: str
@@ -76,7 +76,7 @@ def pick_and_place(rng: np.random.Generator) -> Performance:
     start = np.array([rng.uniform(0.42, 0.58), rng.uniform(-0.24, -0.05), 0.0])
     begin = _standing(start, size, poses.yaw(rng.uniform(-1.2, 1.2)))
     end = _standing([*(goal[:2] + rng.normal(0, 0.006, 2)), 0.0], size, _turned(heading, rng.normal(0, 0.03)))
-    things = {"target": Thing(begin, kind, size)}
+    things = {"target": DrawnThing(begin, kind, size)}
     lift, above = rng.uniform(0.08, 0.15), rng.uniform(0.06, 0.12)
     raised = _shifted(begin, [*rng.normal(0, 0.004, 2), lift])
     ready = _shifted(end, [*rng.normal(0, 0.004, 2), above])
@@ -99,7 +99,7 @@ def shelf_to_shelf(rng: np.random.Generator) -> Performance:
     ready = _shifted(end, [*rng.normal(0, 0.003, 2), above])
     before = _shifted(raised, [-out, rng.normal(0, 0.01), rng.normal(0, 0.006)])
     below = _shifted(ready, [-out + rng.normal(0, 0.01), rng.normal(0, 0.01), rng.normal(0.01, 0.006)])
-    things = {"cup": Thing(begin, "cup", CUP)}
+    things = {"cup": DrawnThing(begin, "cup", CUP)}
     way = [raised, before, below, ready]
     approach = next(p.access for p in load_fixture("shelf").place_models() if p.name == "upper_board")
     return _perform(rng, things, places, ("cup", "lower_board"), approach, way, end, overlap=0.12)
@@ -120,7 +120,7 @@ def pick_and_throw(rng: np.random.Generator) -> Performance:
     if rng.random() < 0.6:  # tips over
         rest[2] = floor[2] + CUP[0] / 2
         rest[3:] = poses.quat_multiply(heading, poses.from_rotation_vector(np.array([np.pi / 2, 0.0, 0.0])))
-    things = {"cup": Thing(begin, "cup", CUP)}
+    things = {"cup": DrawnThing(begin, "cup", CUP)}
     return _perform(rng, things, places, ("cup", "trash_bin"), DOWN, [raised, over], rest, throws=True)
 
 
@@ -133,7 +133,7 @@ SCRIPTS: dict[str, Callable[[np.random.Generator], Performance]] = {
 
 def _perform(
     rng: np.random.Generator,
-    things: dict[str, Thing],
+    things: dict[str, DrawnThing],
     places: dict[str, Surface],
     target_and_destination: tuple[str, str],
     approach: Floats,
@@ -190,7 +190,7 @@ def _perform(
     return Performance(hand, things, places, target, destination, closed, opened, end, lowest, labels)
 
 
-def _grip(rng: np.random.Generator, thing: Thing, approach: Floats) -> Floats:
+def _grip(rng: np.random.Generator, thing: DrawnThing, approach: Floats) -> Floats:
     """Pose ``(7,)`` of the hand in the target's frame."""
     side = poses.rotate(thing.pose[3:], np.array([0.0, 1, 0]))
     if approach[0] > 0.5:  # a cup from the front: the fingers close sideways

@@ -23,6 +23,7 @@ from bt_tasksim.core import plugins, poses
 from bt_tasksim.core.bundles import parts, taken
 from bt_tasksim.core.world import Command, Hidden, Observation
 from bt_tasksim.execution.runner import Runner
+from bt_tasksim.planning.arm import arm_of
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import Goal, ObjectSpec, SpotSpec
@@ -72,11 +73,15 @@ SCENE = Scene(
 class ToyWorld:
     """Stands in for an engine pipeline: tool and hand are at once where they are told to be.
 
+    The arm's joints are those that bring the tool there, where it can go there.
+
     Attributes:
         now: The present observation; tests change it by `put`.
         steps: The commands it was stepped with.
         grip: The hand feels something when it is half closed, and its objects follow the tool.
     """
+
+    state = None
 
     def __init__(self) -> None:
         self.steps: list[Command] = []
@@ -91,7 +96,7 @@ class ToyWorld:
         self.steps.clear()
         self.resets += 1
         n_hand, n_tips = len(self.robot.hand_joints), len(self.robot.tips)
-        down = poses.frame_from_axes(np.array([0.0, 0, -1]), np.array([0.0, 1, 0]))
+        down = poses.frame_from_axes(np.array([0.0, 0, -1]), np.array([0.0, -1, 0]))
         self.now = Observation(
             time=np.float64(0.0),
             arm_position=self.robot.rest.copy(),
@@ -108,6 +113,7 @@ class ToyWorld:
             contact_points=np.zeros((n_tips, 3)),
             motion=np.zeros(6),
         )
+        self.bend()
         return self.now
 
     def put(self, **changes: Any) -> None:
@@ -120,6 +126,13 @@ class ToyWorld:
         objects[self.model.object_index(name), :3] = self.now.tool_pose[:3]
         self.put(objects=objects, contacts=np.ones(len(self.robot.tips), bool), closure=np.float64(0.5))
 
+    def stand(self, name: str, place: str) -> None:
+        """Have an object stand on the middle of a place."""
+        k, objects = self.model.object_index(name), self.now.objects.copy()
+        objects[k] = self.model.place(place).pose
+        objects[k, 2] += self.model.object(name).extent[2] / 2
+        self.put(objects=objects)
+
     def step(self, command: Command) -> Observation:
         self.steps.append(command)
         before = self.now
@@ -129,7 +142,15 @@ class ToyWorld:
             tool_pose=before.tool_pose if command.tool is None else command.tool,
             closure=closure,
         )
+        self.bend(command.posture)
         return self.now
+
+    def bend(self, posture: Any = None) -> None:
+        """Have the arm where its tool is; ``posture (n_arm,)`` is the one that was asked for, if any."""
+        start = self.now.arm_position if posture is None or np.isnan(posture).any() else posture
+        joints = arm_of(self.robot).joints(self.now.tool_pose, start)
+        if joints is not None:
+            self.put(arm_position=joints)
 
     def hidden(self) -> Hidden | None:
         return None

@@ -39,7 +39,7 @@ PARSED = {
     r"--device cuda": "needs a GPU; tests and the CPU device run the same code",
     r"--real-time": "takes as long as it says",
     r"\b[A-Z]{2,}(_[A-Z]+)*\b": "has a placeholder",
-    r"my_robot\.yaml|so100\.yaml|--plugin|wipe\.xml": "needs a file that its reader writes",
+    r"--urdf|my_robot\.yaml|so100\.yaml|--plugin|wipe\.xml": "needs a file that its reader writes",
     r"push=policies/push": "needs a policy that its reader trains",
     r"tables --decomposition": "writes into the documentation; benchmarks.decomposition measures the same",
     r"experiments . --train|experiments [AB]$|experiments B --quick": "takes minutes even when quick",
@@ -47,6 +47,9 @@ PARSED = {
 """Commands that are only parsed, and why."""
 
 QUICK = {
+    "benchmarks.any_tree": "--only 900009 --robot so100 --oracle 0",
+    "benchmarks.any_tree.five": "--episodes 1 --only tower",
+    "benchmarks.planning": "--quick",
     "benchmarks.batch": "--quick --worlds 4 --episodes 2 --trees 40",
     "benchmarks.cluster": "--times 1 --episodes 12",
     "benchmarks.decomposition": "--seeds 1",
@@ -158,6 +161,8 @@ def prepared(tmp_path_factory):
         assert main(["decompose", log, "--xml", "kitchen.xml"]) == 0
         assert main(["run", "kitchen.xml", "--seed", "11", "--out", "runs/kitchen"]) in (0, 1)
         assert main(["new", "concept", "push"]) == 0
+        assert main(["new", "scene", "kitchen"]) == 0
+        assert main(["new", "tree", "mine"]) == 0
     shutil.copy(folder / "kitchen.xml", folder / "shelf.xml")
     return folder
 

@@ -10,8 +10,11 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("bt_tasksim", "concept_nodes", "trees", "demos_decomp")
 
 ALIKE = {
+    "Beside": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Command": "what a tick asks of the robot; a command of the command line, as Typer calls it",
     "ContactReader": "the same of two simulators",
+    "Inside": "the goal relation, as physics tells it; the condition, as a robot sees it",
+    "Lifted": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Policy": "what decides in a leaf; what a limit of a robot does, in its file",
     "World": "the same of two simulators",
 }

@@ -13,6 +13,7 @@ jsonschema = pytest.importorskip("jsonschema")
 FILES = {
     "robot": sorted(asset("robots").glob("*.yaml")),
     "scene": sorted(asset("scenes").glob("*.yaml")),
+    "object": sorted(asset("objects").glob("*.yaml")),
     "fixture": sorted(asset("fixtures").glob("*.yaml")),
     "twin": [asset("twin", "gap.yaml")],
     "ros": sorted(asset("robots", "ros").glob("*.yaml")),

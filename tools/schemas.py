@@ -20,6 +20,7 @@ from bt_tasksim.hardware.ros.schema import CellFile
 from bt_tasksim.hardware.twin.gap_schema import GapFile
 from bt_tasksim.robot.schema import RobotFile
 from bt_tasksim.scene.fixture_schema import FixtureFile
+from bt_tasksim.scene.object_schema import COLOURS, ObjectFile
 from bt_tasksim.scene.scene_schema import SceneFile
 from bt_tasksim.scene.shapes import KINDS
 from bt_tasksim.training.config import TrainConfig
@@ -28,6 +29,7 @@ FOLDER = Path(__file__).resolve().parents[1] / "docs" / "schemas"
 MODELS: dict[str, Callable[[], type[Model]]] = {
     "robot": lambda: RobotFile,
     "scene": lambda: SceneFile,
+    "object": lambda: ObjectFile,
     "fixture": lambda: FixtureFile,
     "maniskill": lambda: EnvironmentFile,
     "settings": lambda: record_model(TrainConfig),
@@ -40,9 +42,14 @@ MODELS: dict[str, Callable[[], type[Model]]] = {
 def schema(name: str) -> dict[str, Any]:
     """The JSON schema of one kind of file."""
     made = MODELS[name]().model_json_schema()
+    if name in ("scene", "object"):
+        thing = made["$defs"]["ObjectEntry"] if name == "scene" else made
+        _suggest(thing["properties"]["kind"], sorted(KINDS))
+        _suggest(thing["properties"]["colour"], list(COLOURS))
     if name == "scene":
         entries = made["$defs"]
-        _suggest(entries["ObjectEntry"]["properties"]["kind"], sorted(KINDS))
+        objects = sorted(path.name for path in asset("objects").glob("*.yaml"))
+        _suggest(entries["ObjectEntry"]["properties"]["object"], objects)
         _suggest(entries["GoalEntry"]["properties"]["relation"], sorted(parts("goal relation")))
         _suggest(made["properties"]["robot"], _bundled("robots"))
         _suggest(made["properties"]["fixtures"]["items"], _bundled("fixtures"))

@@ -13,6 +13,7 @@ from bt_tasksim._names import one_module
 if TYPE_CHECKING:
     from bt_tasksim.trees.check import check_tree
     from bt_tasksim.trees.equality import same_tree
+    from bt_tasksim.trees.from_goals import tidy
     from bt_tasksim.trees.nodes.fallback import fallback
     from bt_tasksim.trees.nodes.force_failure import force_failure
     from bt_tasksim.trees.nodes.force_success import force_success
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from bt_tasksim.trees.nodes.sequence import sequence
     from bt_tasksim.trees.nodes.subtree import subtree
     from bt_tasksim.trees.nodes.timeout import timeout
+    from bt_tasksim.trees.recovery import recovering
     from bt_tasksim.trees.xml_reader import load_tree, scene_of_tree, tree_from_xml
     from bt_tasksim.trees.xml_writer import node_models, save_tree, tree_to_xml
 
@@ -36,6 +38,8 @@ _HOMES = {
     "bt_tasksim.trees.xml_reader": ("load_tree", "tree_from_xml", "scene_of_tree"),
     "bt_tasksim.trees.xml_writer": ("save_tree", "tree_to_xml", "node_models"),
     "bt_tasksim.trees.equality": ("same_tree",),
+    "bt_tasksim.trees.from_goals": ("tidy",),
+    "bt_tasksim.trees.recovery": ("recovering",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -52,6 +56,8 @@ __all__ = [
     "force_success",
     "force_failure",
     "subtree",
+    "tidy",
+    "recovering",
     "check_tree",
     "load_tree",
     "tree_from_xml",

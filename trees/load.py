@@ -199,11 +199,40 @@ def check_names(
                 )
 
 
-def own_nodes(file: str) -> Leaves:
-    """The concepts and conditions that a Python file defines, by name.
+def has_scene(file: str) -> bool:
+    """A Python file has a function ``scene()``.
 
     Raises:
-        InputError: The file is missing, fails, or defines none.
+        InputError: The file is missing or fails.
+    """
+    return callable(getattr(_module(Path(file)), "scene", None))
+
+
+def load_scene_of(file: str, robot: str | None = None) -> Scene:
+    """The scene of a scene file, or of the ``scene()`` of a Python file.
+
+    Args:
+        file: The file.
+        robot: Name or file of the robot; by default the scene's own.
+
+    Raises:
+        InputError: It is no good.
+    """
+    path = Path(file)
+    if path.suffix != ".py":
+        return _scene(file, robot)
+    return _made(_function(_module(path), "scene", path), robot, path)
+
+
+def own_nodes(file: str, needed: bool = True) -> Leaves:
+    """The concepts and conditions that a Python file defines, by name.
+
+    Args:
+        file: The file.
+        needed: It should define one at least.
+
+    Raises:
+        InputError: The file is missing, fails, or defines none though it should.
     """
     module = _module(Path(file))
     found: Leaves = {
@@ -213,7 +242,7 @@ def own_nodes(file: str) -> Leaves:
         and issubclass(value, ConceptModel | Condition)
         and value.__module__ == module.__name__
     }
-    if not found:
+    if needed and not found:
         raise InputError(f"'{file}' defines no concept and no condition")
     return found
 
@@ -332,8 +361,11 @@ def _called(function: Callable[..., Any], path: Path, *arguments: Any) -> Any:
     """What a function of a tree's file returns; whatever it raises is one sentence with the line."""
     try:
         return function(*arguments)
-    except InputError:
-        raise
+    except InputError as error:
+        line = line_in(error, path)
+        if not line or path.name in str(error):
+            raise
+        raise InputError(f"'{path}'{line}: {error}") from error
     except (Exception, SystemExit) as error:
         text = (error.msg if isinstance(error, SyntaxError) else str(error)) or "no reason given"
         where = f"'{path}'{line_in(error, path)}"

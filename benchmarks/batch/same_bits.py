@@ -121,7 +121,7 @@ def _alone(engine: str, seeds: Sequence[int]) -> dict[int, str]:
             hashes.take(0)
             out[seed] = _facts(_run(runner, seed), "")
             out[seed] = f"{out[seed]} {hashes.take(0)}"
-    runner.pipeline.close()
+    runner.close()
     return out
 
 

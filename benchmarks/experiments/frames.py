@@ -55,7 +55,7 @@ def film(job: Job, seed: int, caption: str, count: int = 4, part: tuple[int, int
     try:
         runner.run(seed, record=draw)
     finally:
-        runner.pipeline.close()
+        runner.close()
     return Strip(caption, tuple(_cropped(p, part) for p in pictures))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,10 @@ import numpy as np
 
 from bt_tasksim.checking.bundles import numbers
 from bt_tasksim.checking.declaration import check_declaration
-from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case, Finding
+from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
 from bt_tasksim.checking.purity import check_batches, check_beginning, check_purity
 from bt_tasksim.checking.recording import Recording, record
+from bt_tasksim.checking.report import Report
 from bt_tasksim.checking.situations import RecordedDecision, Situations, alike
 from bt_tasksim.checking.values import check_values
 from bt_tasksim.checking.watching import check_observables, check_watching
@@ -30,33 +30,6 @@ MOST = 24
 """Situations of a concept that are taken from real runs."""
 BESIDE = "train_"
 """How the file begins, beside a concept's own, that holds its training tree."""
-
-
-@dataclass
-class Report:
-    """What a check has found.
-
-    Attributes:
-        findings: What is wrong.
-        checked: What was checked, a line for each concept.
-    """
-
-    findings: list[Finding] = field(default_factory=list)
-    checked: list[str] = field(default_factory=list)
-
-    @property
-    def errors(self) -> int:
-        """How many findings are errors."""
-        return sum(f.level == ERROR for f in self.findings)
-
-    def lines(self) -> list[str]:
-        """What is printed: a line for each finding, errors first, and what was checked."""
-        order = sorted(self.findings, key=lambda f: (f.concept, f.level != ERROR))
-        counted = f"{_count(self.errors, 'error')}, {_count(len(self.findings) - self.errors, 'warning')}"
-        return [
-            *map(str, order),
-            *(f"{'not ok' if self.errors else 'ok'}: {c}; {counted}" for c in self.checked),
-        ]
 
 
 def check(file: str | Path, tree: str | None = None) -> Report:
@@ -130,10 +103,20 @@ def check_concept(concept: type[ConceptModel], name: str, root: Any, runs: Recor
 
 
 def spread(decisions: Sequence[RecordedDecision], n: int) -> list[RecordedDecision]:
-    """At most about ``n`` decisions, spread evenly, the first and last ones among them."""
-    step = max(1, len(decisions) // n)
-    chosen = list(decisions[::step])
-    return chosen if chosen[-1] is decisions[-1] else [*chosen, decisions[-1]]
+    """At most about ``n`` decisions, as many of each run, spread evenly from its first to its last.
+
+    A run that explores may go on for long without getting anywhere; one that does not shows every phase.
+    """
+    runs: dict[int, list[RecordedDecision]] = {}
+    for decision in decisions:
+        runs.setdefault(decision.run, []).append(decision)
+    each = max(2, n // len(runs))
+    return [run[k] for run in runs.values() for k in _even(len(run), each)]
+
+
+def _even(count: int, n: int) -> list[int]:
+    """At most ``n`` positions of ``count``, evenly, the first and the last among them."""
+    return sorted({round(k) for k in np.linspace(0, count - 1, min(n, count))})
 
 
 def _own_tree(path: Path, concept: type[ConceptModel]) -> str | None:
@@ -224,7 +207,3 @@ def _check_done(case: Case, runs: Recording) -> None:
             return
     what = f"is never true in {len(runs.ends)} runs (the last one ended: {runs.ends[-1]})"
     case.add(WARNING, "done", what, "see with bt-tasksim run whether the goal is ever reached")
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'' if n == 1 else 's'}"

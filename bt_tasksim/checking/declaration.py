@@ -8,7 +8,10 @@ from typing import Any
 
 from bt_tasksim.checking.findings import ERROR, WARNING, Case
 from bt_tasksim.checking.values import degrees_like
+from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.core.errors import nearest
+from bt_tasksim.core.registry import parts
 
 UNITS = re.compile(
     r"\b(metres?|m|mm|millimetres?|N|Nm|newtons?|rad|radians?|degrees?|s|seconds?|ticks?|share|ratio|over|"
@@ -23,6 +26,7 @@ def check_declaration(case: Case) -> None:
     """Everything that can be said without running it."""
     _check_parameters(case)
     _check_learning(case)
+    _check_conditions(case)
     _check_words(case)
 
 
@@ -77,6 +81,27 @@ def _check_learning(case: Case) -> None:
     if not concept.is_programmed and not learnable:
         what = "is neither programmed nor to be learned"
         case.add(ERROR, "", what, "say is_task_model = False, or leave is_programmed = True")
+
+
+def _check_conditions(case: Case) -> None:
+    """What it says to bring about and to need is said of conditions and parameters that there are."""
+    ours = case.concept.parameters()
+    known = {name: kind for name, kind in parts("concept").items() if issubclass(kind, Condition)}
+    for name in ("establishes", "requires"):
+        for one in getattr(case.concept, name):
+            if one.condition not in known:
+                what = f"'{name}' names the condition '{one.condition}', which does not exist"
+                case.add(ERROR, "", what, f"name a registered one{nearest(one.condition, known)}")
+                continue
+            theirs = known[one.condition].parameters()
+            for key in one.parameters:
+                if key not in theirs:
+                    what = f"'{name}' gives {one.condition} a '{key}', which it does not take"
+                    case.add(ERROR, "", what, f"it takes {', '.join(theirs) or 'nothing'}")
+            for value in (*one.parameters.values(), *one.given):
+                if value not in ours:
+                    what = f"'{name}' speaks of its parameter '{value}', which it does not have"
+                    case.add(ERROR, "", what, f"its parameters are {', '.join(ours) or 'none'}")
 
 
 def _check_words(case: Case) -> None:

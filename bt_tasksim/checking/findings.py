@@ -3,49 +3,23 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 import inspect
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from bt_tasksim.checking.questions import QUESTIONS
+from bt_tasksim.checking.report import ERROR, WARNING, Finding
 from bt_tasksim.checking.situations import RecordedDecision, Situation, Situations
 from bt_tasksim.concept.functions import ConceptFunctions
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Seen
+from bt_tasksim.core.errors import NoWayError
 
-ERROR, WARNING = "ERROR", "WARNING"
+__all__ = ["ERROR", "FAILED", "WARNING", "Case", "Finding"]
+
 FAILED: Any = object()
 """What a call gives that raised."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Finding:
-    """One thing that is wrong.
-
-    Attributes:
-        level: `ERROR` or `WARNING`.
-        concept: Name of the concept.
-        function: Name of its function; empty for the concept itself.
-        what: What is wrong.
-        remedy: What to do.
-        line: Line in the concept's file; 0 where none is to blame.
-        file: Name of that file.
-    """
-
-    level: str
-    concept: str
-    function: str
-    what: str
-    remedy: str
-    line: int = 0
-    file: str = ""
-
-    def __str__(self) -> str:
-        where = f"{self.concept}.{self.function}" if self.function else self.concept
-        line = f" ({self.file}:{self.line})" if self.line else ""
-        return f"{self.level} {where}{line}: {self.what}; {self.remedy}"
 
 
 class Case:
@@ -108,8 +82,20 @@ class Case:
         return (self._named(function), kind) in self._said
 
     def ask(self, name: str, situation: Situation, like: Situations, seen: Seen | None = None) -> Any:
-        """What a function answers; `FAILED`, and a finding, where it raises."""
-        return self.call(name, lambda: like.ask(name, situation, self.model, seen))
+        """What a function answers; `FAILED`, and a finding, where it raises.
+
+        A beginning may find that there is no way: that is `FAILED`, and no finding.
+        """
+
+        def answer() -> Any:
+            try:
+                return like.ask(name, situation, self.model, seen)
+            except NoWayError:
+                if QUESTIONS[name].begins:
+                    return FAILED
+                raise
+
+        return self.call(name, answer)
 
     def call(self, name: str, answer: Callable[[], Any], where: str = "") -> Any:
         """What a call gives; `FAILED`, and a finding, where it raises.

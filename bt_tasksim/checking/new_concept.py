@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib.util
 import keyword
-import re
 from pathlib import Path
 
-from bt_tasksim.core.errors import InputError, MachineError, nearest
-from bt_tasksim.core.files import write_texts
+from bt_tasksim.checking.new_files import NAME, check_new, write_new
+from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.resources import asset
 from bt_tasksim.policy.policy import concept_name
 
@@ -48,25 +46,10 @@ def write_concept(name: str, folder: str | Path = ".", like: str | None = None) 
     _check_name(name, class_name)
     if like is not None and like not in examples():
         raise InputError(f"there is no example '{like}' to begin with{nearest(like, examples())}")
-    above = next(path for path in (folder, *folder.parents) if path.exists())
-    if not above.is_dir():
-        raise InputError(f"'{above}' is a file: name another folder with --out")
-    for path in paths.values():
-        if path.exists() or path.is_symlink():
-            raise InputError(f"'{path}' is there already: remove it, or choose another name or --out")
+    check_new(folder, dict.fromkeys(paths.values()))
     _check_free(name)
     texts = {template: _filled(template, like or PLAIN, name, class_name) for template in paths}
-    made = [path for path in (folder, *folder.parents) if not path.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_texts({path: texts[template] for template, path in paths.items()})
-    except BaseException as error:
-        for path in made:
-            with contextlib.suppress(OSError):
-                path.rmdir()
-        if isinstance(error, OSError):
-            raise MachineError(f"cannot make the folder '{folder}': {error.strerror or error}") from error
-        raise
+    write_new(folder, {path: texts[template] for template, path in paths.items()})
     concept, tree, _ = paths.values()
     return (
         f"wrote {', '.join(map(str, paths.values()))}\n"
@@ -78,7 +61,7 @@ def _check_name(name: str, class_name: str) -> None:
     from bt_tasksim.concept.model import ConceptModel
     from bt_tasksim.concept_nodes import catalogue
 
-    good = re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name) and not keyword.iskeyword(name)
+    good = NAME.fullmatch(name) and not keyword.iskeyword(name)
     if not good or name.startswith(TAKEN):
         raise InputError(
             f"a concept's name should be lower-case words joined by '_', such as push or wipe_table, "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib.util
 import random
 import sys
@@ -15,7 +14,6 @@ from bt_tasksim.checking.bundles import different, frozen
 from bt_tasksim.checking.findings import ERROR, FAILED, Case
 from bt_tasksim.checking.questions import QUESTIONS
 from bt_tasksim.checking.situations import Situation, Situations
-from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array
 
 DATA = (bool, int, float, str, list, dict, set, np.ndarray)
@@ -42,12 +40,10 @@ def check_purity(case: Case, situations: Situations) -> None:
 
 def check_beginning(case: Case, situations: Situations) -> None:
     """What runs once at the start may plan and search, and leaves what it was given as it is."""
-    firsts = [s for s, d in zip(situations.single, case.decisions, strict=False) if d.first]
     for name in (n for n in case.functions if QUESTIONS[n].begins and not case.has(n, "text")):
-        for situation in firsts or situations.single[:1]:
+        for situation in situations.firsts or situations.single[:1]:
             before = _surroundings(case, situation)
-            with contextlib.suppress(NoWayError):
-                case.ask(name, situation, situations)
+            case.ask(name, situation, situations)
             _compare(case, name, before, _surroundings(case, situation))
 
 

@@ -55,6 +55,10 @@ def _explain(model: ConceptFunctions, at: Asked) -> Any:
     return spoken(as_statement(model.explain(at.seen, at.memory)), at.seen.tool.shape[0])
 
 
+def _planned(model: ConceptFunctions, at: Asked) -> Any:
+    return model.planned(at.memory) + 0.0 * at.seen.elapsed  # it may be one number for all worlds
+
+
 def _limits(model: ConceptFunctions, at: Asked) -> Any:
     return possible(model.limits(at.seen, at.memory), at.seen.tool.shape[0])
 
@@ -105,6 +109,7 @@ QUESTIONS: Mapping[str, Question] = {
     "advance": Question(_advance),
     "carry_out": Question(_carry_out),
     "sufficient_cost": Question(lambda model, at: model.sufficient_cost(at.known, at.memory)),
+    "planned": Question(_planned),
     "explain": Question(_explain, words=True),
 }
 """By the function's name."""

@@ -152,6 +152,8 @@ class Situations:
         self.single = [situation_of(d) for d in decisions]
         self.real = len(self.single)
         """So many are as they were; those after them are changed."""
+        self.firsts = [s for s, d in zip(self.single, decisions, strict=True) if d.first]
+        """Those in which the concept began, as they were."""
         self.single += [perturbed(s, rng) for s in self.single for _ in range(copies)]
 
     @cached_property

@@ -1,8 +1,8 @@
 """The command ``bt-tasksim``.
 
 Bad input ends with one sentence and exit code 2, and so does an exception in a plugin's code; a failing
-machine with 1, an interrupt with 130, SIGTERM with 143. Everything
-heavy is imported by the command that needs it.
+machine with 1, an interrupt with 130, SIGTERM with 143. What comes from a user's own code names its file and
+line. Everything heavy is imported by the command that needs it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import typer
 from bt_tasksim.cli.app import NAME, application
 from bt_tasksim.cli.options.plugins import taken
 from bt_tasksim.cli.streams import complain, flush_or_discard, open_missing, spell_out
-from bt_tasksim.core.culprit import users_place
+from bt_tasksim.core.culprit import users_place, with_place
 from bt_tasksim.core.errors import BtTasksimError, BtTasksimWarning, InputError, Terminated, is_bad_path
 
 COMPLETE = f"_{NAME.replace('-', '_').upper()}_COMPLETE"
@@ -48,10 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain(f"{'terminated' if ended else 'interrupted'}{f'; {stop}' if str(stop) else ''}")
         return 143 if ended else 130
     except InputError as error:
-        complain(f"{NAME}: {error}")
+        complain(f"{NAME}: {with_place(error)}")
         return 2
     except BtTasksimError as error:
-        complain(f"{NAME}: {error}")
+        complain(f"{NAME}: {with_place(error)}")
         return 1
     except BrokenPipeError:
         flush_or_discard()

@@ -60,7 +60,7 @@ def run_into(
                 folder, runner, seed, scenario=name, film=film, no_video=why or NO_VIDEO
             )
     finally:
-        runner.pipeline.close()
+        runner.close()
     for remark in files.remarks:
         say(remark)
     say(printable(f"{result}; results: {files.folder / 'report.html'}"))

@@ -18,6 +18,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.contract import Contract
+from bt_tasksim.concept.following import following
 from bt_tasksim.concept.functions import ConceptFunctions, any_of, booleans, first_of, sequence_of
 from bt_tasksim.concept.reporting import as_statement
 from bt_tasksim.concept.seen import Seen
@@ -93,6 +94,8 @@ class Activation:
         self._started: Array = np.zeros(worlds)
         self._nearer: Array = np.zeros(worlds)
         self._lost: Array = np.zeros(worlds, np.int64)
+        self._later: tuple[Any, ...] | None = None
+        self._failures: Array = np.zeros(worlds, np.int64)
 
     def elapsed(self, rows: Array) -> Array:
         """Seconds ``(k,)`` since it began."""
@@ -100,7 +103,12 @@ class Activation:
 
     def seen(self, rows: Array) -> Seen:
         """What is seen now."""
-        return self._context.seen(rows, self.elapsed(rows))
+        found = self._context.seen(rows, self.elapsed(rows))
+        if self._later is None:
+            self._later = following(self._leaf)
+        found.later = self._later
+        found.failures = self._failures[rows]
+        return found
 
     def judge(self, rows: Array, fresh: Array) -> Judged:
         """Begin where it begins, and see where it can go on.
@@ -145,13 +153,17 @@ class Activation:
         nearer = self._nearer[judged.rows] + host(action.terminate)
         self._nearer[judged.rows] = nearer
         done = nearer >= 1.0
-        late = ~done & (self.elapsed(judged.rows) > model.timeout)
+        planned = model.planned(judged.memory) if model.patient else 0.0
+        patience = model.timeout + (host(planned) if getattr(planned, "ndim", 0) else planned)
+        late = ~done & (self.elapsed(judged.rows) > patience)
         ended = done | late
         if ended.any():
             positions = np.flatnonzero(ended)
             ends = judged.at(positions)
             statuses[ends.going] = np.where(done[positions], SUCCESS, FAILURE)
             finished = judged.rows[done]
+            self._failures[finished] = 0
+            self._failures[judged.rows[late]] += 1
             for goal in model.ends:
                 context.end(goal, model.actor, finished)
             for goal in model.reaches:
@@ -187,6 +199,8 @@ class Activation:
             return
         context, model = self._context, self._model
         begins = rows[positions]
+        anew = context.times[begins] <= self._started[begins]  # no clock goes back but for another episode
+        self._failures[begins[anew]] = 0
         self._started[begins] = context.times[begins]
         seen = self.seen(begins)
         unmet = sequence_of(model.initial_state(seen), self._contract.where("initial_state"))
@@ -295,6 +309,7 @@ class Activation:
     def _fail(self, statuses: Array, position: int, row: int, why: Outcome) -> None:
         statuses[position] = FAILURE
         self.outcomes[row] = why
+        self._failures[row] += 1
 
 
 def no_action(judged: Judged, size: int) -> Action:

@@ -16,6 +16,7 @@ from bt_tasksim.concept.reporting import as_statement
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.outcomes import Outcome, Statement, register_reason
 from bt_tasksim.core.poses import Array
+from bt_tasksim.scene.specs import Goal
 
 HOLDS = register_reason("condition_holds", "")
 HOLDS_NOT = register_reason("condition_does_not_hold", "")
@@ -78,9 +79,21 @@ class Condition(LeafModel, _CalledCondition):
     """
 
     leaf_base: ClassVar[type[ModelLeaf]] = ConditionNode
+    relation: ClassVar[str | None] = None
+    """The goal relation that it asks about, as far as can be seen; None: no goal is about it."""
+    in_hand: ClassVar[bool] = False
+    """It can hold only as long as the hand holds something: letting go ends it."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._bind(args, kwargs, f"condition {type(self).__name__}")
+
+    @classmethod
+    def from_goal(cls, goal: Goal) -> dict[str, Any]:
+        """Arguments with which it asks whether a goal of its `relation` is reached.
+
+        By default the first parameter is the goal's object, and the second one its place.
+        """
+        return dict(zip(cls.parameters(), (goal.object, goal.place), strict=False))
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:

@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept.beliefs import Beliefs, Believed
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.bundles import Rows
 from bt_tasksim.core.culprit import place_of
@@ -52,7 +53,8 @@ class Written:
     """What the leaves have written in a tick, in all worlds.
 
     Attributes:
-        tool: Tool targets ``(N, 7)``, NaN where nobody wrote one; None where nobody wrote any.
+        tool: Tool targets ``(N, 7)``, NaN where nobody wrote one; None where nobody wrote any. Behind them,
+            where a leaf wrote one, the arm's postures: ``(N, 7 + n_arm)``, NaN in other worlds.
         hand: Hand targets ``(N, 1 + n_synergies)``, likewise.
     """
 
@@ -62,7 +64,10 @@ class Written:
     def of_world(self, world: int) -> Command:
         """The command of one world, by its row, in NumPy: a part is None where nobody wrote it."""
         parts = (None if part is None else host(part[world, ...]) for part in (self.tool, self.hand))
-        return Command(*(None if part is None or np.isnan(part[0]) else part for part in parts))
+        tool, hand = (None if part is None or np.isnan(part[0]) else part for part in parts)
+        if tool is None or len(tool) == TOOL or np.isnan(tool[TOOL]):
+            return Command(None if tool is None else tool[:TOOL], hand)
+        return Command(tool[:TOOL], hand, tool[TOOL:])
 
 
 class Context:
@@ -82,6 +87,8 @@ class Context:
         self.like: Array = np.empty(0) if like is None else like
         self.rows: Array = np.arange(worlds)
         self._table = FactsTable(worlds, self.like)
+        self._beliefs = Beliefs(worlds)
+        self._believed: Believed | None = None
         self._latest: Observation | None = None
         self._observation: Observation | None = None
         self.ask_hidden: Callable[[Array | None], Hidden | None] = lambda rows: None
@@ -91,7 +98,7 @@ class Context:
         """Seconds ``(N,)`` since each episode began."""
         self._refused: dict[int, Refusal] = {}
         self._held: dict[tuple[str, str], Array] = {}
-        most = {"tool": TOOL, "hand": 1 + len(robot.synergies)}
+        most = {"tool": TOOL + len(robot.arm_joints), "hand": 1 + len(robot.synergies)}
         self._parts = {name: _Part(name, worlds, self.like, n) for name, n in most.items()}
         self._indices: dict[bytes, Index] = {}
 
@@ -140,6 +147,19 @@ class Context:
             self._observation = self.facts_table.arranged(self._latest)
         return self._observation
 
+    @property
+    def beliefs(self) -> Beliefs:
+        """What estimates are corrected by."""
+        return self._beliefs
+
+    @property
+    def believed(self) -> Believed:
+        """Gives the poses at which the objects are taken to be at this tick, in the columns of `world`."""
+        if self._believed is None:
+            seen = self.observation.objects
+            self._believed = Believed(seen, self.beliefs.corrections(list(self.world.columns), seen))
+        return self._believed
+
     def hidden(self, rows: Array | None = None) -> Hidden | None:
         """The hidden state ``(k, ...)``, in the columns of `world`; None where nobody knows it.
 
@@ -167,7 +187,8 @@ class Context:
         """
         rows = self.rows if rows is None else rows
         self.facts_table.replace(rows, models)
-        self._observation = None
+        self.beliefs.begin(rows, models)
+        self._observation = self._believed = None
         for held in self._held.values():
             held[rows] = False
         for row in rows.tolist():
@@ -181,7 +202,8 @@ class Context:
             rows: The worlds ``(k,)`` that have gone on; by default all. The others are as they were, in the
                 middle of a tick.
         """
-        self._latest, self._observation = observation, None
+        self._latest, self._observation, self._believed = observation, None, None
+        self.beliefs.see(observation)
         self.times = host(observation.time)
         rows = self.rows if rows is None else rows
         for part in self._parts.values():
@@ -199,7 +221,8 @@ class Context:
         """
         size = self.times.dtype.itemsize
         if command.tool is not None:
-            self._parts["tool"].write(command.tool, self.index(rows), leaf, size)
+            tool = command.tool if command.posture is None else _with_posture(command, leaf)
+            self._parts["tool"].write(tool, self.index(rows), leaf, size)
         if command.hand is not None:
             self._parts["hand"].write(command.hand, self.index(rows), leaf, size)
 
@@ -284,10 +307,11 @@ class Context:
         """
         observation, facts, (since,) = self.observation, self.world, sent([elapsed], self.like)
         if len(rows) == self.worlds:
-            return Seen(observation, facts, self.robot, since)
+            return Seen(observation, facts, self.robot, since, believed=self.believed)
         index = self.index(rows)
         picked: Observation = Rows(observation, index.of)  # type: ignore[assignment]
-        return Seen(picked, self.facts_table.taken(index), self.robot, since)
+        taken, believed = self.facts_table.taken(index), self.believed
+        return Seen(picked, taken, self.robot, since, believed=lambda: index.of(believed()))
 
     def index(self, rows: Array) -> Index:
         """What picks some worlds ``(k,)``; numbers that are asked for often go to a device once."""
@@ -343,7 +367,8 @@ class _Part:
                 xp, shape = array_namespace(values), (self._worlds, values.shape[-1])
                 self.values = xp.full(shape, np.nan, dtype=values.dtype, device=values.device)
             width = max(self.values.shape[-1], values.shape[-1])
-            self.values, values = _widened(self.values, width), _widened(values, width)
+            filling = np.nan if self._name == "tool" else 0.0
+            self.values, values = widened(self.values, width, filling), widened(values, width, filling)
             index.put(self.values, values)
         if id(leaf) not in self._numbers:
             self._numbers[id(leaf)] = len(self._leaves)
@@ -364,8 +389,7 @@ class _Part:
         self._by[rows] = NOBODY
 
     def finite(self) -> Array:
-        xp = array_namespace(self.values)
-        return xp.all(xp.isfinite(self.values), axis=-1)
+        return _all_finite(self.values[:, :TOOL] if self._name == "tool" else self.values)
 
     def check(self, finite: np.ndarray) -> None:
         for world in np.flatnonzero(~finite & (self._by != NOBODY)).tolist():
@@ -385,7 +409,7 @@ class _Part:
         if self.writer(world) is None:
             return None
         found = host(self.values[world : world + 1, ...])
-        if not np.isfinite(found).all():
+        if not np.isfinite(found[:, :TOOL] if self._name == "tool" else found).all():
             raise self._not_finite(world)
         return found
 
@@ -409,7 +433,13 @@ class _Part:
 
     def _fits(self, width: int) -> bool:
         """Whether a target may have so many numbers."""
-        return width == TOOL if self._name == "tool" else 0 < width <= self._most
+        return width in (TOOL, self._most) if self._name == "tool" else 0 < width <= self._most
+
+
+def _all_finite(values: Array) -> Array:
+    """Boolean ``(N,)``: all numbers of a row are finite."""
+    xp = array_namespace(values)
+    return xp.all(xp.isfinite(values), axis=-1)
 
 
 def _real(values: Array) -> bool:
@@ -427,21 +457,45 @@ def _floats(values: Array, size: int) -> Array:
     return values if values.dtype == kind else xp.astype(values, kind)
 
 
-def _widened(values: Array, width: int) -> Array:
-    """Targets ``(k, n)`` with so many numbers: a hand target without synergies has them at zero."""
+def widened(values: Array, width: int, filling: float) -> Array:
+    """Targets ``(k, n)`` with so many numbers.
+
+    Args:
+        values: The targets.
+        width: How many numbers.
+        filling: What those are that are missing: a hand target without synergies has them at zero, a tool
+            target without a posture has none.
+    """
     missing = width - values.shape[-1]
-    if not missing:
+    if missing <= 0:
         return values
     xp = array_namespace(values)
-    nothing = xp.zeros((values.shape[0], missing), dtype=values.dtype, device=values.device)
+    nothing = xp.full((values.shape[0], missing), filling, dtype=values.dtype, device=values.device)
     return xp.concat([values, nothing], axis=-1)
 
 
 WANTED = {
-    "tool": "a tool target is (worlds, 7): of each world 7 numbers, position, then quaternion w x y z",
+    "tool": "a tool target is (worlds, 7): of each world 7 numbers, position, then quaternion w x y z; a "
+    "posture beside it has a number for each arm joint",
     "hand": "a hand target is (worlds, n): of each world a row of numbers, the closure first and then "
     "this robot's synergies, {most} at most: hand=closure[..., None]",
 }
+
+
+def _with_posture(command: Command, leaf: Behaviour) -> Array:
+    """The tool targets ``(k, 7)`` of a command and its postures ``(k, n_arm)``, side by side.
+
+    Raises:
+        LeafError: They are not arrays of as many rows.
+    """
+    tool, posture = command.tool, command.posture
+    target, given = (tuple(getattr(part, "shape", ())) for part in (tool, posture))
+    if len(given) != 2 or target != (given[0], TOOL):
+        raise LeafError(
+            f"leaf '{leaf.name}' commands a posture of shape {given} for tool targets of shape "
+            f"{target}: postures are (worlds, arm joints), beside targets (worlds, 7)"
+        )
+    return array_namespace(tool, posture).concat([tool, posture], axis=-1)
 
 
 def _conflict(part: str, first: Behaviour, second: Behaviour) -> CommandConflictError:

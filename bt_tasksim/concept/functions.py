@@ -10,7 +10,9 @@ from typing import Any, ClassVar, Generic, Protocol, cast
 
 from typing_extensions import TypeVar
 
+from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.contact import ContactChange
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.demonstrated import Shown, plain_argument, plain_words
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.parameters import Parameter, declared_parameters
@@ -45,6 +47,10 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
     """Goals that hold after its SUCCESS."""
     ends: ClassVar[tuple[str, ...]] = ()
     """Goals that no longer hold after its SUCCESS."""
+    establishes: ClassVar[tuple[ConditionOf, ...]] = ()
+    """Conditions that hold after its SUCCESS, the strongest first; trees from goals are chained by them."""
+    requires: ClassVar[tuple[ConditionOf, ...]] = ()
+    """Conditions that must hold when it begins, besides the goals that it maintains."""
     default_timeout: ClassVar[float] = 10.0
     """Seconds."""
     default_tolerance: ClassVar[float] = 0.005
@@ -64,11 +70,15 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
     """Seconds after which it fails."""
     tolerance: float
     """Metres within which its goal counts as reached."""
+    patient: bool = True
+    """Its timeout is the usual one: what `planned` says comes on top of it."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        if "carry_out" not in vars(cls) and {"command", "advance"} & vars(cls).keys():
-            cls.carry_out = ConceptFunctions.carry_out  # type: ignore[method-assign]  # asks what is its own
+        doing = {"carry_out", "command", "advance"}
+        last = next(kind for kind in cls.__mro__ if doing & vars(kind).keys())
+        if "carry_out" not in vars(last):
+            cls.carry_out = ConceptFunctions.carry_out  # type: ignore[method-assign]  # asks the other two
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
@@ -104,6 +114,24 @@ class ConceptFunctions(abc.ABC, Generic[MemoryT]):
             NoWayError: There is no way in one of these worlds; then they are asked one by one.
         """
         return cast("MemoryT", None)
+
+    def planned(self, memory: MemoryT) -> Array | float:
+        """Seconds ``(N,)`` that a way takes which had to be searched for.
+
+        They come on top of a timeout that nobody gave.
+        """
+        return 0.0
+
+    def aim(self, view: Any) -> Aim | None:
+        """Where this concept brings its target, for those before it: a grasp has to serve what follows.
+
+        Args:
+            view: One world (`bt_tasksim.concept_nodes.view.WorldView`).
+
+        Returns:
+            None where it brings it nowhere.
+        """
+        return None
 
     def advance(self, action: Array, seen: Seen, memory: MemoryT) -> MemoryT:
         """The memory for the next tick, after the action ``(N, actions)``."""

@@ -118,6 +118,7 @@ class ConceptModel(ConceptFunctions[MemoryT], LeafModel, _CalledConcept):
         settings = {k: kwargs.pop(k, None) for k in ("timeout", "tolerance", "uncertainty")}
         self._bind(args, kwargs, owner)
         self._settings = settings
+        self.patient = settings["timeout"] is None
         self.timeout = _positive(settings["timeout"], self.default_timeout, owner, "timeout")
         self.tolerance = _positive(settings["tolerance"], self.default_tolerance, owner, "tolerance")
         self.uncertainty = _uncertainty(settings["uncertainty"], self.parameters(), owner)

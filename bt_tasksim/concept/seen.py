@@ -5,6 +5,11 @@ They resolve names to columns. All arrays have a leading axis of worlds ``(N, ..
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
 from bt_tasksim.core.bundles import Rows
 from bt_tasksim.core.fact_arrays import ObjectFacts, PlaceFacts
 from bt_tasksim.core.facts import WorldFacts
@@ -23,17 +28,32 @@ class Seen:
         world: What is known beforehand of these worlds.
         robot: The robot.
         elapsed: ``(N,)`` seconds since the concept became active.
+        later: The concepts that come after this one in its tree, in order, where they are known.
+        failures: ``(N,)`` in NumPy: how often this leaf has failed in a row in the episode before it became
+            active; None where nobody has counted.
+        believed: Gives the poses ``(N, n_objects, 7)`` at which the objects are taken to be; by default they
+            are as they were observed.
     """
 
-    __slots__ = ("_derived", "elapsed", "observation", "robot", "world")
+    __slots__ = ("_believed", "_derived", "elapsed", "failures", "later", "observation", "robot", "world")
 
     def __init__(
-        self, observation: Observation, world: WorldFacts, robot: RobotDescription, elapsed: Array
+        self,
+        observation: Observation,
+        world: WorldFacts,
+        robot: RobotDescription,
+        elapsed: Array,
+        later: Sequence[Any] = (),
+        failures: np.ndarray | None = None,
+        believed: Callable[[], Array] | None = None,
     ) -> None:
         self.observation = observation
         self.world = world
         self.robot = robot
         self.elapsed = elapsed
+        self.later = later
+        self.failures = failures
+        self._believed = believed
         self._derived: dict[str, Array] | None = None
 
     def at(self, rows: Array) -> Seen:
@@ -44,7 +64,15 @@ class Seen:
         """
         index = Index(rows)
         picked: Observation = Rows(self.observation, index.of)  # type: ignore[assignment]
-        return Seen(picked, self.world.map(index.of), self.robot, index.of(self.elapsed))
+        return Seen(
+            picked,
+            self.world.map(index.of),
+            self.robot,
+            index.of(self.elapsed),
+            self.later,
+            index.of(self.failures) if self.failures is not None else None,
+            lambda: index.of(self.objects),
+        )
 
     def observable(self, name: str) -> Array:
         """An observable by its name, computed when it is first asked for.
@@ -78,8 +106,21 @@ class Seen:
         """External wrench at the tool ``(N, 6)``."""
         return self.observation.wrench
 
+    @property
+    def objects(self) -> Array:
+        """Poses ``(N, n_objects, 7)`` at which the objects are taken to be; NaN where one was never seen.
+
+        They are as observed, but for what their first sight on a support has shown to be wrong: see
+        `bt_tasksim.concept.beliefs`.
+        """
+        return self.observation.objects if self._believed is None else self._believed()
+
     def object(self, name: str) -> Array:
-        """Estimated pose ``(N, 7)`` of an object; NaN where it was never seen."""
+        """Pose ``(N, 7)`` at which an object is taken to be, see `objects`."""
+        return self.objects[:, self.world.column(name), :]
+
+    def observed(self, name: str) -> Array:
+        """Estimated pose ``(N, 7)`` of an object as it was observed; NaN where it was never seen."""
         return self.observation.objects[:, self.world.column(name), :]
 
     def model(self, name: str) -> ObjectFacts:

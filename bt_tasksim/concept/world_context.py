@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept.beliefs import Beliefs, Believed
 from bt_tasksim.concept.context import NO_EPISODE, Context, Refusal, Written, only_world
 from bt_tasksim.core.facts_table import FactsTable
 from bt_tasksim.core.poses import Array
@@ -60,6 +61,16 @@ class WorldContext(Context):
         if known is None or known[0] is not looked or known[1] is not facts:
             self._arranged = known = looked, facts, facts.arranged(only_world(looked, int(self._row[0])))
         return known[2]
+
+    @property
+    def beliefs(self) -> Beliefs:
+        """See `Context.beliefs`."""
+        return self._batch.beliefs
+
+    @property
+    def believed(self) -> Believed:
+        """See `Context.believed`."""
+        return Believed(self.observation.objects, self.beliefs.of_world(int(self._row[0]))[None])
 
     @property
     def facts_table(self) -> FactsTable:

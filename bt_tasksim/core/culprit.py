@@ -18,14 +18,21 @@ def users_place(error: BaseException) -> str:
     ours has asked a part for an attribute that it lacks, it is the line of the part's class.
 
     Returns:
-        ``my_concept.py:12``, the innermost such line; empty where there is none.
+        ``my_concept.py:12``, or ``cell In[3]:12`` of a notebook, the innermost such line; empty where there
+        is none.
     """
     found, trace = "", error.__traceback__
     while trace is not None:
         if _is_the_users(trace.tb_frame):
-            found = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}"
+            found = f"{_file_name(trace.tb_frame.f_code.co_filename)}:{trace.tb_lineno}"
         trace = trace.tb_next
     return found or (_class_without(error) if isinstance(error, AttributeError) else "")
+
+
+def with_place(error: BaseException) -> str:
+    """An error's sentence, behind the line of a user's file that it comes from where it does not name it."""
+    place = users_place(error)
+    return f"{place}: {error}" if place and place.rpartition(":")[0] not in str(error) else str(error)
 
 
 def place_of(definition: object) -> str:
@@ -34,7 +41,15 @@ def place_of(definition: object) -> str:
         file, line = inspect.getsourcefile(definition), inspect.getsourcelines(definition)[1]  # type: ignore[arg-type]
     except (OSError, TypeError):
         return ""
-    return f"{Path(file).name}:{line}" if file is not None else ""
+    return f"{_file_name(file)}:{line}" if file is not None else ""
+
+
+def _file_name(file: str) -> str:
+    """A file's name; of a cell of a notebook what its reader sees beside it, not the file behind it."""
+    ipython = sys.modules.get("IPython")
+    shell = ipython.get_ipython() if ipython is not None else None
+    named = getattr(getattr(shell, "compile", None), "format_code_name", lambda file: None)(file)
+    return Path(file).name if named is None else " ".join(named).lower().replace("in[", "In[")
 
 
 def _class_without(error: AttributeError) -> str:

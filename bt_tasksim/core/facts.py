@@ -36,6 +36,9 @@ class WorldFacts:
         object_facts: ``(N, n_objects)``.
         place_facts: ``(N, n_places)``.
         obstacle_facts: ``(N, most)``.
+        models: What the facts were made of, for what cannot be computed with arrays, such as the search for a
+            way.
+        numbers: Which of ``models`` each world has ``(N,)``, in NumPy.
     """
 
     columns: Mapping[str, int]
@@ -46,6 +49,8 @@ class WorldFacts:
     object_facts: ObjectFacts
     place_facts: PlaceFacts
     obstacle_facts: ObstacleFacts
+    models: tuple[WorldModel, ...]
+    numbers: np.ndarray
 
     @classmethod
     def of(
@@ -82,7 +87,13 @@ class WorldFacts:
             object_facts=object_facts(worlds, names),
             place_facts=place_facts(worlds, places),
             obstacle_facts=obstacle_facts(worlds),
+            models=tuple(worlds),
+            numbers=np.arange(len(worlds)),
         )
+
+    def model_of(self, world: int) -> WorldModel:
+        """What is known beforehand of one world, with names."""
+        return self.models[int(self.numbers[world])]
 
     @property
     def worlds(self) -> int:
@@ -100,6 +111,8 @@ class WorldFacts:
             self.object_facts.map(change),
             self.place_facts.map(change),
             self.obstacle_facts.map(change),
+            self.models,
+            change(self.numbers),
         )
 
     def sent(self, like: Array) -> WorldFacts:
@@ -124,6 +137,9 @@ class WorldFacts:
         _check_alike(self, other)
 
         index = Index(rows)
+        sources: list[int | None] = [None] * self.worlds
+        for k, row in enumerate(rows.tolist()):
+            sources[row] = k
 
         def bundle(kind: str) -> Any:
             mine, others = getattr(self, kind), getattr(other, kind)
@@ -145,6 +161,9 @@ class WorldFacts:
             bundle("object_facts"),
             bundle("place_facts"),
             bundle("obstacle_facts"),
+            *_gathered(
+                [self.model_of(k) if at is None else other.model_of(at) for k, at in enumerate(sources)]
+            ),
         )
 
     def column(self, name: str) -> int:
@@ -220,7 +239,13 @@ def joined(worlds: Sequence[WorldFacts]) -> WorldFacts:
         join("object_facts"),
         join("place_facts"),
         join("obstacle_facts"),
+        *_gathered([facts.model_of(k) for facts in worlds for k in range(facts.worlds)]),
     )
+
+
+def _gathered(models: Sequence[WorldModel]) -> tuple[tuple[WorldModel, ...], np.ndarray]:
+    """What worlds were made of, one a world, and their numbers."""
+    return tuple(models), np.arange(len(models))
 
 
 def _concatenated(arrays: Sequence[Array], filling: Any) -> Array:

@@ -13,7 +13,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import Any, Generic, Self, TypeVar
 
-from bt_tasksim.core.culprit import users_place
+from bt_tasksim.core.culprit import users_place, with_place
 from bt_tasksim.core.errors import BtTasksimError, InputError, MachineError
 
 StateT = TypeVar("StateT")
@@ -187,6 +187,8 @@ def sendable(error: Exception) -> Exception:
         return InputError(f"{place}: {type(error).__name__}: {error}")
     if not isinstance(error, BtTasksimError):
         return MachineError(f"{error!r}: {traceback.format_exc(limit=-3)}")
+    if type(error) is InputError:
+        return InputError(with_place(error))
     try:
         return copy.copy(error)  # as it is put together again on the other side
     except Exception:  # whatever its constructor asks for

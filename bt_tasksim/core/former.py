@@ -44,7 +44,7 @@ FORMER: Mapping[str, str] = {
     "pacing": "engines.clock",
     "engines.registry": "execution.pipelines",
     "engines.kinematics_pinocchio": "engines.kinematics.pinocchio",
-    "engines.pinocchio_models": "engines.kinematics.models",
+    "engines.pinocchio_models": "robot.kinematics.models",
     "engines.physics_sapien": "engines.physics.sapien",
     "engines.physics_mujoco": "engines.physics.mujoco",
     "engines.mujoco_model": "engines.physics.mujoco_model",

@@ -34,7 +34,8 @@ def renamed_arguments(**former: str) -> Callable[[Callable[P, R]], Callable[P, R
 def renamed_fields(**former: str) -> Callable[[type[T]], type[T]]:
     """A decorator of a dataclass whose fields had other names, given as ``former="present"``.
 
-    Calls may use a former name as a keyword, and read the attribute by it. Where both are given, the former
+    Calls may use a former name as a keyword, and read the attribute by it, unless the class says itself what
+    that is. Where both are given, the former
     one counts, since `dataclasses.replace` gives the present one always.
     """
 
@@ -42,7 +43,8 @@ def renamed_fields(**former: str) -> Callable[[type[T]], type[T]]:
         made: Callable[..., None] = cls.__dict__["__init__"]
         setattr(cls, "__init__", renamed_arguments(**former)(made))  # noqa: B010 - no method to mypy
         for old, new in former.items():
-            setattr(cls, old, property(operator.attrgetter(new)))
+            if old not in cls.__dict__:
+                setattr(cls, old, property(operator.attrgetter(new)))
         _FORMER[cls] = former
         return cls
 

@@ -9,11 +9,28 @@ stand in `WorldModel`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.poses import Array
+
+
+class KnownGeometry(Protocol):
+    """The geometry that an object is taken to have; made when somebody asks."""
+
+    @property
+    def pieces(self) -> tuple[Array, ...]:
+        """Corners ``(n, 3)`` of convex pieces that together are the solid, object's frame, metres."""
+
+    @property
+    def grips(self) -> Any:
+        """Where two fingers may hold it: `bt_tasksim.scene.grips.Grips`."""
+
+    @property
+    def given(self) -> Sequence[Any]:
+        """Those of them that somebody gave; where there are any, it is held there and nowhere else."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +44,11 @@ class ObjectModel:
             box's centre, z points up when the object stands.
         symmetry: Order of the rotational symmetry about z (2: looks the same after half a turn); 0 for a
             body of revolution.
-        cubic: The object looks the same on each of its faces (a cube), so any face may be down.
         grasp_axes: Directions ``(k, 3)`` in the object's frame along which two fingers may close on it,
             best first; a body of revolution has one and may turn it about z at will.
         grasp_widths: Widths ``(k,)`` in metres between the surfaces along these directions.
+        cubic: The object looks the same on each of its faces (a cube), so any face may be down.
+        solid: Its geometry as it is known; None where nothing but the box is.
     """
 
     name: str
@@ -40,6 +58,7 @@ class ObjectModel:
     grasp_axes: tuple[tuple[float, float, float], ...]
     grasp_widths: tuple[float, ...]
     cubic: bool = False
+    solid: KnownGeometry | None = None
 
 
 @dataclass(frozen=True)
@@ -214,16 +233,18 @@ class Command:
     Attributes:
         tool: ``(..., 7)`` tool-pose target, robot base frame.
         hand: ``(..., 1 + n_synergies)`` closure in [0, 1], then the synergies that the robot declares.
+        posture: ``(..., n_arm)`` joints to hold the tool with, as a planned way gives them; NaN, or None,
+            where the kinematics engine may choose. It belongs to ``tool`` and counts for nothing without it.
     """
 
     tool: Array | None = None
     hand: Array | None = None
+    posture: Array | None = None
 
     def over(self, other: Command) -> Command:
         """This command, with the parts that it lacks taken from ``other``."""
-        return Command(
-            other.tool if self.tool is None else self.tool, other.hand if self.hand is None else self.hand
-        )
+        held = other if self.tool is None else self
+        return Command(held.tool, other.hand if self.hand is None else self.hand, held.posture)
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,8 +94,10 @@ CAMERAS: dict[str, CameraSpec] = {
     "overview": CameraSpec((-0.66, 1.30, 1.16), (0.38, 0.0, 0.30), field_of_view=math.radians(43.0)),
     # To the left of the workspace, so that the arm in its rest posture hides nothing of table and shelf.
     "scene": CameraSpec((0.05, 0.95, 1.25), (0.53, -0.05, 0.27), field_of_view=math.radians(46.0)),
+    # And to its right: a shelf on the left shows the other one its back.
+    "scene_right": CameraSpec((0.05, -0.95, 1.25), (0.53, 0.05, 0.27), field_of_view=math.radians(46.0)),
 }
-"""Cameras of every scene: one for people, one for perception (RGB-D, fixed beside the robot)."""
+"""Cameras of every scene: one for people, two for perception (RGB-D, fixed beside the robot)."""
 
 
 def project(camera: CameraModel, point: Array) -> tuple[Array, Array]:

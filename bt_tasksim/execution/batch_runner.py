@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Self
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -18,6 +17,7 @@ from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.concept.world_context import WorldContext
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING
+from bt_tasksim.core.closing import Closing
 from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.core.outcomes import FAILED, TIME_OVER, Outcome
 from bt_tasksim.core.poses import Array
@@ -33,6 +33,7 @@ from bt_tasksim.execution.runner import LONGEST, NOT_JUDGED, QUIET, SETTLE, Runn
 from bt_tasksim.execution.worlds import BatchWorlds, Unreached, hidden_of
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.moments import Moments
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.scene.success import at_rest, evaluate_success
 
@@ -47,6 +48,7 @@ class _Episode:
     configuration: ActorConfiguration
     world: WorldModel
     began: float
+    moments: Moments
     status: Status = Status.INVALID
     outcome: Outcome | None = None
     leaf: str = ""
@@ -54,7 +56,7 @@ class _Episode:
     sim_time: float = 0.0
 
 
-class BatchRunner:
+class BatchRunner(Closing):
     """Runs one tree in one scene, in many worlds at once; behind ``with`` it closes itself.
 
     What becomes of a seed does not depend on the others, nor on how many worlds or threads there are: it is
@@ -154,17 +156,11 @@ class BatchRunner:
         """Let go of worlds and threads."""
         self.worlds.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """See `close`."""
-        self.close()
-
     # ---- one control period ------------------------------------------------------------------------------
 
     def _period(self, waiting: Iterator[int], stream: str) -> Iterator[tuple[int, Result | BtTasksimError]]:
         """Tick, judge what has come to rest, begin anew there, and let all others go on by one period."""
+        self._look()
         try:
             self._tick()
             written = self.context.written
@@ -195,6 +191,19 @@ class BatchRunner:
         if len(seen):
             self.context.advance(self.worlds.observe(seen), seen)
         self.context.refused.update(refused)
+
+    def _look(self) -> None:
+        """Look whether goals that have to be true once are so now."""
+        watched = {
+            row: episode
+            for row, episode in enumerate(self._episodes)
+            if episode is not None and episode.moments.open
+        }
+        if not watched:
+            return
+        hidden = self.worlds.hidden(np.array(list(watched)))
+        for k, episode in enumerate(watched.values()):
+            episode.moments.look(_state_of(episode, hidden, k))
 
     def _tick(self) -> None:
         """Tick all worlds whose tree has not ended; those whose tree ends now come to rest."""
@@ -249,8 +258,7 @@ class BatchRunner:
 
     def _result(self, episode: _Episode, hidden: Hidden, row: int) -> Result:
         drawn, status = episode.configuration, episode.status
-        state = hidden_of(hidden, row, len(drawn.objects), len(drawn.fixtures))
-        verdict = evaluate_success(drawn, episode.world, state)
+        verdict = evaluate_success(drawn, episode.world, _state_of(episode, hidden, row), episode.moments)
         outcome = verdict.outcome if status == Status.SUCCESS else episode.outcome
         return Result(
             status=status,
@@ -307,7 +315,7 @@ class BatchRunner:
         self.context.begin(models, rows)
         now = time.perf_counter()
         for (row, seed), configuration, model in zip(drawn, worlds, models, strict=True):
-            self._episodes[row] = _Episode(seed, configuration, model, now)
+            self._episodes[row] = _Episode(seed, configuration, model, now, Moments(configuration, model))
             self._phase[row] = TICKING
 
     def _broken(self, rows: Array) -> Iterator[tuple[int, Result | BtTasksimError]]:
@@ -330,8 +338,7 @@ class BatchRunner:
         seeds = [episode.seed for episode in self._episodes if episode is not None]
         self.batch.reset(np.arange(self.context.worlds))
         self._phase[:], self._episodes = IDLE, [None] * self.context.worlds
-        runner = Runner(self._build, self.scene, self.options, longest=self.longest)
-        try:
+        with Runner(self._build, self.scene, self.options, longest=self.longest) as runner:
             for seed in seeds:
                 try:
                     if self.batch.unknown:
@@ -341,5 +348,9 @@ class BatchRunner:
                     raise
                 except BtTasksimError as found:
                     yield seed, found
-        finally:
-            runner.pipeline.close()
+
+
+def _state_of(episode: _Episode, hidden: Hidden, row: int) -> Hidden:
+    """The hidden state of one episode, by its row."""
+    drawn = episode.configuration
+    return hidden_of(hidden, row, len(drawn.objects), len(drawn.fixtures))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import signal
 from collections.abc import Generator
-from typing import Any
+from typing import Any, NoReturn
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -46,12 +46,7 @@ def ticking(tree: Behaviour) -> Generator[Behaviour, None, None]:
     try:
         yield from tree.tick()
     except BaseException as error:
-        culprit = _raising_leaf(error, tree)
-        end_all(tree, culprit)
-        closed = isinstance(error, GeneratorExit) and culprit is None
-        if isinstance(error, BtTasksimError) or closed or not is_leafs(error):
-            raise
-        raise leaf_error(error, tree if culprit is None else culprit) from error
+        _give_up(error, tree)
 
 
 def stop(tree: Behaviour) -> None:
@@ -63,11 +58,7 @@ def stop(tree: Behaviour) -> None:
     try:
         tree.stop(Status.INVALID)
     except BaseException as error:
-        culprit = _raising_leaf(error, tree)
-        end_all(tree, culprit)
-        if isinstance(error, BtTasksimError) or not is_leafs(error):
-            raise
-        raise leaf_error(error, tree if culprit is None else culprit) from error
+        _give_up(error, tree)
 
 
 def clear(tree: Behaviour) -> None:
@@ -93,10 +84,25 @@ def end_all(tree: Behaviour, culprit: Behaviour | None = None) -> None:
                 node.iterator = node.tick()
 
 
+def _give_up(error: BaseException, tree: Behaviour) -> NoReturn:
+    """End every node of a tree out of which an exception came, and raise it, as the error of its leaf's.
+
+    Raises:
+        BaseException: Always.
+    """
+    culprit = _raising_leaf(error, tree)
+    end_all(tree, culprit)
+    closed = isinstance(error, GeneratorExit) and culprit is None
+    if isinstance(error, BtTasksimError) or closed or not is_leafs(error):
+        raise error
+    raise leaf_error(error, tree if culprit is None else culprit) from error
+
+
 def no_status(node: Behaviour) -> LeafError:
     """The error that a tree has no status after its tick, as py_trees gives none to what returned none."""
+    whose = ", ".join(filter(None, (type(node).__name__, place_of(type(node)))))
     return LeafError(
-        f"leaf '{node.name}' ({type(node).__name__}) has no status after its tick: update returns RUNNING, "
+        f"leaf '{node.name}' ({whose}) has no status after its tick: update returns RUNNING, "
         "SUCCESS or FAILURE of py_trees.common.Status"
     )
 

@@ -34,8 +34,9 @@ from bt_tasksim.execution.runner import LONGEST
 from bt_tasksim.policy.library import PROGRAMMED, is_bundled
 from bt_tasksim.policy.policy import concept_name
 from bt_tasksim.robot.description import load_robot
-from bt_tasksim.scene.configuration import ActorConfiguration, Disturbance, ObjectActor
+from bt_tasksim.scene.configuration import ActorConfiguration, Disturbance, ObjectActor, goals_in
 from bt_tasksim.scene.fixtures import Box, Fixture, FixturePlace
+from bt_tasksim.scene.goal_functions import GoalFunction
 from bt_tasksim.scene.specs import Goal
 from bt_tasksim.trees.load import Leaves
 from bt_tasksim.trees.walk import nodes_of
@@ -256,7 +257,8 @@ _PARTS: Mapping[type, Mapping[str, type]] = {
         "objects": ObjectActor,
         "fixtures": Fixture,
         "places": PlaceModel,
-        "goal": Goal,
+        "goals": Goal,
+        "functions": GoalFunction,
         "disturbance": Disturbance,
     },
     Fixture: {"boxes": Box, "places": FixturePlace},
@@ -297,6 +299,8 @@ def _with_defaults(kind: Any, data: Any) -> Any:
     }
     for name, value in with_present_names(data, former_names(kind)).items():
         part = parts.get(name)
+        if name == "goals":
+            value = list(goals_in(value))
         if part is not None and isinstance(value, list):
             value = [_with_defaults(part, v) for v in value]
         elif part is not None:

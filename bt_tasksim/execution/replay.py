@@ -102,7 +102,7 @@ def replay(
         world = runner.reset(recorded.configuration)
         result = runner.finish(recorded.configuration, world, record=recorder)
     finally:
-        runner.pipeline.close()
+        runner.close()
     repeated = recorder.demonstration(result)
     before, now = recorded.versions, versions(runner.robot)
     now |= {f"policy of '{leaf}'": name for leaf, name in result.policies.items()}

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from py_trees.common import Status
 
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.markup import html_pairs
 from bt_tasksim.core.outcomes import Outcome
+from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.clock import Timing
+from bt_tasksim.execution.paths import Paths
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.success import NO_GOAL, Verdict
 
@@ -33,6 +37,8 @@ class Result:
         policies: Policy in use by leaf.
         configuration: The world as drawn.
         timing: How well the control rate was kept; None where there was none to keep.
+        paths: Where everything was at every tick; None where nobody kept it, as in a batch. Read it by
+            `times`, `path` and `poses`.
     """
 
     status: Status
@@ -47,6 +53,49 @@ class Result:
     policies: dict[str, str]
     configuration: ActorConfiguration
     timing: Timing | None = None
+    paths: Paths | None = field(default=None, compare=False)
+
+    @property
+    def times(self) -> Array:
+        """Seconds ``(N,)`` since the episode began: of each tick, and of each period until all was at rest.
+
+        Raises:
+            InputError: See `path`.
+        """
+        return self._paths.times
+
+    def path(self, name: str) -> Array:
+        """Poses ``(N, 7)`` of an object at `times`, or of the tool by the name ``tool``, robot base frame.
+
+        In simulation they are the true ones; on a robot those of objects are as estimated.
+
+        Raises:
+            InputError: There is no such object, or no paths were kept.
+        """
+        return self._paths.of(name)
+
+    @property
+    def poses(self) -> Mapping[str, Array]:
+        """The last pose ``(7,)`` of each object, and of the ``tool``, see `path`.
+
+        Raises:
+            InputError: See `path`.
+        """
+        return self._paths.last
+
+    @property
+    def _paths(self) -> Paths:
+        if self.paths is None:
+            raise InputError(
+                "this result keeps no paths: those of a batch, and of a run that broke off, have none; "
+                "run this seed by itself, with run() or Session"
+            )
+        return self.paths
+
+    @property
+    def judged(self) -> bool:
+        """The physics state was asked whether all goals are reached; else the tree's own word was taken."""
+        return self.verdict is not None and self.verdict.judged
 
     @property
     def reason(self) -> str:

@@ -3,7 +3,8 @@
 Besides what every demonstration holds, a run's log has, one row a tick:
 
 - ``observations/*``: the fields of `Observation`;
-- ``commands/tool`` and ``commands/hand``: what the tree wrote, NaN where it wrote nothing;
+- ``commands/tool``, ``commands/posture`` and ``commands/hand``: what the tree wrote, NaN where it wrote
+  nothing;
 - ``state/*``: joint positions, velocities and efforts, and in simulation object poses and velocities, exactly
   as the engine gave them;
 - ``tree/status`` ``(T, nodes)``: 0 not active, 1 running, 2 success, 3 failure;
@@ -44,9 +45,9 @@ from bt_tasksim.trees.walk import nodes_of
 STATUSES = {Status.INVALID: 0, Status.RUNNING: 1, Status.SUCCESS: 2, Status.FAILURE: 3}
 """Numbers in ``tree/status``."""
 ABOUT = frozenset((
-    "status", "success", "reason", "why", "leaf", "outcome", "scenario", "seed", "stream", "robot", "engines",
-    "perception", "options", "longest", "policies", "control_steps", "control_frequency", "sim_time",
-    "wall_time", "timing", "verdict", "versions",
+    "status", "success", "judged", "reason", "why", "leaf", "outcome", "scenario", "seed", "stream", "robot",
+    "engines", "perception", "options", "longest", "policies", "control_steps", "control_frequency",
+    "sim_time", "wall_time", "timing", "verdict", "versions",
 ))  # fmt: skip
 """What a log says about a run, see `about`."""
 STATE = ("joint_position", "joint_velocity", "joint_effort", "objects", "velocities")
@@ -91,6 +92,8 @@ class RunRecorder:
         for name in _OBSERVED:
             self._keep(f"observations/{name}", getattr(observation, name))
         self._keep("commands/tool", np.full(7, np.nan) if step.command.tool is None else step.command.tool)
+        arm = step.command.posture
+        self._keep("commands/posture", np.full_like(observation.arm_position, np.nan) if arm is None else arm)
         hand = step.command.hand
         self._keep("commands/hand", [math.nan] if hand is None else hand)
         if state is not None:
@@ -256,6 +259,7 @@ def about(result: Result, runner: Runner, scenario: str) -> dict[str, Any]:
     return {
         "status": result.status.name,
         "success": result.success,
+        "judged": result.judged,
         "reason": result.reason,
         "why": result.why,
         "leaf": result.leaf,

@@ -8,7 +8,7 @@ state (`bt_tasksim.scene.success`).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from contextlib import nullcontext
 from dataclasses import dataclass
 
@@ -18,6 +18,7 @@ from py_trees.common import Status
 from bt_tasksim.concept.context import Context, one_world
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.reporting import as_statement, speaker, whole_outcome
+from bt_tasksim.core.closing import Closing
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
 from bt_tasksim.core.interrupts import ending, terminable
 from bt_tasksim.core.outcomes import (
@@ -33,11 +34,13 @@ from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
 from bt_tasksim.execution.blackboard import WorldBlackboard
 from bt_tasksim.execution.leaf_errors import clear, end_all, no_status, set_up, ticking
+from bt_tasksim.execution.paths import PathKeeper
 from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
 from bt_tasksim.execution.result import Result
 from bt_tasksim.hardware.safety.stop import SafetyStop
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.moments import Moments
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.scene.success import Verdict, at_rest, evaluate_success
 
@@ -47,6 +50,8 @@ SAFETY_STOP = register_reason("safety_stop", "safety stop, {arm}")
 
 LONGEST = 120.0
 """Seconds of an episode after which it is stopped."""
+BROKEN_OFF = "the run was ended before its tree"
+"""What a robot is told that has to hold since nobody asks for the next control period."""
 QUIET = 4
 """Control periods in a row in which everything is at rest, after which an outcome is judged."""
 SETTLE = 4.0
@@ -63,7 +68,7 @@ class Step:
     pipeline: EnginePipeline
 
 
-class Runner:
+class Runner(Closing):
     """Runs one tree in one scene.
 
     Each episode has a blackboard of py_trees of its own, which begins with what stands on the process's one.
@@ -131,12 +136,6 @@ class Runner:
         """Close the engines."""
         self.pipeline.close()
 
-    def __enter__(self) -> Runner:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.close()
-
     def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:
         """Draw a world, reset the engines and the tree."""
         configuration = self.scene.sample(seed, stream)
@@ -151,6 +150,7 @@ class Runner:
         self.blackboard = WorldBlackboard(self._planted)
         self.context.ask_hidden = self._hidden
         self.context.begin([world])
+        self._moments = Moments(configuration, world)
         self._observed(self.pipeline.reset(configuration, world))
         return world
 
@@ -158,6 +158,8 @@ class Runner:
         """Go on to the next tick with what is seen now."""
         self.observation = observation
         self.context.advance(one_world(observation))
+        if self._moments.open and (hidden := self.pipeline.hidden()) is not None:
+            self._moments.look(hidden)
 
     def _hidden(self, rows: Array | None = None) -> Hidden | None:
         """What only a simulator knows, ``(1, ...)``."""
@@ -193,28 +195,55 @@ class Runner:
 
         However it ends, every node has ended then, and a real robot holds.
         """
-        started = time.perf_counter() if started is None else started
-        with self.blackboard:
-            return self._finished(configuration, world, started, record)
+        periods = self.periods(configuration, world, started, record)
+        try:
+            with self.blackboard:
+                while True:
+                    next(periods)
+        except StopIteration as end:
+            result: Result = end.value
+            return result
+        finally:
+            periods.close()
 
-    def _finished(
+    def periods(
         self,
         configuration: ActorConfiguration,
         world: WorldModel,
-        started: float,
-        record: Callable[[Step], None] | None,
-    ) -> Result:
+        started: float | None = None,
+        record: Callable[[Step], None] | None = None,
+    ) -> Generator[None, None, Result]:
+        """What `finish` does, one control period at a time.
+
+        Whoever asks for the next period enters `blackboard`. Closed before its end, it ends every node, and a
+        real robot holds.
+
+        Yields:
+            Nothing, after every period but the one in which the tree ends.
+        """
         pipeline, tree = self.pipeline, self.tree
+        started = time.perf_counter() if started is None else started
+        keeper = PathKeeper([actor.name for actor in configuration.objects])
+
+        def kept(step: Step) -> None:
+            keeper.add(pipeline.state, step.observation)
+            if record is not None:
+                record(step)
+
         try:
-            steps, stopped, leaf = self._loop(configuration, record)
+            steps, stopped, leaf = yield from self._loop(configuration, kept)
             status = tree.status
             sim_time, timing = self.context.now, pipeline.timing()
-            verdict = self._settle_and_judge(configuration, world, record)
+            verdict = self._settle_and_judge(configuration, world, kept)
             pipeline.stop("the run is over")
         except BaseException as error:
             with ending():
                 try:
-                    pipeline.stop(f"{type(error).__name__}: {error}".removesuffix(": "))
+                    pipeline.stop(
+                        BROKEN_OFF
+                        if isinstance(error, GeneratorExit)
+                        else f"{type(error).__name__}: {error}".removesuffix(": ")
+                    )
                 finally:
                     end_all(tree)
             if pipeline.real and isinstance(error, KeyboardInterrupt):
@@ -239,6 +268,7 @@ class Runner:
             policies=self._policies(),
             configuration=configuration,
             timing=timing,
+            paths=keeper.paths(),
         )
 
     def broken_off(self, steps: int, error: BtTasksimError | None = None) -> Result:
@@ -273,8 +303,8 @@ class Runner:
         }
 
     def _loop(
-        self, configuration: ActorConfiguration, record: Callable[[Step], None] | None
-    ) -> tuple[int, Outcome | None, Behaviour | None]:
+        self, configuration: ActorConfiguration, record: Callable[[Step], None]
+    ) -> Generator[None, None, tuple[int, Outcome | None, Behaviour | None]]:
         """Tick and step until the tree ends or is ended.
 
         Returns:
@@ -284,8 +314,7 @@ class Runner:
         steps, limit = 0, round(self.longest * configuration.control_frequency)
         while True:
             command = self.tick()
-            if record is not None:
-                record(Step(self.observation, command, tree.status, pipeline))
+            record(Step(self.observation, command, tree.status, pipeline))
             if tree.status != Status.RUNNING:
                 return steps, None, None
             if steps >= limit:
@@ -298,6 +327,7 @@ class Runner:
                 end_all(tree)
                 return steps, SAFETY_STOP(stop.outcome, arm=_holding(pipeline)), leaf
             steps += 1
+            yield
 
     def step(self, command: Command) -> None:
         """Carry a command out for one control period, and observe.
@@ -344,7 +374,7 @@ class Runner:
         return outcome if unseen is None else outcome.with_detail(as_statement(unseen))
 
     def _settle_and_judge(
-        self, configuration: ActorConfiguration, world: WorldModel, record: Callable[[Step], None] | None
+        self, configuration: ActorConfiguration, world: WorldModel, record: Callable[[Step], None]
     ) -> Verdict | None:
         pipeline = self.pipeline
         own = pipeline.verdict()
@@ -364,11 +394,10 @@ class Runner:
                 break
             except SafetyStop:  # the guard brakes from the next step on
                 continue
-            if record is not None:
-                record(Step(self.observation, Command(), self.tree.status, pipeline))
+            record(Step(self.observation, Command(), self.tree.status, pipeline))
             hidden = pipeline.hidden()
             assert hidden is not None
-        return evaluate_success(configuration, world, hidden)
+        return evaluate_success(configuration, world, hidden, self._moments)
 
 
 def _holding(pipeline: EnginePipeline) -> str:

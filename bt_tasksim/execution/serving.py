@@ -45,7 +45,7 @@ def serve(
         from bt_tasksim.engines.remote.keys import SERVER, load_key
         from bt_tasksim.engines.remote.refusals import RefusalLog
         from bt_tasksim.engines.remote.server import EngineServer, check_address
-        from bt_tasksim.engines.remote.session import Session
+        from bt_tasksim.engines.remote.session import ServedSession
     except ImportError as error:
         raise MachineError(
             f"serving an engine needs the extra 'remote' ({error}): pip install 'bt-tasksim[remote]'"
@@ -62,7 +62,7 @@ def serve(
     description = load_robot(robot)
     refused = RefusalLog(complain)
     engine = build_engine(role, name, description)
-    session = Session(engine, role, name, description, objects, refused)
+    session = ServedSession(engine, role, name, description, objects, refused)
     server = EngineServer(session, address, own, refused)
     try:
         say(f"serving {server.sentence}")

@@ -12,12 +12,13 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from bt_tasksim.concept.context import widened
 from bt_tasksim.core.available_memory import available_memory
 from bt_tasksim.core.columns import with_rows
 from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.transfer import Index, fetched, sent
-from bt_tasksim.core.world import Command, Hidden, Observation, WorldState
+from bt_tasksim.core.world import Hidden, Observation, WorldState
 from bt_tasksim.engines.base import PhysicsEngine, engine_class
 from bt_tasksim.engines.kinematics.batch import BatchKinematics
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
@@ -219,7 +220,7 @@ class BatchWorlds(Worlds):
         self._arm = PinocchioKinematics(robot)
         self._perception = BatchState(robot, count, noise_model(options.noise))
         self._unplaced: dict[int, BtTasksimError] = {}
-        self._tool = self._nobody(7)
+        self._tool = self._nobody(7 + len(robot.arm_joints))
         self._hand = self._nobody(1 + len(robot.synergies))
 
     def _nobody(self, width: int) -> Array:
@@ -285,11 +286,12 @@ class BatchWorlds(Worlds):
         xp, index = array_namespace(self._like), Index(rows)
         asked_tool, asked_hand = index.of(self._tool), index.of(self._hand)
         if tool is not None:
-            asked_tool = xp.where(xp.isnan(tool), asked_tool, tool)
+            tool = widened(tool, asked_tool.shape[-1], np.nan)
+            asked_tool = xp.where(xp.isnan(tool[:, :1]), asked_tool, tool)
         if hand is not None:
             asked_hand = _hands(asked_hand, hand)
         state = self.physics.state(rows)
-        target, failures = self.kinematics.solve(Command(asked_tool, asked_hand), state, rows)
+        target, failures = self.kinematics.track(asked_tool, asked_hand, state.joint_position, rows)
         unreached: list[Unreached] = []
         if failures:
             failed = np.flatnonzero(failures.mask)
@@ -298,10 +300,11 @@ class BatchWorlds(Worlds):
                 assert error is not None
                 unreached.append(Unreached(int(rows[k]), error))
             these, last = Index(failed), Index(rows[failed])
-            kept = Command(last.of(self._tool), last.of(self._hand))
-            these.put(asked_tool, kept.tool)
-            these.put(asked_hand, kept.hand)
-            again, _ = self.kinematics.solve(kept, self.physics.state(last.rows), last.rows)
+            tool_before, hand_before = last.of(self._tool), last.of(self._hand)
+            these.put(asked_tool, tool_before)
+            these.put(asked_hand, hand_before)
+            joints = self.physics.state(last.rows).joint_position
+            again, _ = self.kinematics.track(tool_before, hand_before, joints, last.rows)
             position, velocity = (xp.asarray(x, copy=True) for x in (target.position, target.velocity))
             these.put(position, again.position)
             these.put(velocity, again.velocity)

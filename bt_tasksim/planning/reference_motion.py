@@ -28,10 +28,16 @@ class Path(NamedTuple):
     Attributes:
         table: Poses ``(N, n, 7)`` at equal steps of the path's own parameter in [0, 1].
         duration: ``(N,)`` seconds.
+        joints: ``(N, n, n_arm)`` the arm's joints there, where a way was searched for; else NaN. None: there
+            is no such way in any world.
+        even: Boolean ``(N,)``: the parameter is the share of the time; else it follows a minimum-jerk law.
+            None: the law in all worlds.
     """
 
     table: Array
     duration: Array
+    joints: Array | None = None
+    even: Array | None = None
 
 
 def minimum_jerk(fraction: Array) -> Array:
@@ -101,12 +107,37 @@ def plan(
 def sample(path: Path, time: Array) -> Array:
     """Poses ``(N, 7)`` of paths at ``time (N,)`` seconds since their begin; they stay at their ends."""
     table = path.table
-    xp = array_namespace(table)
-    n = table.shape[1]
-    place = minimum_jerk(poses.clip(time / path.duration, 0.0, 1.0)) * (n - 1)
+    index, share = _between(path, time)
+    return poses.interpolate(take_rows(table, index), take_rows(table, index + 1), share)
+
+
+def posture(path: Path, time: Array) -> Array | None:
+    """Joints ``(N, n_arm)`` of the arm on paths at ``time (N,)``, NaN where they may be any; see `sample`."""
+    if path.joints is None:
+        return None
+    index, share = _between(path, time)
+    first, last = take_rows(path.joints, index), take_rows(path.joints, index + 1)
+    return first + share[:, None] * (last - first)
+
+
+def searched_for(path: Path) -> Array | float:
+    """Seconds ``(N,)`` that paths take which were searched for; others count as none."""
+    if path.even is None:
+        return 0.0
+    xp = array_namespace(path.duration)
+    return xp.where(path.even, path.duration, xp.zeros_like(path.duration))
+
+
+def _between(path: Path, time: Array) -> tuple[Array, Array]:
+    """Numbers ``(N,)`` of the rows before these times, and shares ``(N,)`` of the way to the next ones."""
+    xp, n = array_namespace(path.table), path.table.shape[1]
+    fraction = poses.clip(time / path.duration, 0.0, 1.0)
+    place = minimum_jerk(fraction)
+    if path.even is not None:
+        place = xp.where(path.even, fraction, place)
+    place = place * (n - 1)
     before = poses.clip(xp.floor(place), 0.0, n - 2.0)
-    index = xp.astype(before, xp.int64)
-    return poses.interpolate(take_rows(table, index), take_rows(table, index + 1), place - before)
+    return xp.astype(before, xp.int64), place - before
 
 
 def _summed(steps: Array) -> Array:

@@ -1,214 +1,336 @@
-"""Collision-free ways for a hand that carries something, among boxes.
+"""Ways for an arm and what its hand holds, clear of everything that is known to be around.
 
-The hand and what it holds are boxes that move with the tool; coal answers whether they touch an obstacle. A
-straight way is tried first, then the way out of and into fixtures along their access, then a shortest path
-on a lattice of tool positions (Hart, Nilsson and Raphael, "A formal basis for the heuristic determination of
-minimum cost paths", 1968, by networkx). Everything is deterministic.
+A straight way of the tool is taken where it is clear, for it is what people expect and costs next to nothing;
+else one by given poses on the way, such as out of a shelf and into another one; else one that is searched for
+in the space of the arm's joints (`bt_tasksim.planning.search`).
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
 
-import networkx as nx
 import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import Obstacle
+from bt_tasksim.planning.arm import FULL, LEANS, SWAYS, arm_of
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.collision import Collisions
+from bt_tasksim.planning.lines import STEP, line
+from bt_tasksim.planning.route import Pace, Route, timed
+from bt_tasksim.planning.search import Search
+from bt_tasksim.planning.things import Held, Leave, Thing, Touch, inner
+from bt_tasksim.robot.description import RobotDescription
 
-MARGIN = 0.012
-"""Metres of free space kept around everything."""
-_STEP = 0.02
-_CELL = 0.05
+_TURNING = 0.2
+"""Radians between poses of a straight way at which joints are computed."""
+FINER = 0.25
+"""Share of a search's steps at which its way is looked at in the end, and at which it is searched for once
+more if something is touched there: margins are less than an outstretched arm moves in one step."""
+CLOSELY = 0.01
+"""An arm with too few joints to follow any line is asked every so many metres whether it does."""
+LEAVING = 0.25
+"""Radians of any joint from where a way begins within which it may be as close to things as there."""
+LESS = (0.7, 0.4, 0.2)
+"""Shares of their margins that are tried for things within whose margins a way begins."""
+_UNLIKE = 0.2
+"""Radians by which postures at one pose differ to be worth trying both."""
+_LEANING = 0.5
+"""Radians by which what is held may lean more on its way than at its ends."""
 
 
-@dataclass(frozen=True)
-class Carried:
-    """What moves with the tool.
+class Ends(NamedTuple):
+    """Postures at poses that were asked for.
 
     Attributes:
-        hand: Boxes ``(pose (7,), full size (3,))`` in the tool frame.
-        extent: Full size ``(3,)`` of the held object's bounding box, metres.
-        grip: Pose ``(7,)`` of the object in the tool frame.
+        joints: ``(k, n_arm)``.
+        reached: Booleans ``(k,)``: they bring the tool there.
+        free: Booleans ``(k,)``: they do, and nothing is touched.
     """
 
-    hand: Sequence[tuple[Array, tuple[float, float, float]]]
-    extent: tuple[float, float, float]
-    grip: Array
+    joints: Array
+    reached: Array
+    free: Array
 
 
-def clear_path(
-    start: Array,
-    goal: Array,
-    carried: Carried,
-    obstacles: Sequence[Obstacle],
-    exits: tuple[Array, Array] | None = None,
-) -> list[Array]:
-    """Tool poses from start to goal, joined by clear straight lines.
+class WayFinder:
+    """Ways of one arm in one world, as everything stands at one moment.
+
+    What is touched at the beginning already may be left on the way, since that is how things are: nothing
+    else would find a way out. It counts at the end.
 
     Args:
-        start: Tool pose ``(7,)``.
-        goal: Tool pose ``(7,)``.
-        carried: What moves with the tool.
-        obstacles: What to keep clear of.
-        exits: Displacements ``(3,)`` that take the tool out of the fixture it starts in and out of the one
-            it ends in.
-
-    Raises:
-        NoWayError: No way was found.
-    """
-    checker = _Checker(carried, obstacles)
-    if checker.clear(start, goal):
-        return [start, goal]
-    if exits is not None:
-        out, into = start.copy(), goal.copy()
-        out[:3] += exits[0]
-        into[:3] += exits[1]
-        middle = [p for p, e in ((out, exits[0]), (into, exits[1])) if float(np.abs(e).sum()) > 0]
-        for way in _between(start, middle, goal):
-            if checker.clear_way(way):
-                return way
-    return _lattice(start, goal, checker)
-
-
-def _between(start: Array, middle: list[Array], goal: Array) -> list[list[Array]]:
-    plain = [start, *middle, goal]
-    ways = [plain]
-    high = max(float(p[2]) for p in plain) + 0.05
-    lifted = []
-    for p in middle or (start, goal):
-        q = p.copy()
-        q[2] = high
-        lifted.append(q)
-    ways.append([start, *lifted, goal])
-    return ways
-
-
-class _Checker:
-    """Says whether the hand and what it holds touch an obstacle.
-
-    Which boxes are so far from an obstacle that they cannot touch it is seen for many tool poses at once;
-    coal is asked about the others.
+        robot: The robot.
+        joints: The arm's ``(n_arm,)``, where the way begins.
+        hand: The hand's ``(n_hand,)`` on the way.
+        things: What to keep clear of.
+        held: What is in the hand.
+        leave: What may touch.
     """
 
-    def __init__(self, carried: Carried, obstacles: Sequence[Obstacle]) -> None:
-        import coal
+    def __init__(
+        self,
+        robot: RobotDescription,
+        joints: Array,
+        hand: Array,
+        things: Sequence[Thing],
+        held: Held | None = None,
+        leave: Leave | None = None,
+    ) -> None:
+        self.arm = arm_of(robot)
+        self.start = np.clip(joints, robot.arm_lower, robot.arm_upper)
+        self._robot, self._held = robot, held
+        self._hand, self._things, self._leave = hand, things, leave or Leave()
 
-        self._coal = coal
-        boxes = [*carried.hand, (carried.grip, carried.extent)]
-        self._local = np.array([poses.unit_pose(pose) for pose, _ in boxes])
-        self._moving = [coal.Box(*(float(s) for s in size)) for _, size in boxes]
-        self._radius = np.array([np.linalg.norm(size) / 2 for _, size in boxes])
-        sizes = [np.asarray(o.size, float) + 2 * MARGIN for o in obstacles]
-        self._fixed = [
-            (coal.Box(*size.tolist()), coal.Transform3s(poses.to_matrix(o.pose[3:]), o.pose[:3]))
-            for size, o in zip(sizes, obstacles, strict=True)
-        ]
-        self._half = np.array(sizes).reshape(-1, 3) / 2
-        self._at = np.array([o.pose for o in obstacles]).reshape(-1, 7)
-        self._request, self._result = coal.CollisionRequest(), coal.CollisionResult()
+    @property
+    def goes_straight(self) -> bool:
+        """The arm has the joints to follow any line, turning as it likes."""
+        return len(self.start) >= FULL
 
-    def free(self, tools: Array) -> Array:
-        """Boolean ``(n,)``: nothing is touched at tool poses ``(n, 7)``."""
-        coal = self._coal
-        boxes = poses.multiply(tools[:, None], self._local)
-        local = np.abs(poses.localise(self._at[:, None, None], boxes[None, ..., :3]))
-        beyond = np.maximum(local - self._half[:, None, None], 0.0)
-        near = poses.norm(beyond) <= self._radius
-        free = np.ones(len(tools), bool)
-        for k, i, j in zip(*(index.tolist() for index in np.nonzero(near)), strict=True):
-            if free[i]:
-                frame = coal.Transform3s(poses.to_matrix(boxes[i, j, 3:]), boxes[i, j, :3])
-                self._result.clear()
-                free[i] = not coal.collide(
-                    self._moving[j], frame, *self._fixed[k], self._request, self._result
-                )
-        return free
+    @property
+    def leanings(self) -> tuple[float, ...]:
+        """How far in radians the tool may lean where it is on its way, what is best first."""
+        return (LEANS,) if self.goes_straight else (LEANS, SWAYS)
 
-    def clear(self, a: Array, b: Array) -> bool:
-        length = float(np.linalg.norm(b[:3] - a[:3])) + 0.1 * float(poses.angle_between(a[3:], b[3:]))
-        n = max(2, int(np.ceil(length / _STEP)) + 1)
-        # The ends are where the object is lifted from and put down: there it may be near its support.
-        return bool(self.free(poses.interpolate(a[None], b[None], np.linspace(0.0, 1.0, n))).all())
+    @cached_property
+    def collisions(self) -> Collisions:
+        """What counts at the end."""
+        return self._among(self._things)
 
-    def clear_way(self, way: Sequence[Array]) -> bool:
-        return all(self.clear(a, b) for a, b in itertools.pairwise(way))
+    @cached_property
+    def on_the_way(self) -> Collisions:
+        """What counts on the way: of what touches at the beginning less margin, or else nothing."""
+        if self.collisions.free(self.start):
+            return self.collisions
+        near = {name for touch in self.collisions.touches(self.start) for name in touch}
+        for share in LESS:
+            found = self._among(
+                [_with(thing, share) if thing.name in near else thing for thing in self._things]
+            )
+            if found.free(self.start):
+                return found
+        return self._left([_with(thing, 0.0) if thing.name in near else thing for thing in self._things])
 
+    @cached_property
+    def _rooms(self) -> list[Collisions | _Leaving]:
+        """What counts on the way: less than usual near its beginning; where none leads on then, all along."""
+        if self.on_the_way is self.collisions:
+            return [self.collisions]
+        return [_Leaving(self.collisions, self.on_the_way, self.start), self.on_the_way]
 
-def _lattice(start: Array, goal: Array, checker: _Checker) -> list[Array]:
-    low = np.minimum(start[:3], goal[:3]) - 0.35
-    high = np.maximum(start[:3], goal[:3]) + 0.35
-    low[2] = max(low[2], 0.02)
-    counts = np.ceil((high - low) / _CELL).astype(int) + 1
-    span = max(float(np.linalg.norm(goal[:3] - start[:3])), 1e-6)
+    @cached_property
+    def _without_margins(self) -> Collisions:
+        """What must not happen between two questions either: that something is touched."""
+        return self._left([_with(thing, 0.0) for thing in self._things])
 
-    def poses_at(cells: Array) -> Array:
-        p = low + _CELL * cells
-        f = np.clip((p - start[:3]) @ (goal[:3] - start[:3]) / span**2, 0.0, 1.0)
-        return np.concatenate([p, poses.interpolate(start[None], goal[None], f)[:, 3:]], axis=-1)
+    def _left(self, things: Sequence[Thing]) -> Collisions:
+        """Collisions among things; what touches at the beginning is left, and nobody goes through it."""
+        found = self._among(things)
+        if found.free(self.start):
+            return found
+        touches = found.touches(self.start)
+        names = {name for touch in touches for name in touch}
+        within = [*things, *(piece for thing in things if thing.name in names for piece in inner(thing))]
+        return self._among(within, [*touches, *self._among(within, touches).touches(self.start)])
 
-    def pose_at(cell: tuple[int, ...]) -> Array:
-        found: Array = poses_at(np.array([cell]))[0]
-        return found
+    def _among(self, things: Sequence[Thing], pairs: Collection[Touch] = ()) -> Collisions:
+        leave = replace(self._leave, pairs={*self._leave.pairs, *pairs})
+        return Collisions(bodies_of(self._robot), self._hand, things, self._held, leave)
 
-    cells = list(itertools.product(*(range(n) for n in counts)))
-    free = {c for c, is_free in zip(cells, checker.free(poses_at(np.array(cells))), strict=True) if is_free}
-    graph: nx.Graph[Any] = nx.Graph()
-    moves = [m for m in itertools.product((-1, 0, 1), repeat=3) if m > (0, 0, 0)]
-    for cell in sorted(free):
-        for move in moves:
-            other = tuple(c + m for c, m in zip(cell, move, strict=True))
-            if other in free:
-                graph.add_edge(cell, other, weight=float(np.linalg.norm(move)))
-    for end in (start, goal):
-        key = "start" if end is start else "goal"
-        near = sorted(free, key=lambda c: float(np.linalg.norm(low + _CELL * np.array(c) - end[:3])))[:20]
-        for cell in near:
-            if checker.clear(end, pose_at(cell)):
-                graph.add_edge(key, cell, weight=float(np.linalg.norm(pose_at(cell)[:3] - end[:3])) / _CELL)
-    try:
-        way = _clear_cells(graph, start, goal, pose_at, checker)
-    except (nx.NetworkXNoPath, nx.NodeNotFound) as error:
-        ends = (np.round(p[:3], 3).tolist() for p in (start, goal))
+    def ends(self, tools: Array, beginning: Array | None = None, leans: float = LEANS) -> Ends:
+        """Postures at tool poses ``(k, 7)``, from where the arm is or from ``beginning (n_arm,)``.
+
+        Args:
+            tools: The poses.
+            beginning: Where the arm comes from.
+            leans: Radians by which an arm of few joints may turn the tool from them.
+        """
+        begin = self.start if beginning is None else beginning
+        found = [self._end(tool, begin, leans) for tool in tools]
+        joints = np.array([self.start if q is None else q for q, _ in found])
+        reached = np.array([q is not None for q, _ in found], bool)
+        return Ends(joints, reached, np.array([free for _, free in found], bool))
+
+    def _end(self, tool: Array, begin: Array, leans: float) -> tuple[Array | None, bool]:
+        """A posture at a tool pose, one that touches nothing if there is such among those that are tried."""
+        touching = None
+        for q, free in self._tried(tool, begin, leans):
+            if free:
+                return q, True
+            touching = q if touching is None else touching
+        return touching, False
+
+    def postures(self, tool: Array, leans: float = LEANS) -> Iterator[Array]:
+        """Postures ``(n_arm,)`` at a tool pose ``(7,)`` in which nothing is touched, unlike ones."""
+        found: list[Array] = []
+        for q, free in self._tried(tool, self.start, leans):
+            if free and all(float(np.abs(q - other).max()) > _UNLIKE for other in found):
+                found.append(q)
+                yield q
+
+    def _tried(self, tool: Array, begin: Array, leans: float) -> Iterator[tuple[Array, bool]]:
+        for seed in (begin, self._robot.rest, *self.arm.seeds):
+            q = self.arm.joints(tool, seed, leans=leans)
+            if q is not None:
+                yield q, self.collisions.free(q)
+
+    def straight(
+        self,
+        way: Sequence[Array],
+        start: Array | None = None,
+        spacing: float = 0.04,
+        leans: float = LEANS,
+    ) -> Array | None:
+        """Joints ``(n, n_arm)`` along straight lines of the tool through poses ``(7,)``, the first included.
+
+        Args:
+            way: Poses that the tool goes through; the first one is where it is.
+            start: Joints ``(n_arm,)`` there, by default where the arm is.
+            spacing: Metres between poses at which joints are computed.
+            leans: Radians by which an arm of few joints may turn the tool from the last pose.
+
+        Returns:
+            None where the arm cannot follow, or would touch something.
+        """
+        begin = self.start if start is None else start
+        if not self.goes_straight:
+            spacing = min(spacing, CLOSELY)
+        tools = _spaced(way, spacing)
+        joints = self.arm.along(begin, tools, leans)
+        if joints is None:
+            return None
+        return joints if self.clear(np.concatenate([begin[None], joints])) else None
+
+    def clear(self, joints: Array) -> bool:
+        """Nothing is touched on the straight lines between postures ``(n, n_arm)``."""
+        pieces = [line(a, b, 2 * STEP)[1:] for a, b in itertools.pairwise(joints)]
+        postures = np.concatenate(pieces)
+        return any(among.all_free(postures) for among in self._rooms)
+
+    def search(self, tools: Array, pace: Pace, seed: int = 1, leans: float = LEANS) -> Route:
+        """A way to one of the tool poses ``(k, 7)``, those that come first preferred.
+
+        Args:
+            tools: The poses.
+            pace: How fast the tool may go.
+            seed: Of the search's random numbers.
+            leans: As of `ends`.
+
+        Raises:
+            NoWayError: There is none, or none was found; says what is in the way, or that it is out of reach.
+        """
+        found = [q for tool in tools for q in self.postures(tool, leans)]
+        if not found:
+            raise NoWayError(self.no_end(tools))
+        return self.search_posture(np.array(found), pace, seed)
+
+    def search_posture(self, goals: Array, pace: Pace, seed: int = 1) -> Route:
+        """A way to one of the postures ``(k, n_arm)``, in which nothing is touched.
+
+        Raises:
+            NoWayError: None was found.
+        """
+        robot = self._robot
+        for among in self._rooms:
+            allowed = _Allowed(among, self._held, [self.start, *goals])
+            for step in (STEP, FINER * STEP):
+                search = Search(allowed, robot.arm_lower, robot.arm_upper, robot.rest, seed, step)
+                way = search.way(self.start, goals)
+                if way is None:
+                    break
+                route = timed(self.arm, way, pace, among.free)
+                if self._without_margins.all_free(_finely(route.joints)):
+                    return route
+        at = ", ".join(f"{v:.2f}" for v in self.arm.tool(goals[0])[:3])
         raise NoWayError(
-            f"no way for the hand from {' to '.join(map(str, ends))} m that keeps {1000 * MARGIN:.0f} mm "
-            f"clear of the fixtures: give via-points, or move the fixtures apart"
-        ) from error
-    return _shortcut(way, checker)
+            f"no way for the hand to ({at}) m that keeps clear of everything was found: "
+            f"make room, or give via-points"
+        )
+
+    def touched(self, tool: Array) -> list[Touch]:
+        """What would touch with the tool at a pose ``(7,)``; nothing where that is out of reach."""
+        end = self.ends(tool[None])
+        return self.collisions.touches(end.joints[0]) if end.reached[0] else []
+
+    def no_end(self, tools: Array) -> str:
+        """Why the hand cannot be at any of the tool poses ``(k, 7)``, in one sentence."""
+        ends = self.ends(tools)
+        at = ", ".join(f"{v:.2f}" for v in tools[0, :3])
+        if not ends.reached.any():
+            return f"the arm does not reach ({at}) m: bring things nearer, or turn them"
+        k = int(np.flatnonzero(ends.reached)[0])
+        touches = self.collisions.touches(ends.joints[k])
+        pair = f"{touches[0][0]} would touch {touches[0][1]}" if touches else "something would be touched"
+        return f"at ({at}) m {pair}: make room there"
 
 
-def _clear_cells(
-    graph: nx.Graph[Any],
-    start: Array,
-    goal: Array,
-    pose_at: Callable[[tuple[int, ...]], Array],
-    checker: _Checker,
-) -> list[Array]:
-    """The shortest way through free cells whose joining lines are clear too; these are checked on demand."""
-    clear: set[tuple[Any, Any]] = set()
-    while True:
-        cells = nx.shortest_path(graph, "start", "goal", weight="weight")
-        way = [start, *(pose_at(c) for c in cells[1:-1]), goal]
-        pairs = zip(itertools.pairwise(cells), itertools.pairwise(way), strict=True)
-        fresh = [(edge, line) for edge, line in pairs if edge not in clear]
-        blocked = [edge for edge, line in fresh if not checker.clear(*line)]
-        if not blocked:
-            return way
-        clear.update(edge for edge, _ in fresh if edge not in blocked)
-        graph.remove_edges_from(blocked)
+class _Leaving:
+    """Collisions of an arm that begins closer to things than usual, and may be so near there alone."""
+
+    def __init__(self, usual: Collisions, less: Collisions, start: Array) -> None:
+        self._usual, self._less, self._start = usual, less, start
+
+    def free(self, q: Array) -> bool:
+        """Nothing touches with the arm's joints at ``q (n_arm,)``."""
+        if self._usual.free(q):
+            return True
+        return float(np.abs(q - self._start).max()) < LEAVING and self._less.free(q)
+
+    def all_free(self, postures: Array) -> bool:
+        """Nothing touches at any of ``postures (n, n_arm)``."""
+        return all(self.free(q) for q in postures)
+
+    def tool_rotation(self) -> Array:
+        """See `Collisions.tool_rotation`."""
+        return self._usual.tool_rotation()
 
 
-def _shortcut(way: list[Array], checker: _Checker) -> list[Array]:
-    out, i = [way[0]], 0
-    while i < len(way) - 1:
-        j = len(way) - 1
-        while j > i + 1 and not checker.clear(way[i], way[j]):
-            j -= 1
-        out.append(way[j])
-        i = j
-    return out
+class _Allowed:
+    """Nothing touches, and what is held leans little more than at its ends."""
+
+    def __init__(self, collisions: Collisions | _Leaving, held: Held | None, ends: Sequence[Array]) -> None:
+        self._collisions, self._up = collisions, None if held is None else _up(held)
+        self._most = -1.0
+        if self._up is not None:
+            leans = []
+            for q in ends:
+                collisions.free(q)
+                leans.append(np.arccos(np.clip(self._height(), -1.0, 1.0)))
+            self._most = float(np.cos(min(max(leans) + _LEANING, np.pi)))
+
+    def __call__(self, q: Array) -> bool:
+        return self._collisions.free(q) and (self._up is None or self._height() >= self._most)
+
+    def _height(self) -> float:
+        return float((self._collisions.tool_rotation() @ self._up)[2])
+
+
+def _finely(joints: Array) -> Array:
+    """Postures ``(m, n_arm)`` on the lines between postures ``(n, n_arm)``, close together."""
+    return np.concatenate([line(a, b, FINER * STEP) for a, b in itertools.pairwise(joints)])
+
+
+def _with(thing: Thing, share: float) -> Thing:
+    """The thing with a share of its margin."""
+    return replace(thing, margin=share * thing.margin)
+
+
+def _up(held: Held) -> Array:
+    """The held object's upward axis ``(3,)`` in the tool frame."""
+    found: Array = poses.z_axis(poses.unit_pose(held.grip)[3:])
+    return found
+
+
+def _spaced(way: Sequence[Array], spacing: float) -> Array:
+    """Poses ``(n, 7)`` along lines, without the first one."""
+    out = []
+    for a, b in itertools.pairwise(way):
+        length, turn = float(np.linalg.norm(b[:3] - a[:3])), float(poses.angle_between(a[3:], b[3:]))
+        n = max(1, int(np.ceil(max(length / spacing, turn / _TURNING))))
+        out.append(poses.interpolate(a[None], b[None], np.linspace(1.0 / n, 1.0, n)))
+    return np.concatenate(out)

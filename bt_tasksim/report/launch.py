@@ -10,17 +10,17 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.core.errors import InputError, MachineError, nearest
+from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.files import check_folder, check_writable, write_bytes
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import Runner
+from bt_tasksim.execution.session import engine_options
 from bt_tasksim.report.video import Film, VideoRecorder
 from bt_tasksim.report.write import FILES, VIDEO, write_run
 from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.trees.load import with_policies
 
-_ENGINES = tuple(f.name for f in dataclasses.fields(EngineOptions))
 _OPTIONS = ("seed", "video", "out", "film", "policy", "options")
 """What `run` takes by keyword besides."""
 _log = logging.getLogger(__name__)
@@ -62,9 +62,7 @@ def run(
         MachineError: An engine failed, the machine cannot film, or the disk is full or not writable.
         KeyboardInterrupt: The run was interrupted; the folder, if any, holds what was run until then.
     """
-    unknown = next((name for name in engines if name not in _ENGINES), None)
-    if unknown is not None:
-        raise InputError(f"unknown option '{unknown}'{nearest(unknown, (*_ENGINES, *_OPTIONS))}")
+    options = engine_options(options, engines, _OPTIONS)
     film, path = film or Film(), None if isinstance(video, bool) or video is None else Path(video)
     if video is True and out is None:
         raise InputError("video=True films into the run's folder: give out=FOLDER, or video='run.mp4'")
@@ -74,10 +72,6 @@ def run(
     if out is not None:
         check_folder(out, FILES)
     filmed = path is not None or video is True
-    if options is None:
-        options = EngineOptions(**({"rendering": filmed} | engines))
-    elif engines:
-        raise InputError(f"give options= or {next(iter(engines))}=, not both")
     if filmed:
         options = dataclasses.replace(options, rendering=True)
     runner = Runner(with_policies(lambda: tree, (policy or {}).items())(), scene, options)
@@ -89,7 +83,7 @@ def run(
         with recorder:
             return runner.run(seed, record=recorder)
     finally:
-        runner.pipeline.close()
+        runner.close()
 
 
 def _kept(folder: Path, runner: Runner, seed: int, video: Path | None, film: Film) -> Result:

@@ -32,6 +32,8 @@ function header() {
     tree: a.status, "simulated time": `${a.sim_time.toFixed(2)} s in ${a.control_steps} steps`,
     "computed in": `${a.wall_time.toFixed(1)} s`,
   };
+  if (a.judged === false && a.success) facts.judged = "no: the tree's own word was taken";
+  for (const p of (a.verdict && a.verdict.placements) || []) facts[p.goal] = p.why;
   for (const [key, value] of Object.entries(facts)) fact(byId("facts"), key, value);
   const numbers = { stream: a.stream, "control frequency": `${a.control_frequency} Hz` };
   if (a.verdict) {

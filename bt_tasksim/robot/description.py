@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -95,6 +95,7 @@ class RobotDescription:
         hand_drive_scale: Factors ``(n_hand,)`` on the gains and limits of each hand joint: a thumb that
             stands against four fingers needs more than one of them.
         hand_speed: Fastest change of closure, 1/s.
+        hand_press: Force or torque, N or Nm, that joints press with at least once they are told to shut.
         synergies: Names of further hand motions.
         synergy_directions: ``(n_synergies, n_hand)`` joint displacements at synergy value 1.
         tool_link: Link that carries the tool frame.
@@ -138,6 +139,7 @@ class RobotDescription:
     hand_drive: Drive
     hand_drive_scale: Array
     hand_speed: float
+    hand_press: float
     synergies: tuple[str, ...]
     synergy_directions: Array
     tool_link: str
@@ -178,6 +180,18 @@ class RobotDescription:
         for i in range(min(len(self.synergies), hand.shape[-1] - 1)):
             out = out + hand[..., i + 1 : i + 2] * poses.constant(self.synergy_directions[i].copy(), hand)
         return out
+
+    def derived(self, name: str, make: Callable[[RobotDescription], Any]) -> Any:
+        """Something that follows from this description alone, made when it is first asked for.
+
+        Args:
+            name: What it is.
+            make: Makes it.
+        """
+        kept = self.__dict__.setdefault("_derived", {})
+        if name not in kept:
+            kept[name] = make(self)
+        return kept[name]
 
     @cached_property
     def hand_range(self) -> tuple[Array, Array]:
@@ -234,6 +248,19 @@ def _load(path: Path, version: tuple[int, ...]) -> RobotDescription:
         return _description(data, path)
 
 
+def described(data: RobotFile, path: Path) -> RobotDescription:
+    """The robot that a file's content describes.
+
+    Args:
+        data: The content.
+        path: Where the file is, or is to be: its URDF is found from there.
+
+    Raises:
+        FieldError: Its URDF is not to be found, or it misstates something.
+    """
+    return _description(data, path)
+
+
 def _description(data: RobotFile, path: Path) -> RobotDescription:
     arm, hand, tool = data.arm, data.hand, data.tool
     n_arm, n_hand = len(arm.joints), len(hand.joints)
@@ -258,6 +285,7 @@ def _description(data: RobotFile, path: Path) -> RobotDescription:
         hand_drive=Drive(**dict(hand.drive)),
         hand_drive_scale=_scale(hand.drive_scale or {}, hand.joints),
         hand_speed=hand.speed,
+        hand_press=hand.press,
         synergies=tuple(synergies),
         synergy_directions=np.array(
             [_joints(v, n_hand, "hand", "synergies", k) for k, v in synergies.items()]

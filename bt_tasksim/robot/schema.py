@@ -86,6 +86,9 @@ class HandEntry(Model):
     """By joint: factor on the gains and the limit; by default 1."""
     speed: Positive
     """Fastest change of closure, 1/s."""
+    press: NotNegative = 0.0
+    """Force or torque, N or Nm, that each joint presses with at least once it is told to shut, however thin
+    what it meets; 0 for hands without force control."""
     synergies: Annotated[dict[Name, Joints], Field(max_length=16)] | None = None
     """By name: displacements of the joints at value 1, rad or m."""
 

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from bt_tasksim.scene.fixtures import Fixture, load_fixture
     from bt_tasksim.scene.scene import CurriculumStage, Lesson, Scene
     from bt_tasksim.scene.scene_file import load_scene
-    from bt_tasksim.scene.specs import Goal, HandStart, ObjectSpec, SpotSpec
+    from bt_tasksim.scene.specs import FixtureSpec, Goal, HandStart, ObjectSpec, SpotSpec
 
 __getattr__, __dir__ = handed_on(
     __name__,
     {
-        "specs": ("Goal", "HandStart", "ObjectSpec", "SpotSpec"),
+        "specs": ("FixtureSpec", "Goal", "HandStart", "ObjectSpec", "SpotSpec"),
         "configuration": ("ActorConfiguration", "ObjectActor"),
         "fixtures": ("Fixture", "load_fixture"),
         "scene": ("CurriculumStage", "Lesson", "Scene"),
@@ -30,6 +30,7 @@ __getattr__, __dir__ = handed_on(
 __all__ = [
     "ActorConfiguration",
     "Fixture",
+    "FixtureSpec",
     "Goal",
     "HandStart",
     "CurriculumStage",

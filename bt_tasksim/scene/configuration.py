@@ -16,9 +16,11 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.json_text import parse_json
 from bt_tasksim.core.names import check_name
-from bt_tasksim.core.renamed import renamed_fields
+from bt_tasksim.core.renamed import former_names, renamed_fields, with_present_names
 from bt_tasksim.core.world import ObjectModel, Obstacle, PlaceModel, WorldModel
 from bt_tasksim.scene.fixtures import Fixture
+from bt_tasksim.scene.goal_functions import GoalFunction
+from bt_tasksim.scene.grips import GivenGrip
 from bt_tasksim.scene.shapes import Shape, ShapeSize, object_model, shape
 from bt_tasksim.scene.specs import Goal
 
@@ -64,7 +66,22 @@ class ObjectActor:
     known_size: tuple[float, float, float] | None = None
     """The size it is taken to have; None where that is its true one."""
     on: str = ""
-    """Name of the place where it starts."""
+    """Name of the place where it starts, whatever is between them."""
+    base: str = ""
+    """Name of the object that it starts on or in; empty where it starts on the place itself."""
+    movable: bool = False
+    """It may be shifted and tilted in a run."""
+    grasps: tuple[GivenGrip, ...] = ()
+    """Where two fingers may hold it; empty where its kind says so."""
+    symmetry: int | None = None
+    """Order of its symmetry about z; None for that of its kind."""
+    category: str = ""
+    """What people call things like it; empty for its kind."""
+
+    @classmethod
+    def from_data(cls, data: Any) -> ObjectActor:
+        """From what JSON holds of it, lists as tuples."""
+        return cls(**{**data, "grasps": tuple(GivenGrip(**grip) for grip in data.get("grasps", ()))})
 
     def shape(self) -> Shape:
         """Its geometry."""
@@ -77,10 +94,10 @@ class ObjectActor:
     def model(self) -> ObjectModel:
         """What is known about it beforehand."""
         size = ShapeSize(self.known_size or self.size, self.exponents, self.mesh)
-        return object_model(self.name, self.kind, size)
+        return object_model(self.name, self.kind, size, self.grasps, self.symmetry)
 
 
-@renamed_fields(lesson="stage")
+@renamed_fields(lesson="stage", goal="goals")
 @dataclass(frozen=True)
 class ActorConfiguration:
     """One drawn world, as plain data.
@@ -96,11 +113,12 @@ class ActorConfiguration:
             ``(4,)``; then the joints follow from it. Empty: ``joint_position`` counts.
         physics_frequency: Hz.
         control_frequency: Hz.
-        goal: What should be true at the end, or None.
+        goals: What should be true; one goal alone, or None, will do.
         disturbance: What happens on the way, or None.
         noise: Name of the noise model of the estimate; empty for the engine's own.
         tolerance: In training, the sufficient cost below which a goal counts as reached.
         stage: Name of the stage it was drawn for.
+        functions: Goals that are functions, of which a log knows no more than the names.
     """
 
     robot: str
@@ -112,17 +130,24 @@ class ActorConfiguration:
     joint_position: tuple[float, ...] = ()
     physics_frequency: int = 100
     control_frequency: int = 20
-    goal: Goal | None = None
+    goals: tuple[Goal, ...] = ()
     disturbance: Disturbance | None = None
     noise: str = ""
     tolerance: float = 1.0
     stage: str = ""
     hand_start: tuple[float, ...] = ()
+    functions: tuple[GoalFunction, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "goals", goals_in(self.goals))
         for kind, things in (("an object", self.objects), ("a place", self.places)):
             for thing in things:
                 check_name(thing.name, f"the name of {kind}")
+
+    @property
+    def goal(self) -> Goal | None:
+        """The first goal, or None."""
+        return self.goals[0] if self.goals else None
 
     def generator(self, purpose: str) -> np.random.Generator:
         """Random numbers for one purpose (such as ``"estimate"``), independent of every other."""
@@ -157,7 +182,7 @@ class ActorConfiguration:
         """
         try:
             data = _tuples(parse_json(text, "a drawn world"))
-            data["objects"] = tuple(ObjectActor(**o) for o in data["objects"])
+            data["objects"] = tuple(ObjectActor.from_data(o) for o in data["objects"])
             data["fixtures"] = tuple(Fixture.from_data(f) for f in data["fixtures"])
             data["places"] = tuple(
                 PlaceModel(
@@ -170,11 +195,20 @@ class ActorConfiguration:
                 )
                 for p in data["places"]
             )
-            data["goal"] = Goal(**data["goal"]) if data["goal"] else None
+            data = with_present_names(data, former_names(cls))
+            data["goals"] = tuple(Goal(**goal) for goal in goals_in(data.get("goals")))
+            data["functions"] = tuple(GoalFunction(**known) for known in data.get("functions", ()))
             data["disturbance"] = Disturbance(**data["disturbance"]) if data["disturbance"] else None
             return cls(**data)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"not an actor configuration: {error}") from error
+
+
+def goals_in(said: Any) -> tuple[Any, ...]:
+    """Several goals, where former versions had one or None; in plain data likewise."""
+    if isinstance(said, list | tuple):
+        return tuple(said)
+    return () if said is None else (said,)
 
 
 def check_seed(seed: int) -> None:

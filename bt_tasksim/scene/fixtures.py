@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from bt_tasksim.core.plain import Plain
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.renamed import renamed_fields
 from bt_tasksim.core.world import PlaceModel
+from bt_tasksim.scene.specs import FixtureSpec
 
 if TYPE_CHECKING:
     from bt_tasksim.scene.fixture_schema import FixtureFile
@@ -163,16 +164,34 @@ def _scaled(direction: tuple[float, float, float]) -> tuple[float, float, float]
     return direction if abs(length - 1.0) < ROUNDED else (x / length, y / length, z / length)
 
 
-def load_fixture(name: str) -> Fixture:
-    """A fixture by name, or one from a data file by path.
+def load_fixture(name: str | FixtureSpec) -> Fixture:
+    """A fixture by name, one from a data file by path, or one of these where a scene puts it.
 
     What is registered as a ``fixture`` is the path of its data file, or a `Fixture`.
 
     Raises:
         InputError: No such fixture, or the file is not one; says what is wrong and where.
     """
+    if isinstance(name, FixtureSpec):
+        return _put(load_fixture(name.fixture), name)
     found = named_data("fixture", name, Fixture)
     return found if isinstance(found, Fixture) else _load(found, file_version(found))
+
+
+def _put(fixture: Fixture, spec: FixtureSpec) -> Fixture:
+    """A fixture where a scene puts it, with the names that it has there."""
+    position, turn = fixture.pose[:3], fixture.pose[3:]
+    if spec.at is not None:
+        position = (*spec.at, *position[len(spec.at) :])
+    if spec.yaw is not None:
+        turn = tuple(float(v) for v in poses.yaw(spec.yaw))
+    name, places = fixture.name, fixture.places
+    if spec.name:
+        places = tuple(
+            replace(p, name=spec.name if p.name == fixture.name else f"{spec.name}_{p.name}") for p in places
+        )
+        name = spec.name
+    return Fixture(name, (*position, *turn), fixture.boxes, places)
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,4 @@
-"""Objects from a user's own mesh files: read, checked, and made into convex pieces."""
+"""Objects from a user's own mesh files: read, checked, put right, and made into convex pieces."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ import numpy as np
 from bt_tasksim.core.errors import BtTasksimWarning, InputError, MachineError
 from bt_tasksim.core.files import file_version
 from bt_tasksim.core.poses import Array
+from bt_tasksim.scene.convex_parts import convex_parts
 from bt_tasksim.scene.geometry import ConvexPiece, Piece, Shape
+from bt_tasksim.scene.mesh_bodies import separate, solids_and_cavities, united
+from bt_tasksim.scene.mesh_surface import MeshSurface
 from bt_tasksim.scene.meshes import TriangleMesh, cube_sphere, mass_properties
-from bt_tasksim.scene.surfaces import Polygon, PrismSurface
 
 SMALLEST = 0.005
 LARGEST = 1.0
@@ -30,7 +32,9 @@ MOST_BODIES = 256
 FARTHEST = 1e6
 """Largest coordinate in a mesh's own units."""
 _MOST_VERTICES = 64
-_HOLLOW = 1.2
+_FILLED = 1.2
+_NO_VOLUME = 1e-9
+"""Share of the bounding box below which a body is none."""
 
 
 def mesh_extent(path: str) -> tuple[float, float, float]:
@@ -47,32 +51,52 @@ def mesh_extent(path: str) -> tuple[float, float, float]:
 def mesh_shape(path: str, size: tuple[float, float, float]) -> Shape:
     """The geometry of a mesh file, scaled to a bounding box of ``size (3,)`` metres.
 
-    Each separate body in the file collides as its own convex hull.
+    Each body in the file collides as its convex parts (`bt_tasksim.scene.convex_parts`); what is weighed,
+    seen and touched is the mesh itself.
 
     Raises:
         InputError: The file is not a closed mesh, or the size is not one that an arm can handle.
-        MachineError: The package that reads meshes is not installed.
+        MachineError: A package that reads or decomposes meshes is not installed.
     """
-    check_size(f"mesh '{path}'", size)
-    whole, bodies = _read(path, file_version(path))
-    low, high = np.min(whole.vertices, axis=0), np.max(whole.vertices, axis=0)
-    scale, middle = np.array(size) / (high - low), (low + high) / 2
-    visual = TriangleMesh((whole.vertices - middle) * scale, whole.faces)
+    visual = mesh_solid(path, size)
     mass = mass_properties(visual)
+    whole, bodies = _read(path, file_version(path))
+    scale, middle = _fitting(whole, size)
     pieces: list[Piece] = []
-    hulls = 0.0
+    filled = 0.0
     for body in bodies:
-        vertices, volume = _hull((body.vertices - middle) * scale)
-        pieces.append(ConvexPiece(vertices))
-        hulls += volume
-    if hulls > _HOLLOW * mass.volume:
+        for part in convex_parts(body):
+            vertices, volume = _hull((part - middle) * scale)
+            pieces.append(ConvexPiece(vertices))
+            filled += volume
+    if len(bodies) == 1 and filled > _FILLED * mass.volume:
         warnings.warn(
-            f"mesh '{path}' has hollows, which its convex hull fills ({hulls / mass.volume - 1:.0%} more "
-            f"volume): to keep them, save it as several separate closed convex bodies in one file",
+            f"mesh '{path}' has thin walls, which its {len(pieces)} convex parts make thicker "
+            f"({filled / mass.volume - 1:.0%} more volume); to choose the parts, save "
+            f"them as several separate closed convex bodies in one file",
             BtTasksimWarning,
             stacklevel=2,
         )
-    return Shape(size, tuple(pieces), lambda: visual, lambda: mass, _box_surface(size))
+    return Shape(size, tuple(pieces), lambda: visual, lambda: mass, MeshSurface(visual))
+
+
+def mesh_solid(path: str, size: tuple[float, float, float]) -> TriangleMesh:
+    """The surface of all that is in a mesh file, scaled to a bounding box of ``size (3,)`` metres, centred.
+
+    Raises:
+        InputError: As `mesh_shape`.
+        MachineError: The package that reads meshes is not installed.
+    """
+    check_size(f"mesh '{path}'", size)
+    whole, _ = _read(path, file_version(path))
+    scale, middle = _fitting(whole, size)
+    return TriangleMesh((whole.vertices - middle) * scale, whole.faces)
+
+
+def _fitting(whole: TriangleMesh, size: tuple[float, float, float]) -> tuple[Array, Array]:
+    """Factors ``(3,)`` that give it a size, and its middle ``(3,)``."""
+    low, high = np.min(whole.vertices, axis=0), np.max(whole.vertices, axis=0)
+    return np.array(size) / (high - low), (low + high) / 2
 
 
 def check_size(what: str, size: tuple[float, float, float]) -> None:
@@ -99,7 +123,7 @@ def check_size(what: str, size: tuple[float, float, float]) -> None:
 
 @lru_cache(maxsize=256)
 def _read(path: str, version: tuple[int, ...]) -> tuple[TriangleMesh, tuple[TriangleMesh, ...]]:
-    """The mesh in this version of a file, and its separate bodies."""
+    """The surface of all that is in this version of a file, and its bodies."""
     if not Path(path).is_file():
         raise InputError(f"no mesh file '{path}'")
     try:
@@ -131,31 +155,28 @@ def _read(path: str, version: tuple[int, ...]) -> tuple[TriangleMesh, tuple[Tria
         raise InputError(
             f"mesh '{path}' has coordinates beyond {FARTHEST:g}: save it in metres or millimetres"
         )
-    if not loaded.is_watertight:
-        raise InputError(
-            f"mesh '{path}' is not watertight: {_holes(loaded)} of its edges do not join two triangles"
-        )
-    if not loaded.is_winding_consistent:
-        raise InputError(f"mesh '{path}' has triangles that face different ways: recompute its normals")
-    if np.min(np.ptp(loaded.vertices, axis=0)) <= 0 or abs(loaded.volume) <= 0:
-        raise InputError(f"mesh '{path}' is flat: it encloses no volume")
-    if loaded.volume < 0:
-        loaded.invert()
-    if loaded.body_count > MOST_BODIES:
-        raise InputError(
-            f"mesh '{path}' has {loaded.body_count} separate bodies, more than {MOST_BODIES}: save fewer"
-        )
-    bodies = loaded.split(only_watertight=True)
-    return _plain(loaded), tuple(_plain(body) for body in bodies)
+    try:
+        solids, cavities = solids_and_cavities(_bodies(loaded))
+        whole = united(solids, cavities)
+    except InputError as error:
+        raise InputError(f"mesh '{path}' {error}") from None
+    return whole, tuple(solids)
 
 
-def _holes(mesh: Any) -> int:
-    _, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
-    return int(np.sum(count != 2))
-
-
-def _plain(mesh: Any) -> TriangleMesh:
-    return TriangleMesh(np.array(mesh.vertices, float), np.array(mesh.faces, np.int64))
+def _bodies(mesh: Any) -> list[TriangleMesh]:
+    """Separate bodies of what a reader has given; its errors say only what is wrong."""
+    vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+    if np.min(np.ptp(vertices, axis=0)) <= 0:
+        raise InputError("is flat: it encloses no volume")
+    different = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    bodies = separate(vertices, faces[different])
+    if len(bodies) > MOST_BODIES:
+        raise InputError(f"has {len(bodies)} separate bodies, more than {MOST_BODIES}: save fewer")
+    smallest = _NO_VOLUME * float(np.prod(np.ptp(vertices, axis=0)))
+    bodies = [body for body in bodies if abs(mass_properties(body).volume) > smallest]
+    if not bodies:
+        raise InputError("is flat: it encloses no volume")
+    return bodies
 
 
 def _hull(points: Array) -> tuple[Array, float]:
@@ -170,8 +191,3 @@ def _hull(points: Array) -> tuple[Array, float]:
         corners = corners[np.unique(np.argmax(directions @ corners.T, axis=1))]
     corners.setflags(write=False)
     return corners, float(hull.volume)
-
-
-def _box_surface(size: tuple[float, float, float]) -> PrismSurface:
-    x, y = size[0] / 2, size[1] / 2
-    return PrismSurface(Polygon(((x, y), (-x, y), (-x, -y), (x, -y))), size[2] / 2)

@@ -10,14 +10,20 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.scene.configuration import Disturbance, ObjectActor
+from bt_tasksim.scene.fixtures import Fixture
+from bt_tasksim.scene.outlines import deepest, fixture_slabs
 from bt_tasksim.scene.shape_kind import ShapeKind
-from bt_tasksim.scene.shapes import ShapeSize, object_model, resting_height, shape_kind
+from bt_tasksim.scene.shapes import ShapeSize, object_model, resting_height, shape, shape_kind
 from bt_tasksim.scene.specs import HandStart, ObjectSpec, SpotSpec
+from bt_tasksim.scene.starts import Candidate, start_of
 
 ASIDE = 0.5
 """Radians by which a tilted approach may lean aside, see `bt_tasksim.scene.scene.CurriculumStage`."""
+TRIES = 200
+"""Draws of an object's place, after which there is none."""
 _INTERVALS = 10
 
 
@@ -42,8 +48,17 @@ def draw_object(
     places: Mapping[str, PlaceModel],
     others: Sequence[ObjectActor],
     rng: np.random.Generator,
+    fixtures: Sequence[Fixture] = (),
 ) -> ObjectActor:
-    """An object that stands clear of the others.
+    """An object that stands clear of the others and of the furniture.
+
+    Args:
+        name: Its name.
+        spec: What it may be.
+        places: The places, by name.
+        others: The objects that were drawn before.
+        rng: Random numbers.
+        fixtures: The furniture.
 
     Raises:
         InputError: None of 200 draws of its place was free.
@@ -62,29 +77,38 @@ def draw_object(
     exponents = _draw_in(e_low, e_high, spec.split, rng)
     geometry = ShapeSize((size[0], size[1], size[2]), (exponents[0], exponents[1]), spec.mesh)
     mass, friction = float(rng.uniform(*spec.mass)), float(rng.uniform(*spec.friction))
-    place = places[spec.on]
-    area = np.array(spec.area if spec.area is not None else entry.area_on(place))
-    model = object_model(name, kind, geometry)
-    radius = float(np.hypot(*model.extent[:2])) / 2
-    for _ in range(200):
-        offset = np.array(spec.centre) + rng.uniform(-1, 1, 2) * area
+    start = start_of(name, spec, places, {other.name: other for other in others})
+    model = object_model(name, kind, geometry, spec.grasps, spec.symmetry)
+    area, centre = start.area(spec, entry, model), start.centre(spec)
+    pieces, height = shape(kind, geometry).collision, resting_height(kind, geometry)
+
+    def tried(offset: Array, heading: float, floor: float = 0.0) -> Candidate:
+        local = poses.pose([*offset, height + floor], poses.yaw(heading))
+        return Candidate(pieces, poses.multiply(start.place.pose, local), model.extent)
+
+    for _ in range(TRIES):
+        offset = centre + rng.uniform(-1, 1, 2) * area
         heading = rng.uniform(-1, 1) * spec.yaw
-        local = poses.pose([*offset, resting_height(kind, geometry)], poses.yaw(heading))
-        pose = poses.multiply(place.pose, local)
-        if all(
-            np.hypot(*(pose[:2] - np.array(o.pose[:2]))) > radius + float(np.hypot(*o.size[:2])) / 2 + 0.01
-            or abs(pose[2] - o.pose[2]) > (model.extent[2] + o.size[2]) / 2
-            for o in others
-        ):
+        found = tried(offset, heading)
+        if (floor := start.floor(found)) > 0.0:
+            found = tried(offset, heading, floor)
+        stuck = found.stuck_in(fixtures)
+        if stuck is None and found.clear_of(others, spec.gap) and start.fits(found, spec):
             break
     else:
+        if stuck is not None:
+            depth = deepest(found.parts, fixture_slabs(stuck))
+            raise InputError(
+                f"object '{name}' and fixture '{stuck.name}' overlap by {1000 * depth:.1f} mm at the start, "
+                f"{start} in the last of {TRIES} draws: draw it from another area"
+            )
         raise InputError(
-            f"object '{name}' finds no free spot on '{spec.on}' beside the others: "
+            f"object '{name}' finds no free spot {start} beside the others: "
             f"widen its area, or take fewer or smaller objects"
         )
     taken = {o.colour for o in others}
     colours = [c for c in entry.colours if c not in taken] or entry.colours
-    colour = colours[int(rng.integers(len(colours)))]
+    drawn = colours[int(rng.integers(len(colours)))]  # also where one is given: the draws after it stay
     known_size = _known_size(size, entry, spec, rng)
     return ObjectActor(
         name=name,
@@ -93,11 +117,16 @@ def draw_object(
         exponents=geometry.exponents,
         mass=mass,
         friction=friction,
-        pose=tuple(float(v) for v in pose),
-        colour=colour,
+        pose=tuple(float(v) for v in found.pose),
+        colour=spec.colour or drawn,
         mesh=spec.mesh,
         known_size=known_size,
-        on=spec.on,
+        on=start.under,
+        base=start.base,
+        movable=spec.movable,
+        grasps=spec.grasps,
+        symmetry=spec.symmetry,
+        category=spec.category,
     )
 
 

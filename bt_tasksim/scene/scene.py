@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, cast
 
 from bt_tasksim.core.errors import FieldError, InputError, nearest, within
 from bt_tasksim.core.names import check_name
@@ -15,8 +15,14 @@ from bt_tasksim.core.renamed import renamed_arguments, renamed_fields
 from bt_tasksim.core.resources import is_file
 from bt_tasksim.scene import sampling
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor, check_seed, generator
+from bt_tasksim.scene.fixture_overlap import check_fixtures
 from bt_tasksim.scene.fixtures import load_fixture
-from bt_tasksim.scene.specs import Goal, HandStart, ObjectSpec, SpotSpec, object_spec
+from bt_tasksim.scene.goal_functions import GoalFunction, Judge
+from bt_tasksim.scene.specs import FixtureSpec, Goal, HandStart, ObjectSpec, SpotSpec, object_spec
+from bt_tasksim.scene.starts import draw_order
+
+UNSAID = cast("Goal", object())
+"""What stands for a goal that nobody gave, so that None says that there shall be none."""
 
 
 class WorldSource(Protocol):
@@ -92,32 +98,70 @@ Lesson = CurriculumStage
 
 
 @renamed_fields(lessons="stages", knock="disturbed")
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Scene:
     """A robot, fixtures and objects, and how they are drawn.
 
     Args:
         robot: Name of a bundled robot, or path of a data file.
-        fixtures: Names of bundled fixtures or paths of data files; the table is always there.
+        fixtures: Names of bundled fixtures or paths of data files, or `FixtureSpec` (`bt_tasksim.Fixture`)
+            for one that stands elsewhere, or several times; the table is always there.
         objects: By name: an `ObjectSpec`, or a short form: ``"cup on upper_board"``, or ``"on upper_board"``
-            where the name is also the kind.
+            where the name is also the kind; ``inside`` and ``beside`` likewise.
         spots: Spots marked on places.
-        goal: What should be true at the end.
+        goal: What should be true at the end, where that is one thing; ``scene.goal`` is the first goal.
         disturbed: The object named here is knocked out of the hand at a random moment.
         stages: The curriculum of a training in this scene, in order.
         name: Name of the scene in results.
+        goals: All that should be true: goals, and functions of a `bt_tasksim.scene.relations.FinalState`
+            that answer with true or false, or with that and words.
+
+    Raises:
+        InputError: The scene cannot be: one sentence says what and where.
     """
 
     robot: str = "panda"
-    fixtures: Sequence[str] = ()
+    fixtures: Sequence[str | FixtureSpec] = ()
     objects: Mapping[str, ObjectSpec | str] = field(default_factory=dict)
     spots: Sequence[SpotSpec] = ()
-    goal: Goal | None = None
     disturbed: str | None = None
     stages: Sequence[CurriculumStage] = ()
     name: str = "scene"
+    goals: Sequence[Goal | GoalFunction] = ()
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        robot: str = "panda",
+        fixtures: Sequence[str | FixtureSpec] = (),
+        objects: Mapping[str, ObjectSpec | str] | None = None,
+        spots: Sequence[SpotSpec] = (),
+        goal: Goal | GoalFunction | Judge | None = UNSAID,
+        disturbed: str | None = None,
+        stages: Sequence[CurriculumStage] = (),
+        name: str = "scene",
+        goals: Sequence[Goal | GoalFunction | Judge] = (),
+    ) -> None:
+        put = super().__setattr__
+        put("robot", str(Path(robot).resolve()) if is_file(robot) else robot)  # found from every folder
+        put("spots", spots)
+        put("disturbed", disturbed)
+        put("stages", stages)
+        put("name", name)
+        put("goals", _goals(goal, goals))
+        put("objects", objects or {})
+        self._check_stages()
+        if not name.isprintable():
+            raise FieldError(f"the name of a scene should be printable, found '{shown(name)}'", "name")
+        specs: dict[str, ObjectSpec] = {}
+        for thing, spec in self.objects.items():
+            with within("objects", thing):
+                specs[check_name(thing, "the name of an object")] = object_spec(thing, spec)
+        put("objects", specs)
+        put("fixtures", _fixtures(fixtures))
+        check_fixtures([load_fixture(fixture) for fixture in self.fixtures])
+        self._check_names(specs)
+
+    def _check_stages(self) -> None:
         for stage in self.stages:
             for name in (*stage.objects, *([stage.hand.over] if stage.hand else ())):
                 if not all(name in scene.objects for scene in (self, *stage.scenes)):
@@ -125,43 +169,41 @@ class Scene:
                         f"stage '{stage.name}' names the object '{name}', which is not in the scene"
                         f"{nearest(name, self.objects)}"
                     )
-        if not self.name.isprintable():
-            raise FieldError(f"the name of a scene should be printable, found '{shown(self.name)}'", "name")
-        specs = {}
-        for name, spec in self.objects.items():
-            with within("objects", name):
-                specs[check_name(name, "the name of an object")] = object_spec(name, spec)
-        if is_file(self.robot):  # found from every folder that the scene travels to
-            object.__setattr__(self, "robot", str(Path(self.robot).resolve()))
-        object.__setattr__(self, "objects", specs)
-        for i, name in enumerate(self.fixtures):
-            with within("fixtures", i):
-                load_fixture(name)
-        fixtures = (str(Path(name).resolve()) if is_file(name) else name for name in self.fixtures)
-        object.__setattr__(self, "fixtures", tuple(dict.fromkeys(("table", *fixtures))))
+
+    def _check_names(self, specs: Mapping[str, ObjectSpec]) -> None:
+        """Every name that is used is one of the scene, and means one thing."""
         places = {p.name for f in self.fixtures for p in load_fixture(f).places}
         for i, spot in enumerate(self.spots):
-            _require_place(f"spot '{spot.name}'", spot.on, places, ("spots", i, "on"))
+            _require_place(f"spot '{spot.name}'", "on", spot.on, places, ("spots", i, "on"))
+            if spot.name in places:
+                raise FieldError(f"two places are called '{spot.name}': rename the spot", "spots", i, "name")
             places.add(spot.name)
-        for name, spec in specs.items():
-            _require_place(f"object '{name}'", spec.on, places, ("objects", name, "on"))
-        if self.goal is not None and self.goal.place in specs and self.goal.place not in places:
-            raise FieldError(
-                f"the scene's goal is on the object '{self.goal.place}', and goals on objects are "
-                f"not supported: name a place instead: {', '.join(sorted(places))}",
-                "goal",
-                "place",
-            )
-        for where, wanted, known in (
-            (("goal", "object"), self.goal.object if self.goal else None, specs),
-            (("disturbed",), self.disturbed, specs),
-            (("goal", "place"), self.goal.place if self.goal else None, places),
-        ):
-            if wanted is not None and wanted not in known:
+        for name in specs:
+            if name in places:
                 raise FieldError(
-                    f"the scene's {where[0]} names '{wanted}', which is not in it{nearest(wanted, known)}",
-                    *where,
+                    f"an object and a place are both called '{name}': give the object another name, such as "
+                    f"'my_{name}'",
+                    "objects",
+                    name,
                 )
+        for name, spec in specs.items():
+            word, reference = spec.start
+            known = set(specs) if word == "beside" else {*places, *specs}
+            _require_place(f"object '{name}'", word, reference, known, ("objects", name, word))
+        draw_order(specs)
+        for i, goal in enumerate(self.goals):
+            if isinstance(goal, Goal):
+                where = ("goal",) if len(self.goals) == 1 else ("goals", i)
+                _require("goal", goal.object, specs, (*where, "object"))
+                if goal.place:
+                    _require("goal", goal.place, {*places, *specs}, (*where, "place"))
+        if self.disturbed is not None:
+            _require("disturbed", self.disturbed, specs, ("disturbed",))
+
+    @property
+    def goal(self) -> Goal | None:
+        """The first goal that is no function, or None."""
+        return next((goal for goal in self.goals if isinstance(goal, Goal)), None)
 
     @property
     def object_names(self) -> Collection[str]:
@@ -205,11 +247,16 @@ class Scene:
         places = {p.name: p for f in fixtures for p in f.place_models()}
         for spot in self.spots:
             places[spot.name] = sampling.draw_spot(spot, places, rng)
-        objects: list[ObjectActor] = []
+        specs: dict[str, ObjectSpec] = {}
         for name, usual in self.objects.items():
             spec = usual if taught is None else taught.objects.get(name, usual)
             assert isinstance(spec, ObjectSpec)
-            objects.append(sampling.draw_object(name, spec, places, objects, rng))
+            specs[name] = spec
+        drawn_objects: dict[str, ObjectActor] = {}
+        for name in draw_order(specs):
+            others = list(drawn_objects.values())
+            drawn_objects[name] = sampling.draw_object(name, specs[name], places, others, rng, fixtures)
+        objects = [drawn_objects[name] for name in specs]
         if taught is not None and taught.tilt is not None:
             sampling.tilt_access(taught.tilt, objects, places, generator(seed, stream, "approach"))
         disturbance = None if self.disturbed is None else sampling.draw_disturbance(self.disturbed, rng)
@@ -220,7 +267,8 @@ class Scene:
             places=tuple(places.values()),
             seed=int(seed),
             stream=stream,
-            goal=self.goal,
+            goals=tuple(goal for goal in self.goals if isinstance(goal, Goal)),
+            functions=tuple(goal for goal in self.goals if isinstance(goal, GoalFunction)),
             disturbance=disturbance,
         )
         if taught is None:
@@ -239,8 +287,69 @@ class Scene:
         )
 
 
-def _require_place(what: str, place: str, places: set[str], where: tuple[str | int, ...]) -> None:
-    if place not in places:
+def _goals(one: object, several: Sequence[object]) -> tuple[Goal | GoalFunction, ...]:
+    """All goals, from the short form for one or from the list.
+
+    `dataclasses.replace` hands the goals of the former scene on, and the one counts that is given besides.
+    """
+    if one is not UNSAID and not isinstance(several, _Goals) and one is not None and several:
         raise FieldError(
-            f"{what} is on '{place}', which is not a place of the scene{nearest(place, places)}", *where
+            "a scene has a 'goal' or 'goals', and both are given: put the one into the list", "goals"
+        )
+    of_list = one is UNSAID or (one is None and not isinstance(several, _Goals))
+    every = several if of_list else () if one is None else (one,)
+    found: list[Goal | GoalFunction] = []
+    if not isinstance(every, Sequence) or isinstance(every, str):
+        raise FieldError(f"'goals' should be a list of goals, found {every!r:.100}", "goals")
+    for i, goal in enumerate(every):
+        if not isinstance(goal, Goal | GoalFunction) and not callable(goal):
+            raise FieldError(
+                f"a goal is a Goal, such as Goal('cup', on='table'), or a function, found {goal!r:.100}",
+                "goals",
+                i,
+            )
+        found.append(goal if isinstance(goal, Goal | GoalFunction) else GoalFunction.of(goal))
+    return _Goals(found)
+
+
+class _Goals(tuple[Goal | GoalFunction, ...]):
+    """Goals of a scene that was made."""
+
+    __slots__ = ()
+
+
+def _fixtures(said: Sequence[str | FixtureSpec]) -> tuple[str | FixtureSpec, ...]:
+    """All fixtures, the table among them, files by paths that are found from every folder."""
+    out: list[str | FixtureSpec] = ["table"]
+    for i, entry in enumerate(said):
+        with within("fixtures", i):
+            load_fixture(entry)
+        if isinstance(entry, FixtureSpec):
+            if is_file(entry.fixture):
+                entry = dataclasses.replace(entry, fixture=str(Path(entry.fixture).resolve()))
+            if entry.fixture == "table" and not entry.name and out[0] == "table":
+                out[0] = entry
+                continue
+        elif is_file(entry):
+            entry = str(Path(entry).resolve())
+        if isinstance(entry, FixtureSpec) or entry not in out:
+            out.append(entry)
+    return tuple(out)
+
+
+def _require(what: str, name: str, known: Collection[str], where: tuple[str | int, ...]) -> None:
+    if name not in known:
+        raise FieldError(
+            f"the scene's {what} names '{name}', which is not in it{nearest(name, known)}", *where
+        )
+
+
+def _require_place(
+    what: str, word: str, name: str, known: Collection[str], where: tuple[str | int, ...]
+) -> None:
+    if name not in known:
+        kind = "an object" if word == "beside" else "a place"
+        nor = "" if word == "beside" or where[0] == "spots" else ", nor an object of it"
+        raise FieldError(
+            f"{what} is {word} '{name}', which is not {kind} of the scene{nor}{nearest(name, known)}", *where
         )

@@ -9,16 +9,22 @@ from bt_tasksim.core.beside import beside
 from bt_tasksim.core.document import located
 from bt_tasksim.core.errors import FieldError, within
 from bt_tasksim.core.plain import Where
-from bt_tasksim.core.resources import asset, is_file
+from bt_tasksim.core.resources import is_file
 from bt_tasksim.core.typed_file import load_typed
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.fixtures import load_fixture
-from bt_tasksim.scene.mesh_file import check_size, mesh_extent
+from bt_tasksim.scene.object_file import load_object, object_fields, object_file, overridden
 from bt_tasksim.scene.overlap import check_configuration
 from bt_tasksim.scene.scene import Scene
-from bt_tasksim.scene.scene_schema import GoalEntry, ObjectEntry, SceneFile, SizeRange, SpotEntry
-from bt_tasksim.scene.shapes import KINDS, ShapeSize, shape
-from bt_tasksim.scene.specs import Goal, ObjectSpec, SpotSpec
+from bt_tasksim.scene.scene_schema import (
+    FixturePlacement,
+    GoalEntry,
+    ObjectEntry,
+    SceneFile,
+    SpotEntry,
+)
+from bt_tasksim.scene.shapes import KINDS, ShapeSize, shape, shape_kind
+from bt_tasksim.scene.specs import STARTS, FixtureSpec, Goal, ObjectSpec, SpotSpec, split_start
 
 _DENSEST = 20000.0
 _TRIED = 3
@@ -47,19 +53,28 @@ def _scene(content: SceneFile, file: Path) -> Scene:
         robot = _named(content.robot, file, "a robot file")
         load_robot(robot)
     fixtures = []
-    for i, name in enumerate(content.fixtures):
+    for i, listed in enumerate(content.fixtures):
         with within("fixtures", i):
-            fixtures.append(_named(name, file, "a fixture file"))
+            fixtures.append(_fixture(listed, file))
     objects: dict[str, ObjectSpec | str] = {}
     for name, entry in (content.objects or {}).items():
         with within("objects", name):
-            objects[name] = entry if isinstance(entry, str) else _object(name, entry, file)
+            objects[name] = _short(entry, file) if isinstance(entry, str) else _object(name, entry, file)
+    if content.goal is not None and content.goals:
+        raise FieldError(
+            "a scene has a 'goal' or 'goals', and both are given: put the one into the list", "goal"
+        )
+    with within("goal"):
+        goals = [_goal(content.goal)] if content.goal is not None else []
+    for i, wanted in enumerate(content.goals):
+        with within("goals", i):
+            goals.append(_goal(wanted))
     scene = Scene(
         robot=robot,
         fixtures=fixtures,
         objects=objects,
         spots=[_spot(entry) for entry in content.spots],
-        goal=_goal(content.goal) if content.goal is not None else None,
+        goals=goals,
         disturbed=content.disturbed,
         name=content.name or file.stem,
     )
@@ -72,48 +87,51 @@ def _named(name: str, file: Path, what: str) -> str:
     return str(beside(file.parent, name, what)) if is_file(name) else name
 
 
+def _fixture(entry: str | FixturePlacement, file: Path) -> str | FixtureSpec:
+    if isinstance(entry, str):
+        return _named(entry, file, "a fixture file")
+    at = None if entry.at is None else (entry.at[0], entry.at[1], *entry.at[2:3])
+    return FixtureSpec(_named(entry.fixture, file, "a fixture file"), at, entry.yaw, entry.name or "")
+
+
+def _short(text: str, file: Path) -> str | ObjectSpec:
+    """A short entry; an object file that it names lies beside the scene file, or is bundled."""
+    found = split_start(text)
+    if found is None or not is_file(found[0]):
+        return text
+    named, word, reference = found
+    on, inside, beside = (reference if word == each else "" for each in STARTS)
+    return ObjectSpec(on=on, inside=inside, beside=beside, file=str(object_file(named, file.parent)))
+
+
 def _object(name: str, entry: ObjectEntry, file: Path) -> ObjectSpec:
-    kinds = entry.kind or (("mesh",) if entry.mesh is not None else (name,))
-    size, mesh = entry.size, None
-    if "mesh" in kinds:
-        mesh, size = _mesh(name, entry, file)
-    elif entry.mesh is not None or entry.scale is not None:
-        raise FieldError(
-            f"object '{name}': 'mesh' and 'scale' belong to the kind 'mesh', and its kind is '{kinds[0]}'",
-            "kind",
-        )
+    source = file
+    if entry.object is not None:
+        with within("object"):
+            named = object_file(entry.object, file.parent)
+            source = file if entry.mesh is not None else named
+            entry = overridden(load_object(named), entry)
+    elif entry.kind is None and entry.mesh is None:
+        with within("kind"):
+            shape_kind(name)
+        entry = entry.model_copy(update={"kind": (name,)})
+    told = object_fields(entry, source, f"object '{name}'")
+    if not (entry.on or entry.inside or entry.beside):
+        raise FieldError(f"'objects.{name}.on' is missing: where it starts, or 'inside' or 'beside' what")
     spec = ObjectSpec(
-        kinds=kinds,
-        on=entry.on,
+        on=entry.on or "",
+        inside=entry.inside or "",
+        beside=entry.beside or "",
+        distance=entry.distance,
+        gap=entry.gap,
+        movable=entry.movable,
         centre=entry.at or (0.0, 0.0),
-        area=entry.area or ((0.0, 0.0) if entry.at is not None else None),
+        area=entry.area or ((0.0, 0.0) if entry.at is not None and not entry.beside else None),
         yaw=entry.heading,
-        size=size,
-        mass=entry.mass,
-        friction=entry.friction,
-        exponents=entry.exponents,
-        mesh=mesh,
+        **told,
     )
     _check_density(name, spec)
     return spec
-
-
-def _mesh(name: str, entry: ObjectEntry, file: Path) -> tuple[str, SizeRange]:
-    """Path and size of an object's mesh."""
-    if entry.mesh is None:
-        raise FieldError(f"object '{name}': 'mesh' is missing: the path of a mesh file")
-    if entry.size is not None and entry.scale is not None:
-        raise FieldError(f"object '{name}': give either 'scale' or 'size', not both", "scale")
-    with within("mesh"):
-        own, bundled = beside(file.parent, entry.mesh, "a mesh"), asset("objects", entry.mesh)
-        mesh = str(own if own.is_file() or not bundled.is_file() else bundled)
-        x, y, z = mesh_extent(mesh)
-        scale = 1.0 if entry.scale is None else entry.scale
-        scaled = (x * scale, y * scale, z * scale)
-        size = entry.size or (scaled, scaled)
-        for bound in size:
-            check_size(f"object '{name}' (mesh '{entry.mesh}')", bound)
-    return mesh, size
 
 
 def _spot(entry: SpotEntry) -> SpotSpec:
@@ -123,11 +141,16 @@ def _spot(entry: SpotEntry) -> SpotSpec:
 def _goal(entry: GoalEntry) -> Goal:
     return Goal(
         entry.object,
-        entry.place,
+        entry.place or "",
         entry.relation,
         entry.position_tolerance,
         entry.angle_tolerance,
         entry.height,
+        entry.when,
+        entry.distance,
+        on=entry.on or "",
+        inside=entry.inside or "",
+        beside=entry.beside or "",
     )
 
 
@@ -135,7 +158,8 @@ def _drawn(scene: Scene) -> Iterator[tuple[str, ObjectSpec | SpotSpec, Where]]:
     """What is drawn on places: how to call it, its spec, and where it stands in the file."""
     for name, spec in scene.objects.items():
         assert isinstance(spec, ObjectSpec)
-        yield f"object '{name}'", spec, ("objects", name, "at")
+        if spec.start[0] == "on" and spec.on not in scene.objects:
+            yield f"object '{name}'", spec, ("objects", name, "at")
     for i, spot in enumerate(scene.spots):
         yield f"spot '{spot.name}'", spot, ("spots", i, "at")
 
@@ -156,7 +180,7 @@ def _check_areas(scene: Scene) -> None:
                 )
 
 
-def _check_supports(scene: Scene, named: Sequence[str]) -> None:
+def _check_supports(scene: Scene, named: Sequence[str | FixtureSpec]) -> None:
     """No place of the fixtures ``named`` in the file is in mid-air; it may stand on another fixture."""
     fixtures = [load_fixture(name) for name in scene.fixtures]
     for i, name in enumerate(named):

@@ -4,117 +4,64 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from bt_tasksim.core.registry import OWN, parts
 from bt_tasksim.core.typed_file import (
+    Coordinate,
     Extent2,
     Model,
     Name,
     Number,
+    Switch,
     Text,
     Vector2,
     known_values,
     sized,
 )
-from bt_tasksim.scene.mesh_file import check_size
-from bt_tasksim.scene.shapes import KINDS
+from bt_tasksim.scene.object_schema import ObjectFile
 from bt_tasksim.scene.specs import OLD_RELATION
 
-Range = tuple[float, float]
-"""Lowest and highest value."""
 HalfSize = Annotated[Number, Field(ge=0.0, le=100.0)]
 Extents = Annotated[tuple[HalfSize, HalfSize], Field(strict=False), sized(2)]
 """Half sizes along x and y, metres."""
-SizeRange = tuple[tuple[float, float, float], tuple[float, float, float]]
-"""Lowest and highest full size."""
 
 
-def _number(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ValueError("should be a number, or two")
-    return float(value)
-
-
-def between(low: float, high: float, unit: str = "") -> BeforeValidator:
-    """A value, or a lowest and a highest one, between bounds."""
-    bounds = f"between {low:g} and {high:g}{f' {unit}' if unit else ''}"
-
-    def check(value: object) -> Range:
-        pair = value if isinstance(value, (list, tuple)) and len(value) == 2 else (value, value)
-        first, second = _number(pair[0]), _number(pair[1])
-        if not low <= first <= second <= high:
-            raise ValueError(f"should be {bounds}, the lower one first")
-        return first, second
-
-    return BeforeValidator(check, json_schema_input_type=float | tuple[float, float])
-
-
-def _sizes(value: object) -> SizeRange:
-    nested = isinstance(value, list) and len(value) == 2 and isinstance(value[0], list)
-    low, high = (_size(v) for v in (value if nested and isinstance(value, list) else (value, value)))
-    if min(low) <= 0 or any(a > b for a, b in zip(low, high, strict=True)):
-        raise ValueError("should be positive, the smaller one first")
-    for bound in (low, high):
-        check_size("it", bound)
-    return low, high
-
-
-def _size(value: object) -> tuple[float, float, float]:
-    if not isinstance(value, (list, tuple)) or len(value) != 3:
-        raise ValueError("should be 3 numbers, or two times 3")
-    x, y, z = (_number(v) for v in value)
-    return x, y, z
-
-
-def _listed(value: object) -> object:
-    return value if isinstance(value, list) else [value]
+def _two_or_three(value: object) -> object:
+    if not isinstance(value, list | tuple) or len(value) not in (2, 3):
+        raise ValueError("should be 2 or 3 numbers")
+    return value
 
 
 def _relations() -> list[str]:
     return [*parts("goal relation"), OLD_RELATION]
 
 
-Kind = Annotated[Text, known_values(lambda: list(KINDS), "kind of object", OWN)]
-
-
-class ObjectEntry(Model):
+class ObjectEntry(ObjectFile):
     """An object."""
 
-    kind: (
-        Annotated[
-            tuple[Kind, ...],
-            BeforeValidator(_listed, json_schema_input_type=str | list[str]),
-            Field(strict=False, min_length=1, max_length=100),
-        ]
-        | None
-    ) = None
-    """A kind of object, or a list to draw from; by default `mesh` with a mesh, else the object's name."""
-    on: Text
-    """Name of the place where it starts."""
+    object: Text | None = None
+    """An object file in the scene file's folder or below, or a bundled one; the entry goes before it."""
+    on: Text | None = None
+    """Name of the place where it starts, or of the object on top of which it starts."""
+    inside: Text | None = None
+    """Instead of `on`: name of the container, a place or an object, in which it starts."""
+    beside: Text | None = None
+    """Instead of `on`: name of the object beside which it starts, on the same place."""
     at: Vector2 | None = None
     """Middle of the area in which it is drawn, in the place's frame, m; by default the place's origin."""
     area: Extents | None = None
     """Half sizes of that area, m; by default 0 with `at`, else what an arm reaches well."""
     heading: Annotated[Number, Field(ge=-math.tau, le=math.tau)] = math.pi
     """Half width of the range of its heading, rad."""
-    size: (
-        Annotated[SizeRange, BeforeValidator(_sizes, json_schema_input_type=list[float] | list[list[float]])]
-        | None
-    ) = None
-    """Full size, or the lowest and the highest one, m; by default the kind's range."""
-    mass: Annotated[Range, between(0.001, 20.0, "kg")] = (0.08, 0.25)
-    """Mass, or the lowest and the highest one, kg."""
-    friction: Annotated[Range, between(0.01, 2.0)] = (0.4, 0.9)
-    """Friction coefficient, or the lowest and the highest one."""
-    exponents: Annotated[Range, between(1e-6, 2.0)] = (0.2, 1.0)
-    """Shape exponents of a superellipsoid, from box-like (near 0) to ellipsoid (1)."""
-    mesh: Text | None = None
-    """A mesh file in the scene file's folder or below: OBJ, STL, PLY, OFF or GLB."""
-    scale: Annotated[Number, Field(gt=0.0, le=1e6)] | None = None
-    """What brings the mesh file's numbers to metres; by default 1."""
+    distance: Annotated[Number, Field(ge=0.0, le=10.0)] = 0.10
+    """Of `beside`: between the two outlines from above, at most, m."""
+    gap: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.005
+    """To other objects at the same height, at least, m."""
+    movable: Switch = False
+    """It may be shifted and tilted in a run; else it counts as knocked over where no goal names it."""
 
 
 def _form(value: object) -> str:
@@ -143,21 +90,53 @@ class SpotEntry(Model):
     """Half width of the range of its heading, rad."""
 
 
+class FixturePlacement(Model):
+    """A fixture that stands elsewhere than its file says, or one of several of its kind."""
+
+    fixture: Text
+    """A bundled fixture, or a fixture file in this file's folder or below."""
+    at: Annotated[tuple[Coordinate, ...], Field(strict=False), BeforeValidator(_two_or_three)] | None = None
+    """Where its origin is, x y or x y z, robot base frame, m; by default where its file says."""
+    yaw: Annotated[Number, Field(ge=-math.tau, le=math.tau)] | None = None
+    """Its heading in the robot base frame, rad; by default that of its file."""
+    name: Name | None = None
+    """Its own name; its places are called by it, too: `<name>`, or `<name>_<place>`."""
+
+
+def _fixture_form(value: object) -> str:
+    return "~name" if isinstance(value, str | int) else "~placed"
+
+
+FixtureOrPlacement = Annotated[
+    Annotated[Text, Tag("~name")] | Annotated[FixturePlacement, Tag("~placed")], Discriminator(_fixture_form)
+]
+
+
 class GoalEntry(Model):
-    """Where an object should be at the end."""
+    """Where an object should be."""
 
     object: Text
     """Name of the object."""
-    place: Text
-    """Name of the place."""
+    place: Text | None = None
+    """Name of a place or of another object, with `relation`; or give `on`, `inside` or `beside`."""
+    on: Text | None = None
+    """What it should stand on: a place's origin, the middle of an object; or the reference of `relation`."""
+    inside: Text | None = None
+    """The container, or object, that it should be in."""
+    beside: Text | None = None
+    """The object or place that it should stand near."""
     relation: Annotated[Text, known_values(_relations, "relation", OWN)] = "on"
-    """`on` the place's origin, `inside` it, `lifted` in the hand above where it stood, or one of yours."""
+    """`on`, `anywhere` on it, `inside`, `beside`, `lifted` in the hand above where it stood, or your own."""
     position_tolerance: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.03
     """How far from the place's origin the object may be, m."""
     angle_tolerance: Annotated[Number, Field(gt=0.0, le=math.pi)] = math.radians(10.0)
     """How far it may be tilted, or turned from the place's heading, rad."""
     height: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.3
     """Of `lifted`: how far above where it stood, m."""
+    when: Literal["end", "once"] = "end"
+    """True at the `end` of the run, or `once` in it."""
+    distance: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.10
+    """Of `beside`: between the two outlines from above, at most, m."""
 
 
 class SceneFile(Model):
@@ -169,13 +148,16 @@ class SceneFile(Model):
     """Name of the scene in results; by default that of the file."""
     robot: Text = "panda"
     """A bundled robot, or a robot file in this file's folder or below."""
-    fixtures: Annotated[tuple[Text, ...], Field(strict=False, max_length=50)] = ()
-    """Bundled fixtures, or fixture files in this file's folder or below; the table is always there."""
+    fixtures: Annotated[tuple[FixtureOrPlacement, ...], Field(strict=False, max_length=50)] = ()
+    """Bundled fixtures, fixture files in this file's folder or below, or entries; the table is always there.
+    """
     objects: Annotated[dict[Name, ShortOrEntry], Field(max_length=100)] | None = None
     """By name: an entry, or in short ``cup on upper_board``, or ``on upper_board``."""
     spots: Annotated[tuple[SpotEntry, ...], Field(strict=False, max_length=100)] = ()
     """Spots marked on places."""
     goal: GoalEntry | None = None
-    """What should be true at the end."""
+    """What should be true, where that is one thing."""
+    goals: Annotated[tuple[GoalEntry, ...], Field(strict=False, max_length=100)] = ()
+    """All that should be true."""
     disturbed: Text | None = None
     """An object that is knocked out of the hand on the way."""

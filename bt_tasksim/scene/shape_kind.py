@@ -18,6 +18,7 @@ from typing import ClassVar
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.scene.geometry import Colour, Shape, ShapeSize, Size
+from bt_tasksim.scene.grips import Grips
 
 WIDEST_GRASP = 0.07
 """Metres: a further closing axis is named only where the object is no wider."""
@@ -82,9 +83,19 @@ class ShapeKind(ABC):
         """Full size ``(3,)`` of the bounding box, metres; by default the size itself."""
         return size.size
 
+    def symmetry_of(self, size: ShapeSize) -> int:
+        """Order of the symmetry of an object of this size; by default its kind's `symmetry`."""
+        return self.symmetry
+
     def grasp_axes(self, size: ShapeSize) -> tuple[GraspAxis, ...]:
         """Where two fingers may close, best first; by default along y."""
         return (((0.0, 1.0, 0.0), size.size[1]),)
+
+    def grips(self, size: ShapeSize) -> Grips:
+        """Where two fingers may hold it; by default about its middle along its `grasp_axes`."""
+        axes = self.grasp_axes(size)
+        middle = [(0.0, 0.0, 0.0)] * len(axes)
+        return Grips.of(middle, [axis for axis, _ in axes], [width for _, width in axes])
 
     def resting_height(self, size: ShapeSize) -> float:
         """Metres from the surface that it stands on up to its origin; by default half its height."""

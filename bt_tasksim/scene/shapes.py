@@ -6,18 +6,22 @@ The kinds are in `bt_tasksim.scene.kinds`, one file each; `ShapeKind` says what 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache, lru_cache
 
 from bt_tasksim.core.files import file_version
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import part, parts
 from bt_tasksim.core.world import ObjectModel
 from bt_tasksim.scene.geometry import BoxPiece, ConvexPiece, Piece, Shape, ShapeSize, Size
+from bt_tasksim.scene.grips import GivenGrip, Grips
 from bt_tasksim.scene.shape_kind import ShapeKind
 
 __all__ = [
     "KINDS",
     "BoxPiece",
     "ConvexPiece",
+    "KnownSolid",
     "Piece",
     "Shape",
     "ShapeSize",
@@ -81,24 +85,64 @@ def size_range(kind: str, mesh: str | None = None) -> tuple[Size, Size]:
     return shape_kind(kind).sizes(mesh)
 
 
-def object_model(name: str, kind: str, size: ShapeSize) -> ObjectModel:
+def object_model(
+    name: str,
+    kind: str,
+    size: ShapeSize,
+    grasps: tuple[GivenGrip, ...] = (),
+    symmetry: int | None = None,
+) -> ObjectModel:
     """What is known beforehand about an object of this kind and size, see `ObjectModel`.
+
+    Args:
+        name: Its name.
+        kind: Its kind.
+        size: Its size.
+        grasps: Where it may be held, instead of what its kind says.
+        symmetry: Order of its symmetry about z, instead of its kind's.
 
     Raises:
         InputError: Unknown kind, or a size that it cannot have.
     """
     found = shape_kind(kind)
     found.check(size)
-    axes = found.grasp_axes(size)
+    axes = Grips.given(grasps).axes() or found.grasp_axes(size)
     return ObjectModel(
         name,
         kind,
         found.extent(size),
-        found.symmetry,
+        found.symmetry_of(size) if symmetry is None else symmetry,
         tuple(axis for axis, _ in axes),
         tuple(width for _, width in axes),
         cubic=found.cubic,
+        solid=KnownSolid(kind, size, grasps),
     )
+
+
+@dataclass(frozen=True)
+class KnownSolid:
+    """What an object is taken to be, from its kind and size; see `bt_tasksim.core.world.KnownGeometry`."""
+
+    kind: str
+    size: ShapeSize
+    given: tuple[GivenGrip, ...] = ()
+
+    @property
+    def shape(self) -> Shape:
+        """Its geometry."""
+        return shape(self.kind, self.size)
+
+    @property
+    def pieces(self) -> tuple[Array, ...]:
+        """See `KnownGeometry.pieces`."""
+        return tuple(piece.corners() for piece in self.shape.collision)
+
+    @property
+    def grips(self) -> Grips:
+        """Where two fingers may hold it: as given, else as its kind says."""
+        if self.given:
+            return Grips.given(self.given)
+        return shape_kind(self.kind).grips(self.size)
 
 
 def resting_height(kind: str, size: ShapeSize) -> float:

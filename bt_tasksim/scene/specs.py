@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +12,20 @@ from bt_tasksim.core.errors import FieldError, InputError, nearest, within
 from bt_tasksim.core.names import check_name
 from bt_tasksim.core.registry import parts
 from bt_tasksim.core.renamed import renamed_fields
+from bt_tasksim.core.resources import is_file
+from bt_tasksim.scene.geometry import Colour
+from bt_tasksim.scene.grips import GivenGrip
+from bt_tasksim.scene.object_file import load_object, object_fields, object_file
 from bt_tasksim.scene.shapes import shape_kind
 
 SPLITS = ("all", "even", "odd")
 """Parts of a range from which draws are made, see `ObjectSpec`."""
+STARTS = ("on", "inside", "beside")
+"""Words that say where an object starts, and in goals where it should be."""
+MOMENTS = ("end", "once")
+"""When a goal has to be true, see `Goal`."""
+FARTHEST = 100.0
+"""Metres from the robot beyond which nothing stands."""
 OLD_RELATION = "stands"
 """What files of version 0.1 call the goal relation ``on``."""
 
@@ -23,9 +35,12 @@ OLD_RELATION = "stands"
 class ObjectSpec:
     """What an object may be; ranges are uniform.
 
+    It starts ``on`` a place or an object, ``inside`` a container or an object, or ``beside`` an object: one
+    of the three.
+
     Attributes:
-        kinds: Categories drawn from, such as ``("box", "cylinder")``.
-        on: Name of the place where it starts.
+        kinds: One or several to draw from, such as ``("box", "cylinder")``; may be left out with a ``file``.
+        on: Name of the place where it starts, or of the object on top of which it starts.
         area: Half sizes ``(2,)`` in metres of the rectangle on that place in which its centre is drawn; None
             for the place's own default.
         centre: Centre ``(2,)`` of that rectangle in the place's frame, metres.
@@ -41,10 +56,24 @@ class ObjectSpec:
             ``even`` or ``odd`` ones. This keeps draws apart where both have the same ranges; where these
             differ, strips overlap.
         size_error: Half width of the relative error with which the size is known beforehand.
+        inside: Name of the container, a place or an object, in which it starts; ``area`` is all of it by
+            default.
+        beside: Name of the object beside which it starts, on the same place.
+        distance: Metres between its outline and that of the object beside which it starts, at most.
+        gap: Metres between it and what stands at the same height, at least.
+        movable: It may be shifted and tilted in a run: then it does not count as knocked over.
+        file: Path of an object file, or name of a bundled one, which says what is left at its default here.
+        colour: RGB colour (sRGB, 0 to 1); None for one of its kind's.
+        grasps: Where two fingers may hold it, in its own frame; empty for what its kind says.
+        symmetry: Order of its symmetry about z, 0 for a body of revolution; None for its kind's.
+        category: What people call things like it; empty for its kind.
+
+    Raises:
+        FieldError: A field is no good, or it is said in no way or in several ways where it starts.
     """
 
-    kinds: tuple[str, ...]
-    on: str
+    kinds: tuple[str, ...] | str = ()
+    on: str = ""
     area: tuple[float, float] | None = None
     centre: tuple[float, float] = (0.0, 0.0)
     yaw: float = np.pi
@@ -55,8 +84,32 @@ class ObjectSpec:
     mesh: str | None = None
     split: str = "all"
     size_error: float = 0.0
+    inside: str = ""
+    beside: str = ""
+    distance: float = 0.10
+    gap: float = 0.005
+    movable: bool = False
+    file: str | None = None
+    colour: Colour | None = None
+    grasps: tuple[GivenGrip, ...] = ()
+    symmetry: int | None = None
+    category: str = ""
 
     def __post_init__(self) -> None:
+        if self.file is not None:
+            self._complete(self.file)
+        if isinstance(self.kinds, str):
+            object.__setattr__(self, "kinds", (self.kinds,))
+        if not self.kinds:
+            raise FieldError("an object needs 'kinds', or a 'file' that says what it is", "kind")
+        said = [word for word in STARTS if getattr(self, word)]
+        if len(said) != 1:
+            found = f"found {' and '.join(map(repr, said))}" if said else "and none is given"
+            raise FieldError(f"an object starts 'on', 'inside' or 'beside' one thing: {found}", *said[1:2])
+        for name in ("distance", "gap"):
+            value = getattr(self, name)
+            if not 0.0 <= value < np.inf:
+                raise FieldError(f"'{name}' of an object should be at least 0, found {value:g}", name)
         if self.split not in SPLITS:
             raise FieldError(f"unknown split '{self.split}'{nearest(self.split, SPLITS)}", "split")
         if not 0.0 <= self.size_error < 1.0:
@@ -64,6 +117,56 @@ class ObjectSpec:
         for kind in self.kinds:
             with within("kind"):
                 shape_kind(kind)
+
+    @property
+    def start(self) -> tuple[str, str]:
+        """How it starts and what that refers to, such as ``("on", "table")``."""
+        return next((word, getattr(self, word)) for word in STARTS if getattr(self, word))
+
+    def _complete(self, file: str) -> None:
+        """Take from an object file what is at its default; afterwards it is as if written here."""
+        path = object_file(file)
+        told = object_fields(load_object(path), path)
+        for item in dataclasses.fields(self):
+            if item.name in told and getattr(self, item.name) == item.default:
+                object.__setattr__(self, item.name, told[item.name])
+        object.__setattr__(self, "file", None)
+
+
+@dataclass(frozen=True)
+class FixtureSpec:
+    """A fixture and where it stands; `bt_tasksim.Fixture` is this class.
+
+    Attributes:
+        fixture: Name of a bundled fixture, or path of a data file.
+        at: Where its origin is ``(x, y)`` or ``(x, y, z)``, robot base frame, metres; None for where its file
+            says.
+        yaw: Its heading in the robot base frame, radians; None for the file's.
+        name: Its own name, where the same fixture is there several times. The place that has the fixture's
+            name gets this one, and other places ``<name>_<place>``.
+
+    Raises:
+        FieldError: A number is no good, or the name cannot be one.
+    """
+
+    fixture: str
+    at: tuple[float, ...] | None = None
+    yaw: float | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if self.name:
+            check_name(self.name, "the name of a fixture")
+        if self.at is not None:
+            object.__setattr__(self, "at", tuple(float(v) for v in self.at))
+            if len(self.at) not in (2, 3) or not all(abs(v) <= FARTHEST for v in self.at):
+                raise FieldError(
+                    f"'at' of a fixture should be x and y, or x, y and z, in metres, found {self.at}", "at"
+                )
+        if self.yaw is not None and not abs(self.yaw) <= 2 * np.pi:
+            raise FieldError(
+                f"'yaw' of a fixture should be radians within a full turn, found {self.yaw:g}", "yaw"
+            )
 
 
 @dataclass(frozen=True)
@@ -107,45 +210,104 @@ class HandStart:
     turn: float = 0.4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Goal:
-    """Where an object should be at the end, judged by the hidden state.
+    """Where an object should be, judged by the hidden state.
+
+    ``Goal("can", inside="trash_bin")``, ``Goal("cup", on="lower_board")``, ``Goal("red", on="blue")`` and
+    ``Goal("box", beside="cup")`` say the reference and the relation in one; ``Goal("cup", "table")`` means
+    ``on``.
 
     Attributes:
         object: Name of the object.
-        place: Name of the place.
-        relation: Name of a goal relation (`bt_tasksim.scene.relations`): ``on`` (upright on the place's
-            origin, with its heading up to the object's symmetry), ``inside`` (within the container, below its
-            rim), ``lifted`` (held in the hand alone, ``height`` above where it stood on the place, and as
-            upright), or one of your own.
+        place: What it refers to: name of a place, or of another object, wherever that is then. Empty where
+            the relation needs none.
+        relation: Name of a goal relation (`bt_tasksim.scene.relations`): ``on`` (upright on a place's origin,
+            with its heading up to the object's symmetry; or on the middle of an object's top), ``anywhere``
+            (upright anywhere on a place or an object), ``inside`` (within a container, below its rim, or
+            within an object), ``beside`` (at the same level, ``distance`` away at most), ``lifted`` (held in
+            the hand alone, ``height`` above where it stood, and as upright), or one of your own.
         position_tolerance: Metres.
         angle_tolerance: Radians.
         height: Metres, for ``lifted``.
+        when: ``end``: true at the end of the run. ``once``: true at some moment of it.
+        distance: Metres between the two outlines at most, for ``beside``.
+
+    Raises:
+        FieldError: A field is no good, or the reference is missing or named twice.
     """
 
     object: str
-    place: str
+    place: str = ""
     relation: str = "on"
     position_tolerance: float = 0.03
     angle_tolerance: float = float(np.deg2rad(10.0))
     height: float = 0.3
+    when: str = "end"
+    distance: float = 0.10
 
-    def __post_init__(self) -> None:
-        if self.relation == OLD_RELATION:
-            object.__setattr__(self, "relation", "on")
+    def __init__(
+        self,
+        object: str,
+        place: str = "",
+        relation: str = "on",
+        position_tolerance: float = 0.03,
+        angle_tolerance: float = float(np.deg2rad(10.0)),
+        height: float = 0.3,
+        when: str = "end",
+        distance: float = 0.10,
+        *,
+        on: str = "",
+        inside: str = "",
+        beside: str = "",
+    ) -> None:
+        named = {word: name for word, name in zip(STARTS, (on, inside, beside), strict=True) if name}
+        if len(named) + bool(place) > 1:
+            said = [f"{word}='{name}'" for word, name in named.items()]
+            said = [f"'{place}'", *said] if place else said
+            raise FieldError(f"a goal of '{object}' has one reference, found {' and '.join(said)}", "place")
+        relation = "on" if relation == OLD_RELATION else relation
+        for word, name in named.items():
+            if word != "on" and relation not in ("on", word):
+                raise FieldError(
+                    f"a goal of '{object}' is {word} '{name}' or it is '{relation}': for another relation "
+                    f"write on='{name}', relation='{relation}'",
+                    "relation",
+                )
+            place, relation = name, word if relation == "on" else relation
         relations = parts("goal relation")
-        if self.relation not in relations:
+        if relation not in relations:
+            raise FieldError(f"unknown relation '{relation}'{nearest(relation, relations)}", "relation")
+        if not place and getattr(relations[relation], "needs_place", True):
             raise FieldError(
-                f"unknown relation '{self.relation}'{nearest(self.relation, relations)}", "relation"
+                f"the goal '{relation}' of '{object}' names no place and no object: write "
+                f"Goal('{object}', on='table')",
+                "place",
             )
-        for name in ("position_tolerance", "angle_tolerance", "height"):
-            value = getattr(self, name)
+        if place == object:
+            raise FieldError(f"the goal of '{object}' refers to '{object}' itself", "place")
+        if when not in MOMENTS:
+            raise FieldError(f"'when' of a goal is 'end' or 'once', found '{when}'", "when")
+        given = {"object": object, "place": place, "relation": relation, "when": when}
+        lengths = {
+            "position_tolerance": position_tolerance,
+            "angle_tolerance": angle_tolerance,
+            "height": height,
+            "distance": distance,
+        }
+        for name, value in lengths.items():
             if not 0.0 < value < np.inf:
                 raise FieldError(f"'{name}' of a goal should be positive, found {value:g}", name)
+        for name, kept in {**given, **lengths}.items():
+            super().__setattr__(name, kept)
+
+    def __str__(self) -> str:
+        """In words: ``cup on lower_board``."""
+        return " ".join(word for word in (self.object, self.relation, self.place) if word)
 
 
 def object_spec(name: str, spec: ObjectSpec | str) -> ObjectSpec:
-    """The spec that ``"cup on upper_board"`` or ``"on upper_board"`` stands for.
+    """The spec that ``"cup on upper_board"``, ``"mug.yaml on table"`` or ``"box beside cup"`` stands for.
 
     Args:
         name: The object's name, and its kind where the text names none.
@@ -156,8 +318,23 @@ def object_spec(name: str, spec: ObjectSpec | str) -> ObjectSpec:
     """
     if isinstance(spec, ObjectSpec):
         return spec
-    kind, _, place = spec.partition("on ")
-    kind = kind.strip() or name
-    if not place.strip():
-        raise FieldError(f"object '{name}': '{spec}' should read '<kind> on <place>' or 'on <place>'")
-    return ObjectSpec(kinds=(kind,), on=place.strip())
+    found = split_start(spec)
+    if found is None:
+        raise FieldError(
+            f"object '{name}': '{spec}' should read '<kind> on <place>' or 'on <place>', and 'inside' or "
+            f"'beside' likewise"
+        )
+    kind, word, reference = found
+    on, inside, beside = (reference if word == each else "" for each in STARTS)
+    if is_file(kind):
+        return ObjectSpec(on=on, inside=inside, beside=beside, file=kind)
+    return ObjectSpec(kinds=(kind or name,), on=on, inside=inside, beside=beside)
+
+
+def split_start(text: str) -> tuple[str, str, str] | None:
+    """``"cup on table"`` as ``("cup", "on", "table")``; None where it does not read like that."""
+    found = re.fullmatch(rf"\s*(?:(\S.*?)\s+)?({'|'.join(STARTS)})\s+(\S.*?)\s*", text)
+    if found is None:
+        return None
+    kind, word, reference = found.groups()
+    return kind or "", word, reference

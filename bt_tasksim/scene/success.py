@@ -1,13 +1,15 @@
-"""The success evaluator: whether a run did what the scene's goal asks, as the physics state tells it.
+"""The success evaluator: whether a run did what the scene's goals ask, as the physics state tells it.
 
 Nothing here looks at the tree, its statuses or its estimates. What each relation asks of an object stands in
-`bt_tasksim.scene.relations`; what every run must keep to stands here.
+`bt_tasksim.scene.relations`, what every goal asks in `bt_tasksim.scene.goal_verdict`; what every run must
+keep to stands here.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,27 +18,48 @@ import numpy as np
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Outcome, register_reason
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.units import METRES, METRES_PER_SECOND, RADIANS, RADIANS_PER_SECOND
+from bt_tasksim.core.units import COUNT, METRES, RADIANS
 from bt_tasksim.core.world import Hidden, WorldModel
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.goal_verdict import (
+    AT_REST,
+    FUNCTION_NOT_HERE,
+    HAND_NOT_CLEAR,
+    NOT_AT_REST,
+    GoalVerdict,
+    judge_function,
+    judge_goal,
+)
+from bt_tasksim.scene.moments import Moments
 from bt_tasksim.scene.relations import FinalState, relation_named
-from bt_tasksim.scene.specs import Goal
 
-AT_REST = (0.01, 0.1)
-"""Speeds in m/s and rad/s below which an object is at rest."""
+__all__ = [
+    "AT_REST",
+    "DEEPEST",
+    "GOALS_REACHED",
+    "HAND_NOT_CLEAR",
+    "KNOCKED",
+    "KNOCKED_OVER",
+    "NEVER",
+    "NOT_AT_REST",
+    "NO_GOAL",
+    "PENETRATION",
+    "GoalVerdict",
+    "Verdict",
+    "at_rest",
+    "evaluate_success",
+]
+
 DEEPEST = 0.002
 """Metres of overlap of two bodies that may not be exceeded at any time of a run."""
 KNOCKED = (0.05, math.radians(15.0))
 """Metres and radians by which another object may be shifted or tilted."""
 
-NO_GOAL = register_reason("no_goal", "no goal is set for this scene")
-NOT_AT_REST = register_reason(
-    "not_at_rest",
-    "{object} still moves at {speed} and {turning}",
-    speed=METRES_PER_SECOND,
-    turning=RADIANS_PER_SECOND,
+NO_GOAL = register_reason(
+    "no_goal", "no goal is set for this scene, so the tree's own word was taken and nothing was judged"
 )
-HAND_NOT_CLEAR = register_reason("hand_not_clear", "the hand still touches {object}")
+GOALS_REACHED = register_reason("goals_reached", "all {count:.0f} goals are reached: {said}", count=COUNT)
+NEVER = register_reason("never", "at no moment of the run, and in the end")
 KNOCKED_OVER = register_reason(
     "knocked_over", "{object} was shifted by {shift} and tilted by {tilt:.0f}", shift=METRES, tilt=RADIANS
 )
@@ -49,10 +72,12 @@ class Verdict:
 
     Attributes:
         success: Everything asked for is true.
-        outcome: How the object is at the end, or the first thing that is wrong.
-        position_error: Metres from where the object should be; NaN where no goal says so.
-        angle_error: Radians from how it should be, up to its symmetry; NaN likewise.
+        outcome: How the objects are at the end, or the first thing that is wrong.
+        position_error: Metres from where the object should be, the largest of all goals; NaN where no goal
+            says so.
+        angle_error: Radians from how it should be, up to its symmetry; likewise.
         penetration: Deepest overlap of two bodies during the run, metres.
+        placements: What became of each goal.
     """
 
     success: bool
@@ -60,6 +85,12 @@ class Verdict:
     position_error: float
     angle_error: float
     penetration: float
+    placements: tuple[GoalVerdict, ...] = ()
+
+    @property
+    def judged(self) -> bool:
+        """It says more than the tree's own word: there was a goal, and each could be judged."""
+        return not (self.outcome.is_a(NO_GOAL) or self.outcome.is_a(FUNCTION_NOT_HERE))
 
     @property
     def reason(self) -> str:
@@ -80,58 +111,97 @@ class Verdict:
         }
         return {
             "success": self.success,
+            "judged": self.judged,
             "reason": self.reason,
             "why": self.why,
             **{name: value if math.isfinite(value) else None for name, value in errors.items()},
+            "placements": [placement.to_data() for placement in self.placements],
         }
 
 
-def evaluate_success(configuration: ActorConfiguration, world: WorldModel, hidden: Hidden) -> Verdict:
+def evaluate_success(
+    configuration: ActorConfiguration, world: WorldModel, hidden: Hidden, moments: Moments | None = None
+) -> Verdict:
     """Judge the state at the end of a run.
 
     Args:
-        configuration: The world as it was drawn, with its goal.
+        configuration: The world as it was drawn, with its goals.
         world: Names and facts.
         hidden: The physics state at the end.
+        moments: What was seen of goals that have to be true once; None where nobody looked: then they are
+            judged at the end alone.
+
+    Raises:
+        InputError: A goal that is a function raised an exception, or answered nonsense.
     """
-    goal, depth = configuration.goal, float(hidden.penetration)
-    if goal is None:
-        return Verdict(True, NO_GOAL(), math.nan, math.nan, depth)
+    depth = float(hidden.penetration)
     final = FinalState(configuration, world, hidden)
-    relation = relation_named(goal.relation)
-    placement = relation.evaluate(goal, final)
-    wrong = None if placement.reached else placement.outcome
-    if wrong is None:
-        wrong = next(_wrong(goal, final, relation.in_hand), None)
+    placements = (*_goals(final, moments), *(judge_function(f, final) for f in configuration.functions))
+    if not placements:
+        return Verdict(True, NO_GOAL(), math.nan, math.nan, depth)
+    wrong = next(_wrong(placements, final), None)
     return Verdict(
-        wrong is None, wrong or placement.outcome, placement.position_error, placement.angle_error, depth
+        wrong is None,
+        wrong or _reached(placements),
+        _largest([placement.position_error for placement in placements]),
+        _largest([placement.angle_error for placement in placements]),
+        depth,
+        placements,
     )
 
 
-def _wrong(goal: Goal, final: FinalState, in_hand: bool) -> Iterator[Outcome]:
-    """What is wrong besides the goal's own relation, the first thing first."""
-    hidden = final.hidden
-    if not in_hand:
-        velocity = hidden.velocities[final.world.object_index(goal.object)]
-        speed, turning = (float(np.linalg.norm(v)) for v in np.split(velocity, 2))
-        if speed > AT_REST[0] or turning > AT_REST[1]:
-            yield NOT_AT_REST(object=goal.object, speed=speed, turning=turning)
-        if final.touched(goal.object):
-            yield HAND_NOT_CLEAR(object=goal.object)
-        yield from _knocked_over(goal, final)
-    if float(hidden.penetration) > DEEPEST:
-        yield PENETRATION(depth=hidden.penetration)
+def _goals(final: FinalState, moments: Moments | None) -> Iterator[GoalVerdict]:
+    for goal in final.configuration.goals:
+        before = None if moments is None else moments.found(goal)
+        now = judge_goal(goal, final) if before is None else before
+        if goal.when == "once" and not now.reached:
+            now = dataclasses.replace(now, outcome=NEVER(now.outcome))
+        yield now
 
 
-def _knocked_over(goal: Goal, final: FinalState) -> Iterator[Outcome]:
+def _reached(placements: Sequence[GoalVerdict]) -> Outcome:
+    """What to say where nothing is wrong."""
+    unknown = next((p.outcome for p in placements if p.reached is None), None)
+    if unknown is not None:
+        return unknown
+    if len(placements) == 1:
+        return placements[0].outcome
+    said = "; ".join(placement.outcome.sentence for placement in placements)
+    return GOALS_REACHED(count=len(placements), said=said)
+
+
+def _wrong(placements: Sequence[GoalVerdict], final: FinalState) -> Iterator[Outcome]:
+    """What is wrong, the first thing first."""
+    yield from (placement.outcome for placement in placements if placement.reached is False)
+    goals = final.configuration.goals
+    if any(not relation_named(goal.relation).in_hand for goal in goals):
+        yield from _knocked_over({goal.object for goal in goals}, final)
+    if float(final.hidden.penetration) > DEEPEST:
+        yield PENETRATION(depth=final.hidden.penetration)
+
+
+def _knocked_over(meant: set[str], final: FinalState) -> Iterator[Outcome]:
+    """Objects that were moved, though no goal says that they should be.
+
+    What stood on an object, or in it, is carried along: it is looked at from there.
+    """
     for actor in final.configuration.objects:
-        if actor.name == goal.object:
+        if actor.name in meant or actor.movable:
             continue
         before, now = final.start(actor.name), final.pose(actor.name)
+        if actor.base:
+            before, now = (
+                poses.multiply(poses.inverse(base), pose)
+                for base, pose in ((final.start(actor.base), before), (final.pose(actor.base), now))
+            )
         shift = float(np.linalg.norm(now[:3] - before[:3]))
         tilted = float(poses.tilt(now[3:]) - poses.tilt(before[3:]))
         if shift > KNOCKED[0] or tilted > KNOCKED[1]:
             yield KNOCKED_OVER(object=actor.name, shift=shift, tilt=tilted)
+
+
+def _largest(errors: Sequence[float]) -> float:
+    return max((error for error in errors if math.isfinite(error)), default=math.nan)
 
 
 def at_rest(velocities: Array) -> Array:

@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Self
 
 from py_trees.common import Status
 
 from bt_tasksim.concept.batch_leaves import leaf_in_batch
 from bt_tasksim.concept.plugins import load_all
+from bt_tasksim.core.closing import Closing
 from bt_tasksim.core.cluster import Cluster
 from bt_tasksim.core.cluster_process import LOCAL
 from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
@@ -202,7 +202,7 @@ def evaluate(
                 robot=runner.robot.name,
                 engines=engines,
                 perception=perception,
-                policies=_policies(runner),
+                policies=policies_of(runner),
                 outcomes=tuple(found[s] for s in seeds if s in found),
                 seconds=time.perf_counter() - started,
                 asked=len(seeds),
@@ -275,7 +275,7 @@ def _same_player(job: Job, subject: dict[str, str]) -> Player:
     return player
 
 
-class Player:
+class Player(Closing):
     """Plays the episodes of an evaluation: what each member of a fleet keeps.
 
     Args:
@@ -300,12 +300,9 @@ class Player:
         tree = BatchTree(self.runner.tree, 1, lambda leaf: leaf_in_batch(leaf, context))
         self._remembers = bool(tree.unknown)  # such a node may: each episode has a new one
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         """Let go of the engines: what serves one client at a time is free for the next one."""
-        self.runner.pipeline.close()
+        self.runner.close()
         if self._batch is not None:
             self._batch.close()
 
@@ -339,7 +336,7 @@ class Player:
         for seed, found in self._batch.run(seeds, stream):
             if isinstance(found, InputError):
                 raise found
-            outcome = _unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else _outcome(found)
+            outcome = unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else in_short(found)
             yield index_of[seed], outcome
 
 
@@ -358,23 +355,23 @@ def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOut
     """
     started = time.perf_counter()
     try:
-        return _outcome(runner.run(seed, stream))
+        return in_short(runner.run(seed, stream))
     except InputError:
         raise
     except BtTasksimError as error:
         if isinstance(error, MachineError) and (isinstance(error, LostEngine) or runner.options.real):
             raise  # an engine that is not there any more, or a robot, says nothing about the tree
-        return _unfinished(seed, error, time.perf_counter() - started)
+        return unfinished(seed, error, time.perf_counter() - started)
 
 
-def _unfinished(seed: int, error: BtTasksimError, seconds: float) -> EpisodeOutcome:
-    """An episode that an error has ended."""
+def unfinished(seed: int, error: BtTasksimError, seconds: float) -> EpisodeOutcome:
+    """An episode that an error has ended, after so many seconds."""
     nan = float("nan")
     outcome = outcome_of_error(error)
     return EpisodeOutcome(seed, False, Status.INVALID.name, "", outcome, 0, nan, nan, nan, seconds)
 
 
-def _outcome(result: Result) -> EpisodeOutcome:
+def in_short(result: Result) -> EpisodeOutcome:
     """A result, in short."""
     v, nan = result.verdict, float("nan")
     return EpisodeOutcome(
@@ -388,6 +385,8 @@ def _outcome(result: Result) -> EpisodeOutcome:
         angle_error=nan if v is None else v.angle_error,
         penetration=nan if v is None else v.penetration,
         wall_time=result.wall_time,
+        judged=result.judged,
+        placements=() if v is None else tuple(placement.to_data() for placement in v.placements),
     )
 
 
@@ -395,14 +394,15 @@ def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
     from bt_tasksim.training.subject import evaluation_subject, own_code
 
     code = own_code(runner.tree, job.tree, job.plugins)
-    return evaluation_subject(runner.tree, runner.scene, job.options, _policies(runner), code, stream)
+    return evaluation_subject(runner.tree, runner.scene, job.options, policies_of(runner), code, stream)
 
 
 def _name(job: Job) -> str:
     return Path(job.tree).stem if job.tree.endswith((".py", ".xml")) else job.tree
 
 
-def _policies(runner: Runner) -> dict[str, str]:
+def policies_of(runner: Runner) -> dict[str, str]:
+    """Policy in use by leaf."""
     from bt_tasksim.concept.leaf import ConceptNode
 
     return {

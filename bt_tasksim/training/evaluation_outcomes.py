@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from bt_tasksim.core.markup import html_pairs
 from bt_tasksim.core.outcomes import Outcome, outcome_from_data, recorded_outcome
 
 CONFIDENCE = 0.95
@@ -36,6 +37,9 @@ class EpisodeOutcome:
         angle_error: Radians, likewise.
         penetration: Deepest overlap of two bodies, metres.
         wall_time: Seconds it took.
+        judged: The physics state was asked whether all goals are reached; else a success is the tree's own
+            word.
+        placements: What became of each goal, in plain data, see `bt_tasksim.scene.goal_verdict.GoalVerdict`.
     """
 
     seed: int
@@ -48,6 +52,8 @@ class EpisodeOutcome:
     angle_error: float
     penetration: float
     wall_time: float
+    judged: bool = True
+    placements: tuple[Mapping[str, Any], ...] = ()
 
     @property
     def reason(self) -> str:
@@ -62,6 +68,7 @@ class EpisodeOutcome:
     def to_data(self) -> dict[str, Any]:
         """As plain data, for files: ``reason`` is the name, ``outcome`` has the numbers, None is unknown."""
         fields = {name: _known(value) for name, value in vars(self).items() if name != "outcome"}
+        fields["placements"] = list(self.placements)
         return {**fields, "reason": self.reason, "why": self.why, "outcome": self.outcome.to_data()}
 
     @classmethod
@@ -69,10 +76,14 @@ class EpisodeOutcome:
         """What `to_data` wrote, or an older version, which knew no more than a reason and a sentence."""
         fields = {key: value for key, value in data.items() if key not in ("reason", "why", "outcome")}
         fields |= {name: math.nan for name in ERRORS if fields.get(name) is None}
+        fields["placements"] = tuple(data.get("placements", ()))
         if "outcome" in data:
-            return cls(**fields, outcome=outcome_from_data(data["outcome"]))
-        old = recorded_outcome(data["reason"] or "done", data["why"])
-        return cls(**{"leaf": "", **fields}, outcome=old)
+            outcome = outcome_from_data(data["outcome"])
+        else:
+            outcome = recorded_outcome(data["reason"] or "done", data["why"])
+        if "judged" not in data:
+            fields["judged"] = not (data["success"] and outcome.cause.reason.name in UNJUDGED)
+        return cls(**{"leaf": "", **fields}, outcome=outcome)
 
 
 def _known(value: Any) -> Any:
@@ -80,7 +91,7 @@ def _known(value: Any) -> Any:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Evaluation:
     """The outcomes of an evaluation and what they were measured with."""
 
@@ -108,6 +119,11 @@ class Evaluation:
         """Count of successful episodes."""
         return sum(o.success for o in self.outcomes)
 
+    @property
+    def judged(self) -> bool:
+        """Every episode was judged by the physics state; else successes are the tree's own word."""
+        return all(outcome.judged for outcome in self.outcomes)
+
     def failure_lines(self) -> list[str]:
         """A line for each leaf and reason, the most frequent first, with a seed to look at."""
         groups: dict[tuple[str, str], list[EpisodeOutcome]] = {}
@@ -134,6 +150,7 @@ class Evaluation:
             "episodes": n,
             "successes": self.successes,
             "complete": self.complete,
+            "judged": self.judged,
             "success_rate": self.successes / n if n else None,
             "confidence_interval": list(wilson(self.successes, n)) if n else None,
             "failures": dict(failures.most_common()),
@@ -159,9 +176,21 @@ class Evaluation:
             f"95 % interval {100 * low:.1f} to {100 * high:.1f}), "
             f"{steps / max(self.seconds, 1e-9):.0f} control steps/s"
         ]
-        if any(o.success and o.outcome.cause.reason.name in UNJUDGED for o in self.outcomes):
+        if not self.judged:
             lines.append("  (the scene has no goal: success is the tree's own word, nothing was judged)")
         return [*lines, *(f"  {line}" for line in self.failure_lines())]
+
+    def __str__(self) -> str:
+        """As the command line prints it."""
+        return "\n".join(self.lines())
+
+    def __repr__(self) -> str:
+        return f"<Evaluation of {self.scenario} on {self.robot}: {self.successes} of {len(self.outcomes)}>"
+
+    def _repr_html_(self) -> str:
+        """A small table, for notebooks."""
+        head, *rest = self.lines()
+        return html_pairs({"": head} | {str(number): line.strip() for number, line in enumerate(rest, 1)})
 
 
 def outcomes_hash(episodes: Sequence[Any]) -> str:

@@ -161,11 +161,14 @@ def _plain(value: Any) -> Any:
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         first = {present: former for former, present in former_names(type(value)).items()}
-        return {
+        plain = {
             first.get(f.name, f.name): _plain(getattr(value, f.name))
             for f in dataclasses.fields(value)
             if not _is_default(f, getattr(value, f.name))
         }
+        if isinstance(value, Scene) and "goals" in plain and len(value.goals) == 1:
+            plain["goal"] = plain.pop("goals")[0]
+        return plain
     if isinstance(value, Mapping):
         return {str(key): _plain(v) for key, v in value.items()}
     if isinstance(value, np.ndarray):

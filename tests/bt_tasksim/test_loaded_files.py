@@ -1,6 +1,7 @@
 """Bundled files have the values that they had before there were models; odd ones are refused in order.
 
-``data/loaded_files.json`` was recorded from the hand-written loaders of version 0.1.
+``data/loaded_files.json`` was recorded from the hand-written loaders of version 0.1. The SO-100's jaw is
+stronger since.
 """
 
 from __future__ import annotations
@@ -74,7 +75,13 @@ def assert_covers(found, recorded):
     """Everything that was recorded is found; there may be more now."""
     if isinstance(recorded, dict):
         for key, value in recorded.items():
+            if key == "goal":  # one, where there are several now
+                found = {**found, "goal": next(iter(found["goals"]), None)}
             assert_covers(found[key], "on" if (key, value) == ("relation", "stands") else value)
+    elif isinstance(recorded, list):
+        assert len(found) == len(recorded)
+        for one, other in zip(found, recorded, strict=True):
+            assert_covers(one, other)
     else:
         assert found == recorded
 

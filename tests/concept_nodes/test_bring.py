@@ -7,7 +7,7 @@ import pytest
 from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import ONE
-from bt_tasksim.concept_nodes import Bring
+from bt_tasksim.concept_nodes import Bring, Place
 from bt_tasksim.concept_nodes.bring import standing_pose
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.core import poses
@@ -16,6 +16,7 @@ from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.outcomes import CANNOT_START, NO_WAY
 from bt_tasksim.core.world import Obstacle, WorldModel
 from bt_tasksim.scene.shapes import ShapeSize, object_model
+from bt_tasksim.trees import sequence
 
 pytestmark = pytest.mark.physical
 
@@ -62,8 +63,38 @@ def test_above_another_object_and_to_a_position(toy):
     assert status == Status.SUCCESS and np.allclose(cup[:3], [0.5, 0.1, 0.4], atol=1e-3)
 
 
+@pytest.mark.parametrize(("lower", "fits"), [(0.0, False), (0.04, True)])
+@pytest.mark.parametrize("hover", [0.04, 0.12])
+def test_how_far_it_goes_down_follows_from_where_the_object_is_in_the_hand(toy, lower, fits, hover):
+    """Between ribs that are lower than the object there is room for it, and for a hand that holds it high."""
+    leaf = Bring("cup", to="goal", hover=hover)
+    stage = toy(sequence("put down", leaf, Place("cup", on="goal")))
+    model = stage.world.model
+    goal, cup = model.place("goal").pose, model.object("cup").extent
+    middle = goal[2] + cup[2] / 2
+    inner, outer = cup[0] / 2 + 0.012, cup[0] / 2 + 0.1
+    ribs = [
+        Obstacle(
+            poses.pose([*(goal[:2] + way * (inner + outer) / 2 * np.eye(2)[axis]), middle / 2]),
+            (*np.where(np.arange(2) == axis, outer - inner, 2 * outer).tolist(), middle),
+            "ribs",
+        )
+        for axis in (0, 1)
+        for way in (-1, 1)
+    ]
+    stage.context.begin([dataclasses.replace(model, obstacles=(*model.obstacles, *ribs))])
+    stage.world.hold("cup")
+    objects = stage.world.now.objects.copy()
+    objects[model.object_index("cup"), 2] -= lower
+    stage.world.put(objects=objects)
+    stage.look()
+    status = stage.tick()
+    assert (status == Status.RUNNING) == fits, leaf.feedback_message
+    assert fits or (leaf.outcome.is_a(NO_WAY) and "ribs" in leaf.feedback_message)
+
+
 def test_via_points_are_passed_in_order(toy):
-    via = [(0.0, -0.2, 0.3), (0.1, -0.1, 0.35)]
+    via = [(0.0, -0.2, 0.15), (0.05, -0.1, 0.2)]
     leaf = Bring("cup", position=(0.5, 0.2, 0.3), via=via)
     _, status, tools, _ = carry(toy, leaf)
     cup = tools[:, :3]  # the toy holds objects at the tool's origin
@@ -94,9 +125,11 @@ def test_no_way_is_a_failure_that_others_can_act_upon(toy):
     assert leaf.outcome.is_a(CANNOT_START) and leaf.outcome.is_a(NO_WAY)
 
 
-@pytest.mark.parametrize("arguments", [{}, {"to": "goal", "position": (0.4, 0, 0.3)}])
+@pytest.mark.parametrize(
+    "arguments", [{}, {"to": "goal", "position": (0.4, 0, 0.3)}, {"to": "goal", "beside": "box"}]
+)
 def test_one_of_to_and_position(arguments):
-    with pytest.raises(InputError, match="bring: give either 'to' or 'position'"):
+    with pytest.raises(InputError, match="bring: give either 'to', 'position' or 'beside'"):
         Bring("cup", **arguments)
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Grasp, grasp_features
+from bt_tasksim.concept_nodes.grasp import FEELING
 from bt_tasksim.concept_nodes.grasp_features import (
     ACROSS,
     ACTIONS,
@@ -17,11 +18,14 @@ from bt_tasksim.concept_nodes.grasp_features import (
     EAGER,
     HASTE,
     PERIOD,
+    PUSHING,
     RATE,
     SCALE,
     TIME_SCALING,
 )
 from bt_tasksim.core import poses
+from bt_tasksim.planning.reference_motion import sample
+from bt_tasksim.robot.kinematics.hand import tips_in_tool
 
 SCENARIOS = ("pick_and_place", "shelf_to_shelf")
 
@@ -102,7 +106,8 @@ def test_the_programmed_action_is_the_middle_of_an_action_at_the_reference_motio
         there = memory._replace(offset=memory.middle * np.array(SCALE))
         action = near.model.programmed_motion(seen, memory)
         assert np.allclose(offsets(action, seen, there), there.offset, atol=1e-12)
-        assert scaling_of(action, seen, memory) == 1.0
+        if not memory.tight[0]:
+            assert scaling_of(action, seen, memory) == 1.0
     reference = poses.pose([0.4, 0.1, 0.2], poses.yaw(0.3))[None]
     assert np.array_equal(grasp_features.displaced(reference, np.zeros((1, CLOSE + 1))), reference)
 
@@ -230,6 +235,16 @@ def test_fingers_come_as_slowly_as_the_pace_until_opposing_ones_touch(near):
     assert closed(1.0, seen=both, tightening=0.1) == 1.0
 
 
+def test_one_jaw_that_closes_alone_comes_slowly_at_any_pace(near, monkeypatch):
+    monkeypatch.setattr(grasp_features, "standing_side", lambda robot: -0.007)
+    seen, memory = approaching(near, contact=1)
+    memory = memory._replace(closing=np.array([0.1]), closed=np.array([0.2]))
+    step = near.robot.hand_speed * near.period
+    for scaling, share in ((0.0, 0.0), (0.25, 0.25), (1.0, PUSHING)):
+        found = grasp_features.closed(np.array([scaling]), np.array([1.0]), 1.0, seen, memory)
+        assert float(found[0]) == pytest.approx(0.2 + share * step)
+
+
 def test_displacements_are_in_the_tools_frame():
     reference = poses.pose(
         [0.4, 0.1, 0.2], poses.frame_from_axes(np.array([0.0, 0, -1]), np.array([0.0, 1, 0]))
@@ -241,3 +256,32 @@ def test_displacements_are_in_the_tools_frame():
     assert np.allclose(poses.rotation_vector(local[:, 3:]), [[0.0, 0.0, 0.2]])
     many = grasp_features.displaced(np.repeat(reference, 2, 0), np.concatenate([offset, 0.0 * offset]))
     assert np.array_equal(many, np.concatenate([moved, reference]))
+
+
+def test_where_there_is_little_room_the_programmed_motion_feels_its_way(near):
+    for k in range(near.real):
+        seen, memory = instant(near, k)
+        memory = memory._replace(tight=np.array([True]))
+        action = near.model.programmed_motion(without_contacts(seen), memory)
+        now, period = seen.elapsed - memory.delay, seen.world.control_period
+        way = sample(memory.path, now + period)[0, :3] - sample(memory.path, now)[0, :3]
+        share = CAREFUL + EAGER * action[0, TIME_SCALING]
+        assert CAREFUL - 1e-9 <= share <= 1.0 + 1e-9
+        assert share <= CAREFUL + 1e-9 or share * np.linalg.norm(way) / period <= FEELING + 1e-9
+        assert not action[0, ACROSS].any(), "nothing is felt"
+
+
+def test_a_finger_that_stands_on_something_goes_outwards(near):
+    seen, memory = instant(near)
+    memory = memory._replace(tight=np.array([True]))
+    open_tips = tips_in_tool(near.robot, near.robot.hand_open)[:, 1]
+    for finger in range(len(open_tips)):
+        action = near.model.programmed_motion(without_contacts(seen, but=finger), memory)
+        assert np.sign(action[0, ACROSS]) == np.sign(open_tips[finger])
+
+
+def without_contacts(seen, but=None):
+    """The same with no fingertip, or with one alone, in contact."""
+    contacts = np.arange(seen.contacts.shape[1])[None] == (-1 if but is None else but)
+    observation = dataclasses.replace(seen.observation, contacts=contacts)
+    return Seen(observation, seen.world, seen.robot, seen.elapsed, seen.later, seen.failures)

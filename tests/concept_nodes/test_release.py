@@ -1,5 +1,7 @@
 """Release: each world as alone, opens before it draws back, and ends what was held."""
 
+import sys
+
 import numpy as np
 import pytest
 from py_trees.common import Status
@@ -8,6 +10,7 @@ from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Release
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import TIMED_OUT
+from bt_tasksim.robot.kinematics.hand import SLIDE
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "pick_and_throw"])
@@ -68,3 +71,16 @@ def test_a_hand_that_still_touches_something_is_not_done(toy):
     assert leaf.outcome.is_a(TIMED_OUT)
     assert leaf.outcome.detail.numbers == pytest.approx({"opening": 1.0, "contacts": 1, "force": 0.0})
     assert stage.context.reached("holding", "cup", ONE)
+
+
+def test_a_finger_that_stands_still_goes_aside_before_the_hand_draws_back(toy, monkeypatch):
+    module = sys.modules[Release.__module__]
+    monkeypatch.setattr(module, "standing_side", lambda robot: -0.007)
+    monkeypatch.setattr(module, "_opened", lambda view, target: view.robot.hand_open)
+    stage = start(toy, Release("cup", retreat=0.12, opening=0.4))
+    first = stage.world.now.tool_pose.copy()
+    assert stage.tick(300) == Status.SUCCESS
+    gone = poses.localise(first, np.array([command.tool[:3] for command in stage.world.steps]))
+    assert gone[-1] == pytest.approx([0.0, -SLIDE, -0.12], abs=2e-3)
+    aside = gone[np.abs(gone[:, 2]) < 1e-3]
+    assert aside[:, 1].min() == pytest.approx(-SLIDE, abs=1e-3), "it goes aside first"

@@ -18,26 +18,26 @@ FILE = str(Path(__file__).parent / "plugins" / "goal_relation.py")
 ROOM = """
 objects: {cup: {kind: cup, on: table, at: [0, 0]}}
 spots: [{name: mat, on: table, at: [0, MAT], extent: [0.1, 0.1]}]
-goal: {object: cup, place: mat, relation: beside, position_tolerance: 0.05}
+goal: {object: cup, place: mat, relation: near, position_tolerance: 0.05}
 """
 TREE = '<root BTCPP_format="4"><BehaviorTree ID="a"><Wait duration="0.2"/></BehaviorTree></root>'
 
 
-@pytest.mark.parametrize(("mat", "reason"), [(0.08, ""), (0.0, "not_beside"), (0.15, "not_beside")])
+@pytest.mark.parametrize(("mat", "reason"), [(0.08, ""), (0.0, "not_near"), (0.15, "not_near")])
 def test_python_judges_by_it(plugin, mat, reason):
     plugin("goal_relation")
     scene = Scene(
         objects={"cup": ObjectSpec(("cup",), on="table", area=(0.0, 0.0))},
         spots=[SpotSpec("mat", on="table", centre=(0.0, mat), area=(0.0, 0.0), extent=(0.1, 0.1))],
-        goal=Goal("cup", "mat", relation="beside", position_tolerance=0.05),
+        goal=Goal("cup", "mat", relation="near", position_tolerance=0.05),
     )
     result = Runner(trees.sequence("wait", Wait(0.2)), scene).run(1)
     assert result.status == Status.SUCCESS and result.success is (reason == "") and result.reason == reason
-    assert result.outcome.is_a(reason_named(reason or "is_beside"))
+    assert result.outcome.is_a(reason_named(reason or "is_near"))
     assert result.outcome.numbers["gap"] == pytest.approx(mat - 0.05, abs=0.005)
 
 
-@pytest.mark.parametrize(("mat", "failures"), [(0.08, {}), (0.15, {"not_beside": 2})])
+@pytest.mark.parametrize(("mat", "failures"), [(0.08, {}), (0.15, {"not_near": 2})])
 def test_the_command_line_judges_by_it_and_writes_its_reason(
     plugin, capsys, tmp_path, monkeypatch, mat, failures
 ):
@@ -49,8 +49,8 @@ def test_the_command_line_judges_by_it_and_writes_its_reason(
     content = json.loads(Path("e.json").read_text())
     assert content["failures"] == failures and content["successes"] == 2 - sum(failures.values())
     outcome = content["outcomes"][0]["outcome"]
-    assert outcome["reason"] in ("is_beside", "not_beside") and outcome["units"] == {"gap": "m"}
-    assert ("2 x not_beside, such as seed 0: " in capsys.readouterr().out) is bool(failures)
+    assert outcome["reason"] in ("is_near", "not_near") and outcome["units"] == {"gap": "m"}
+    assert ("2 x not_near, such as seed 0: " in capsys.readouterr().out) is bool(failures)
 
 
 def test_without_the_plugin_the_relation_is_unknown(capsys, tmp_path, monkeypatch):
@@ -60,7 +60,7 @@ def test_without_the_plugin_the_relation_is_unknown(capsys, tmp_path, monkeypatc
     Path("tree.xml").write_text(TREE)
     Path("room.yaml").write_text(ROOM.replace("MAT", "0.1"))
     assert main(["run", "tree.xml", "--scene", "room.yaml"]) == 2
-    assert "'beside'" in capsys.readouterr().err
+    assert "'near'" in capsys.readouterr().err
 
 
 def test_what_older_files_call_stands_is_on():

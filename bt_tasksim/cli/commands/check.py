@@ -13,19 +13,33 @@ from bt_tasksim.core.registry import register
 
 @register("command", "check")
 def check(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="The Python file that defines it.")],
+    file: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="A Python file with a concept or a scene(), a robot's or a scene's YAML file, a mesh, or "
+            "the name of a robot.",
+        ),
+    ],
     tree: Annotated[
         str | None,
         typer.Option(
             metavar="TREE",
-            help="The tree to try it in.  [default: the one in FILE or train_FILE, or a scenario]",
+            help="The tree to try a concept in.  [default: the one in FILE or train_FILE, or a scenario]",
         ),
     ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(metavar="ROBOT", help="The robot for a scene or a mesh.  [default: the scene's own]"),
+    ] = None,
 ) -> int:
-    """Check a concept of your own and say what to mend."""
-    from bt_tasksim.checking import concept_file
+    """Check a concept, robot or scene of your own.
+
+    Says what is wrong with it and what to do; with an error it ends with 2. A mesh is checked as an object.
+    """
+    from bt_tasksim.checking.kinds import check_file
 
     with progress("checking", None):
-        report = concept_file.check(file, tree)
+        report = check_file(file, tree, robot)
     say(*report.lines())
     return 2 if report.errors else 0

@@ -1,6 +1,6 @@
 """Commands of many worlds to joint targets: tracking, velocity limits, the hand.
 
-How joints are found for a pose stands in `bt_tasksim.engines.kinematics.inverse`.
+How joints are found for a pose stands in `bt_tasksim.robot.kinematics.inverse`.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import pinocchio as pin
 
 from bt_tasksim.core.poses import Array, array_namespace, constant, host
 from bt_tasksim.core.world import Command, JointTarget, WorldState
-from bt_tasksim.engines.kinematics.chain import placements, poses_of
-from bt_tasksim.engines.kinematics.failures import Failures, Reach
-from bt_tasksim.engines.kinematics.inverse import InverseKinematics
-from bt_tasksim.engines.kinematics.linear import total
-from bt_tasksim.engines.kinematics.models import arm_model, full_model
-from bt_tasksim.engines.kinematics.rows import (
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.chain import placements, poses_of
+from bt_tasksim.robot.kinematics.failures import Failures, Reach
+from bt_tasksim.robot.kinematics.inverse import InverseKinematics
+from bt_tasksim.robot.kinematics.linear import total
+from bt_tasksim.robot.kinematics.models import arm_model, full_model
+from bt_tasksim.robot.kinematics.rows import (
     at_least,
     columns,
     contiguous,
@@ -33,7 +34,6 @@ from bt_tasksim.engines.kinematics.rows import (
     taken_of,
     where_true,
 )
-from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
 _UNIT = (0.25, 4.0)
@@ -158,16 +158,20 @@ class BatchKinematics:
 
         Args:
             command: Tool poses ``(k, 7)`` and hands ``(k, 1 + n_synergies)``; a part is None, or all of a row
-                NaN, where nothing was asked of it since the reset, and its joints stay where they began.
+                NaN, where nothing was asked of it since the reset, and its joints stay where they began. Of a
+                row with a posture ``(k, n_arm)`` the joints are those nearest to it.
             state: The present state ``(k, ...)``; looked at on a world's first call after a reset only.
             rows: Which worlds these are ``(k,)``, each once; by default all.
         """
-        return self.track(command.tool, command.hand, state.joint_position, rows)
+        return self.track(with_posture(command), command.hand, state.joint_position, rows)
 
     def track(
         self, tool: Array | None, hand: Array | None, joints: Array, rows: np.ndarray | None = None
     ) -> Solution:
-        """`solve` of the parts of a command, with joints ``(k, n_joints)`` for worlds that begin."""
+        """`solve` of the parts of a command, with joints ``(k, n_joints)`` for worlds that begin.
+
+        Behind the tool poses ``(k, 7)`` may stand postures: ``(k, 7 + n_arm)``, NaN where there is none.
+        """
         if rows is not None and len(rows) == self.n and bool(np.all(rows == self._all)):
             rows = None
         memory = self._memory
@@ -239,12 +243,13 @@ class BatchKinematics:
         failures = self._none(memory.goal.shape[-1])
         goal = memory.goal
         if tool is not None:
-            asked = columns(tool)
+            asked = columns(tool[:, :7])
             fresh = _new(asked, memory.tool)
             if some(fresh):
                 moved = True
                 index = where_true(fresh)
-                arm, seen, failures = self._near(memory, asked, index)
+                posture = columns(tool[:, 7:]) if tool.shape[-1] > 7 else None
+                arm, seen, failures = self._near(memory, asked, index, posture)
                 goal = xp.concat([arm, goal[self._arm :, ...]], axis=0)
                 if failures:
                     fresh = fresh & ~xp.asarray(failures.mask, device=goal.device)
@@ -265,7 +270,9 @@ class BatchKinematics:
         numbers = np.zeros((9, n))
         return Failures(self.robot.name, numbers[0], numbers[2:].T, numbers[0], numbers[1])
 
-    def _near(self, memory: _Memory, tool: Array, index: np.ndarray) -> tuple[Array, Array, Failures]:
+    def _near(
+        self, memory: _Memory, tool: Array, index: np.ndarray, posture: Array | None
+    ) -> tuple[Array, Array, Failures]:
         """The arms ``(n, N)`` for tool poses ``(7, N)`` of the rows that ask, and what their chains see."""
         last, seen, n = memory.goal[: self._arm, ...], memory.seen, tool.shape[-1]
         turns = _turns(tool)
@@ -275,14 +282,15 @@ class BatchKinematics:
             codes[index[~good[index]]] = Reach.NO_ROTATION
             index = index[good[index]]
         if len(index) == n:
-            found = self.inverse.near(placements(tool), last, seen)
+            found = self.inverse.near(placements(tool), last, seen, posture)
             arm, seen = found.q, found.seen
             if not found.code.any():
                 return arm, seen, self._none(n)
             codes, misses = found.code, np.stack([found.distance, found.angle])
         else:
             asked, begin, chain = taken_of((tool, last, seen), index)
-            found = self.inverse.near(placements(asked), begin, chain)
+            near = None if posture is None else taken(posture, index)
+            found = self.inverse.near(placements(asked), begin, chain, near)
             arm, seen = put_in((last, seen), index, (found.q, found.seen))
             codes[index] = found.code
             misses[:, index] = found.distance, found.angle
@@ -313,6 +321,13 @@ class BatchKinematics:
         asked = JointTarget(_rows(target), _rows(step * memory.rate))
         still = not failures and not some(fastest > 0.0)
         return memory._replace(target=target), asked, still
+
+
+def with_posture(command: Command) -> Array | None:
+    """A command's tool poses, with the postures behind them where there are any."""
+    if command.tool is None or command.posture is None:
+        return command.tool
+    return array_namespace(command.tool).concat([command.tool, command.posture], axis=-1)
 
 
 def _new(asked: Array, before: Array) -> Array:

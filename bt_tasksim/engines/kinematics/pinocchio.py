@@ -1,6 +1,6 @@
 """Kinematics by Pinocchio: tool poses to joint targets, joint positions to link poses.
 
-How joints are found for a pose stands in `bt_tasksim.engines.kinematics.inverse`.
+How joints are found for a pose stands in `bt_tasksim.robot.kinematics.inverse`.
 """
 
 from __future__ import annotations
@@ -17,17 +17,16 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Command, JointTarget, WorldState
 from bt_tasksim.engines.base import EngineSetup, KinematicsEngine
-from bt_tasksim.engines.kinematics.batch import BatchKinematics
-from bt_tasksim.engines.kinematics.chain import turned
-from bt_tasksim.engines.kinematics.failures import Failures
-from bt_tasksim.engines.kinematics.models import arm_model, body_index, full_model, se3
-from bt_tasksim.engines.kinematics.rows import columns
+from bt_tasksim.engines.kinematics.batch import BatchKinematics, with_posture
 from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.chain import turned
+from bt_tasksim.robot.kinematics.failures import Failures
+from bt_tasksim.robot.kinematics.models import arm_model, body_index, full_model, pose_of, se3
+from bt_tasksim.robot.kinematics.rows import columns
 from bt_tasksim.scene.configuration import ActorConfiguration
 
 PATIENCE = 0.03
 """Seconds for which the inverse kinematics of a real robot looks for another posture."""
-_WXYZ = np.array([0, 1, 2, 6, 3, 4, 5])
 
 
 @register("engine/kinematics", "pinocchio")
@@ -71,7 +70,8 @@ class PinocchioKinematics(KinematicsEngine):
 
         Args:
             command: Tool pose ``(7,)`` and hand ``(1 + n_synergies,)``; a part is None where nothing was
-                asked of it since the reset, and its joints stay where they began.
+                asked of it since the reset, and its joints stay where they began. With a posture ``(n_arm,)``
+                the joints are those nearest to it.
             state: The present state; looked at on the first call after a reset only.
 
         Returns:
@@ -81,12 +81,10 @@ class PinocchioKinematics(KinematicsEngine):
             UnreachableError: No posture brings the tool there, or only one that the arm would have to swing
                 to while the tool hardly moves; the target has not changed then.
         """
-        tool, hand = command.tool, command.hand
-        target, failures = self.batch.track(
-            None if tool is None else np.asarray(tool, float)[None],
-            None if hand is None else np.asarray(hand, float)[None],
-            np.asarray(state.joint_position, float)[None],
-        )
+        parts = (command.tool, command.hand, command.posture)
+        one = Command(*(None if part is None else np.asarray(part, float)[None] for part in parts))
+        joints = np.asarray(state.joint_position, float)[None]
+        target, failures = self.batch.track(with_posture(one), one.hand, joints)
         if failures:
             raise _error(failures)
         return JointTarget(target.position[0], target.velocity[0])
@@ -157,9 +155,7 @@ class PinocchioKinematics(KinematicsEngine):
         q[self._order] = joints
         pin.framesForwardKinematics(model, data, q)
         names = [f.name for f in model.frames if f.type == pin.FrameType.BODY] if links is None else links
-        return {
-            name: pin.SE3ToXYZQUAT(data.oMf[body_index(model, name, self.robot)])[_WXYZ] for name in names
-        }
+        return {name: pose_of(data.oMf[body_index(model, name, self.robot)]) for name in names}
 
     def tips(self, joints: Array) -> Array:
         """Positions ``(n_tips, 3)`` of the fingertips, robot base frame, of all joints ``(n_joints,)``."""

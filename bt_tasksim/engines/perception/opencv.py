@@ -10,28 +10,28 @@ objects' shapes and colours by category, the calibrated fixtures and places.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.world import Observation, PlaceModel, WorldModel, WorldState
+from bt_tasksim.core.world import Observation, WorldModel, WorldState
 from bt_tasksim.engines.base import EngineSetup, PostProcessEngine
 from bt_tasksim.engines.images import Image
-from bt_tasksim.engines.perception.camera_errors import PERFECT, CameraErrors, as_calibrated
+from bt_tasksim.engines.perception.camera_errors import PERFECT, CameraErrors
 from bt_tasksim.engines.perception.features import TOUCH, ObservationBuilder
-from bt_tasksim.engines.perception.pose_estimation import Target, estimate_pose, follow
-from bt_tasksim.engines.perception.registration import DepthView, Fit
-from bt_tasksim.engines.perception.segmentation import NEUTRAL, SMALLEST, Segment, classify, find_segments
+from bt_tasksim.engines.perception.looking import Capture, Found, Looker
+from bt_tasksim.engines.perception.registration import Fit
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
+SIDES = ("scene", "scene_right")
+"""Cameras of every simulated scene (`bt_tasksim.engines.cameras`); a robot may have the first one alone."""
 REACH = 0.03
 """Metres between tool and object within which opposing contacts mean that the object is held."""
 APART = 3
@@ -59,6 +59,7 @@ class TrackedObject:
         due: Time of the next capture, seconds; infinite for none.
         captures: Captures that are left before it is given up.
         note: Why it was not seen in the last capture; empty when it was.
+        camera: Name of the camera that saw it best; empty before any did.
     """
 
     grip: Array | None = None
@@ -67,29 +68,7 @@ class TrackedObject:
     due: float = np.inf
     captures: int = 0
     note: str = ""
-
-
-@dataclass(frozen=True)
-class Capture:
-    """A picture, and what was believed when it came.
-
-    Attributes:
-        image: The picture.
-        estimate: Poses ``(n, 7)`` of the objects.
-        handled: For each object, whether the hand held it, and whether it had touched it.
-    """
-
-    image: Image
-    estimate: Array
-    handled: tuple[tuple[bool, bool], ...]
-
-
-@dataclass(frozen=True)
-class Found:
-    """What a capture found: fits by object, and for each object a sentence in case that it has none."""
-
-    fits: Mapping[int, Fit]
-    notes: tuple[str, ...]
+    camera: str = ""
 
 
 @register("engine/postprocess", "camera")
@@ -102,7 +81,7 @@ class CameraPostProcess(PostProcessEngine):
     Args:
         robot: The robot.
         errors: Errors that are added to rendered images; on a real robot `camera_errors.PERFECT`.
-        camera: Name of the RGB-D camera.
+        cameras: Names of the RGB-D cameras: one may see what something hides from another.
         background: Look in a thread of its own, as a robot's control rate wants it. What was found counts
             once it is there, unless the hand has taken or let go the object since. Where an object was never
             seen, a capture is waited for all the same.
@@ -112,19 +91,19 @@ class CameraPostProcess(PostProcessEngine):
         self,
         robot: RobotDescription,
         errors: CameraErrors | None = None,
-        camera: str = "scene",
+        cameras: Sequence[str] = SIDES,
         background: bool = False,
     ) -> None:
         self.robot = robot
         self.errors = CameraErrors() if errors is None else errors
-        self.camera = camera
+        self.every = tuple(cameras)
         self._thread = ThreadPoolExecutor(1, "bt-tasksim-look") if background else None
         self._pending: tuple[Capture, Future[Found]] | None = None
 
     @classmethod
     def create(cls, robot: RobotDescription, setup: EngineSetup) -> Self:
         """See `Engine.create`; a real robot's images have errors of their own, and its rate does not wait."""
-        return cls(robot, PERFECT, background=True) if setup.real else cls(robot)
+        return cls(robot, PERFECT, SIDES[:1], background=True) if setup.real else cls(robot)
 
     @property
     def wants_images(self) -> bool:
@@ -138,26 +117,21 @@ class CameraPostProcess(PostProcessEngine):
             self._pending[1].exception()  # it is over before anything changes under it
             self._pending = None
         self._model = model
-        self._targets = [
-            Target(known, actor.shape())
-            for known, actor in zip(model.objects, configuration.objects, strict=True)
-        ]
-        self._colours = [actor.colour for actor in configuration.objects]
-        fixtures = {box.colour for fixture in configuration.fixtures for box in fixture.boxes}
-        self._others = np.array([NEUTRAL, *sorted(fixtures)])
-        self._rng = configuration.generator("camera")
-        self._calibration = self.errors.calibration(self._rng)
+        self._looker = Looker(configuration, model, self.errors, self.every)
         self._tracks = [TrackedObject() for _ in range(n)]
         self._estimate = np.full((n, 7), np.nan)
         self._builder = ObservationBuilder(self.robot, configuration)
-        self._next, self._taken = 0.0, -np.inf
+        self._next, self._taken = 0.0, dict.fromkeys(self.every, -np.inf)
 
     def cameras(self, first: bool) -> tuple[str, ...]:
-        """The camera, at an episode's begin and when an object is to be looked at."""
+        """Those that see what is to be looked at; all of them at an episode's begin."""
         if self._pending is not None:
             return ()  # what is found now counts first
-        due = any(track.due <= self._next + 1e-6 for track in self._tracks)
-        return (self.camera,) if self._tracks and (first or due) else ()
+        if first and self._tracks:
+            return self.every
+        due = [track for track in self._tracks if track.due <= self._next + 1e-6]
+        lost = any(track.note or not track.camera for track in due)
+        return tuple(name for name in self.every if lost or any(track.camera == name for track in due))
 
     def observe(self, state: WorldState, images: Mapping[str, Image]) -> Observation:
         """See `PostProcessEngine.observe`.
@@ -172,16 +146,16 @@ class CameraPostProcess(PostProcessEngine):
             capture, found = self._pending
             self._pending = None
             self._conclude(capture, found.result(), time)
-        for image in images.values():
-            if self._shows_now(image, time):
-                self._look(image, time)
+        shown = {name: image for name, image in images.items() if self._shows_now(name, image, time)}
+        if shown:
+            self._look(shown, time)
         return self._builder.build(state, self._estimate.copy())
 
     def unseen(self) -> dict[str, str]:
         """For each object that was not seen in the last look at it, one sentence that says so, by name."""
         return {
             target.model.name: track.note
-            for target, track in zip(self._targets, self._tracks, strict=True)
+            for target, track in zip(self._looker.targets, self._tracks, strict=True)
             if track.note
         }
 
@@ -214,7 +188,7 @@ class CameraPostProcess(PostProcessEngine):
     def _in_reach(self, tool: Array) -> int:
         """Index of the object nearest to the tool, its nominal box within the fingers' reach; or -1."""
         best, found = REACH, -1
-        for i, target in enumerate(self._targets):
+        for i, target in enumerate(self._looker.targets):
             if np.isfinite(self._estimate[i, 0]):
                 local = poses.transform(poses.inverse(self._estimate[i]), tool[:3])
                 gap = np.maximum(np.abs(local) - np.array(target.model.extent) / 2, 0.0)
@@ -223,110 +197,41 @@ class CameraPostProcess(PostProcessEngine):
                     best, found = distance, i
         return found
 
-    def _shows_now(self, image: Image, time: float) -> bool:
+    def _shows_now(self, camera: str, image: Image, time: float) -> bool:
         """Whether a picture is new and what it shows is still so; else a capture waits for the next one."""
         taken = image.taken
         if taken is None:
             return True
-        if taken <= self._taken:
+        if taken <= self._taken[camera]:
             return False
         for track in self._tracks:
             if track.grip is not None and time - taken > AGE:
                 return False
             if track.grip is None and np.isfinite(track.due) and taken < track.due - WAIT:
                 return False  # it had not been let go, or it is the last capture's once more
-        self._taken = taken
+        self._taken[camera] = taken
         return True
 
-    def _look(self, image: Image, time: float) -> None:
-        """Have a picture looked at, and believe what was found, now or later."""
-        capture = Capture(image, self._estimate.copy(), tuple(map(_handled, self._tracks)))
+    def _look(self, images: Mapping[str, Image], time: float) -> None:
+        """Have pictures looked at, and believe what was found, now or later."""
+        capture = Capture(images, self._estimate.copy(), tuple(map(_handled, self._tracks)))
         if self._thread is None or not np.all(np.isfinite(self._estimate)):
-            self._conclude(capture, self._search(capture), time)
+            self._conclude(capture, self._looker.look(capture), time)
         elif self._pending is None:
-            self._pending = (capture, self._thread.submit(self._search, capture))
-
-    def _search(self, capture: Capture) -> Found:
-        """Find the objects in a picture; changes nothing but the state of the generator.
-
-        Raises:
-            MachineError: The image has no depth.
-        """
-        image, notes = capture.image, []
-        if image.depth is None:
-            raise MachineError(f"camera '{image.camera.name}' gives no depth: poses need an RGB-D camera")
-        camera = as_calibrated(image.camera, self._calibration)
-        depth = self.errors.depth(image.depth, self._rng)
-        masks = classify(image.colour, self._colours, self._others)
-        fits: list[tuple[Fit, int, Segment]] = []
-        for i, target in enumerate(self._targets):
-            alike = [k for k, colour in enumerate(self._colours) if colour == self._colours[i]]
-            segments = find_segments(
-                camera,
-                depth,
-                masks[i],
-                self._model.obstacles,
-                size=target.diameter,
-                join=len(alike) == 1,
-            )
-            others = np.any([m for k, m in enumerate(masks) if k not in alike] or [0 * masks[i]], axis=0)
-            for segment in segments[: 2 + len(alike)]:
-                view = DepthView(camera, depth, self._rng.permutation(segment.points), others)
-                fit = self._estimated(i, view, capture)
-                if fit is not None:
-                    fits.append((fit, i, segment))
-            pixels = segments[0].pixels if segments else 0
-            amount = f"{pixels} pixels" if pixels else f"fewer than {SMALLEST} pixels"
-            notes.append(
-                f"{target.model.name} is not seen: camera '{image.camera.name}' shows {amount} "
-                f"of its colour{' but not its shape' if pixels else ''}"
-            )
-        found: dict[int, Fit] = {}
-        taken = np.zeros(depth.shape, bool)
-        for fit, i, segment in sorted(fits, key=lambda f: f[0].cost):  # objects of one colour compete
-            if i not in found and np.count_nonzero(taken & segment.mask) < segment.pixels / 4:
-                found[i] = fit
-                taken |= segment.mask
-        return Found(found, tuple(notes))
+            self._pending = (capture, self._thread.submit(self._looker.look, capture))
 
     def _conclude(self, capture: Capture, found: Found, time: float) -> None:
         """Believe what a capture has found, but for what the hand has taken or let go since."""
         for i, track in enumerate(self._tracks):
             if _handled(track) != capture.handled[i]:
                 continue
-            track.note = "" if i in found.fits else found.notes[i]
-            if i in found.fits:
-                self._accept(i, found.fits[i], capture.estimate[i], time)
-            else:
+            sighting = found.sightings.get(i)
+            if sighting is not None:
+                track.note, track.camera = "", sighting.camera
+                self._accept(i, sighting.fit, capture.estimate[i], time)
+            elif not track.camera or track.camera in capture.images:
+                track.note = found.notes[i]
                 self._again(track, time, settled=False)
-
-    def _estimated(self, i: int, view: DepthView, capture: Capture) -> Fit | None:
-        """The fit of object ``i`` to what may be it, or None."""
-        target, before = self._targets[i], capture.estimate[i]
-        if capture.handled[i][0]:
-            fit = follow(target, view, before, self._model.places.values())
-            moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
-            turned = float(poses.angle_between(fit.pose[3:], before[3:]))
-            return fit if fit.cost < 0.3 and moved < 0.02 and turned < 0.35 else None
-        known = before if np.isfinite(before[0]) else None
-        places = [*self._model.places.values(), *self._tops(i, capture.estimate)]
-        return estimate_pose(target, view, places, known)
-
-    def _tops(self, i: int, estimate: Array) -> list[PlaceModel]:
-        """The tops of the other objects that stand, as places."""
-        tops = []
-        table = next(iter(self._model.places.values()), None)
-        for k, target in enumerate(self._targets):
-            pose = estimate[k]
-            if k == i or table is None or not np.isfinite(pose[0]):
-                continue
-            if poses.z_axis(pose[3:])[2] > 0.99:
-                x, y, z = target.model.extent
-                top = poses.multiply(pose, poses.pose([0.0, 0.0, z / 2]))
-                tops.append(
-                    replace(table, name=target.model.name, pose=top, extent=(x, y), centre=(0.0, 0.0))
-                )
-        return tops
 
     def _accept(self, i: int, fit: Fit, before: Array, time: float) -> None:
         track = self._tracks[i]

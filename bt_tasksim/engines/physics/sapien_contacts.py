@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.engines.physics.rolling import rolling_damping
+from bt_tasksim.engines.physics.sapien_overlap import least_overlap
 from bt_tasksim.engines.physics.sapien_robot import SKIN
 from bt_tasksim.engines.physics.sapien_world import DAMPING, World
 
@@ -19,6 +19,8 @@ TOUCH_DISTANCE = 0.002
 """Metres of separation beyond which a contact of PhysX carries no force and counts for nothing."""
 SUPPORT_DISTANCE = 5e-4
 """Metres of separation within which two bodies touch."""
+DEEP = 1e-3
+"""Metres of overlap that are not believed before it is looked how deep the shapes are."""
 _UNKNOWN = ("none", 0)
 _LYING = ("object", "fixture")
 
@@ -71,7 +73,7 @@ class ContactReader:
             if deepest > self.penetration:
                 bodies = contact.bodies
                 if all(known.get(body, _UNKNOWN)[0] != "base" for body in bodies):
-                    self._note_depth(bodies, deepest, time)
+                    self._note_depth(contact, deepest, time)
 
     def read(self, time: float, step: float, asleep: bool = False) -> Touch:
         """What touches what, and the deepest overlap.
@@ -108,7 +110,7 @@ class ContactReader:
             if separation > TOUCH_DISTANCE:
                 continue
             if -separation > self.penetration:
-                self._note_depth(bodies, -separation, time)
+                self._note_depth(contact, -separation, time)
             if not (by_a or by_b):  # what stands on what needs no forces
                 if separation < SUPPORT_DISTANCE:
                     if kind_a == "object":
@@ -144,9 +146,13 @@ class ContactReader:
         self._last = Touch(tip_force, hand_force, distance, support, touched)
         return self._last
 
-    def _note_depth(self, bodies: Sequence[physx.PhysxRigidBaseComponent], deep: float, time: float) -> None:
-        self.penetration = deep
-        self.deepest_pair = (bodies[0].entity.name, bodies[1].entity.name, deep, time)
+    def _note_depth(self, contact: physx.PhysxContact, deep: float, time: float) -> None:
+        if deep > DEEP:
+            deep = least_overlap(contact, deep, self._world.scene.timestep)
+        if deep > self.penetration:
+            bodies = contact.bodies
+            self.penetration = deep
+            self.deepest_pair = (bodies[0].entity.name, bodies[1].entity.name, deep, time)
 
 
 def resist_rolling(world: World, step: float, hand_force: list[float]) -> None:

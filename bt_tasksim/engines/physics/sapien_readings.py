@@ -45,19 +45,25 @@ class SapienReadings:
         self.hand_force = self.hand_distance = np.zeros((worlds, 0))
 
     def fit(self, joints: int, links: int, objects: int, fixtures: int) -> None:
-        """Make room for articulations with so many joints and links, and for so many objects and fixtures."""
+        """Make room for articulations with so many joints and links, and for so many objects and fixtures.
+
+        Where there is less of them than before, all worlds are new ones, and what was read is forgotten.
+        """
         n, had = self._worlds, self.objects.shape[1]
         if self.position.shape[1] != joints or self.incoming.shape[1] != links:
             self.position, self.velocity = np.zeros((n, joints)), np.zeros((n, joints))
             self.incoming = np.zeros((n, links, 6))
         if self.support.shape == (n, objects, objects + fixtures):
             return
+        narrower = objects < had or fixtures < self.support.shape[2] - had
         for name in ("objects", "linear", "angular", "hand_force", "hand_distance"):
             before = getattr(self, name)
             room = np.full((n, objects, *before.shape[2:]), np.nan)
-            room[:, :had] = before
+            if not narrower:
+                room[:, :had] = before
             setattr(self, name, room)
-        self.support = wider_support(self.support, had, objects, fixtures)
+        before = self.support[:, :0, :0] if narrower else self.support
+        self.support = wider_support(before, 0 if narrower else had, objects, fixtures)
 
     def clear(self, row: int) -> None:
         """Forget what the last world of a row has had."""

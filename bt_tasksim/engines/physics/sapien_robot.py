@@ -9,6 +9,8 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.sapien_solving import Solving
+from bt_tasksim.engines.physics.sapien_twist import Twist
 from bt_tasksim.engines.physics.sapien_world import CONTACT_OFFSET, World, array, sapien_pose
 from bt_tasksim.engines.physics.sapien_wrist import wrist_frame
 from bt_tasksim.robot.description import RobotDescription
@@ -99,6 +101,8 @@ class Robot:
         tool_pose: Pose ``(7,)`` of the tool in the first of them.
         lever: Position ``(3,)`` of the tool in the frame of the wrist's joint.
         to_tool: Rotation ``(4,)`` from that frame into the tool's.
+        twist: What its pads do against what turns between them.
+        solving: How long the solver works on what it holds.
     """
 
     def __init__(
@@ -122,6 +126,9 @@ class Robot:
         self.wrist = [link.name for link in articulation.get_links()].index(robot.wrist_link)
         tool = poses.multiply(array(tool_link.entity_pose), self.tool_pose)
         self.lever, self.to_tool = wrist_frame(articulation, links[robot.wrist_link], tool)
+        closing = poses.rotate(self.tool_pose[3:], np.array([0.0, 1.0, 0.0]))
+        self.twist = Twist(robot.pads, robot.opposition, tool_link, closing, world.objects, world.inertia)
+        self.solving = Solving(tool_link, self.tool_pose[:3], world.objects)
 
     def _set_drives(self, robot: RobotDescription, joint_position: Array) -> None:
         articulation = self.articulation
@@ -140,6 +147,7 @@ class Robot:
         q[self.index] = joint_position
         articulation.set_qpos(q)
         span = np.abs(robot.hand_closed - robot.hand_open)
+        self._opens = np.sign(robot.hand_open - robot.hand_closed).tolist()
         self._fast = np.where(span > 0.0, FAST * robot.hand_speed * span, np.inf).tolist()
         self._lead = [damping / stiffness for stiffness, damping in zip(*gains[:2], strict=True)]
         self._tell = [joint.set_drive_target for joint in joints]
@@ -148,14 +156,14 @@ class Robot:
             joint.set_drive_target(value)
             joint.set_drive_velocity_target(0.0)
 
-    def drive_to(self, position: list[float], velocity: list[float]) -> bool:
+    def drive_to(self, position: list[float], velocity: list[float]) -> tuple[bool, bool]:
         """Tell the drives where to go, as far as it is news: a call costs as much as all the rest of it.
 
         A drive of stiffness k and damping d that is told to be at x with the speed v pushes with
         ``k (x - q) + d (v - q')``: the same as when it is told to be at ``x + (d / k) v`` and at rest.
 
         Returns:
-            The hand closes or opens fast.
+            The hand closes or opens fast; and it opens.
         """
         told = [x + lead * v for x, v, lead in zip(position, velocity, self._lead, strict=True)]
         for tell, now, before in zip(self._tell, told, self._told, strict=True):
@@ -163,7 +171,11 @@ class Robot:
                 tell(now)
         self._told = told
         closing = velocity[self._n_arm :]
-        return any(closing) and any(abs(v) > fast for v, fast in zip(closing, self._fast, strict=True))
+        if not any(closing):
+            return False, False
+        fast = [v for v, most in zip(closing, self._fast, strict=True) if abs(v) > most]
+        opens = any(v * way > 0.0 for v, way in zip(closing, self._opens, strict=True))
+        return bool(fast), bool(fast) and opens
 
 
 def _set_surfaces(

@@ -23,6 +23,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, JointTarget, WorldState
 from bt_tasksim.engines.batch import PhysicsBatch
 from bt_tasksim.engines.physics.layout import Layout, put, rows_for, wider_support
+from bt_tasksim.engines.physics.shutting import shutting
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
@@ -144,6 +145,8 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
 
         self._share(build, list(zip(rows.tolist(), configurations, strict=True)))
         self._begin(rows)
+        if len(np.unique(rows)) == self.worlds:  # nothing is left of what was: no wider than these need
+            self._most, self._state, self._hidden = (0, 0), None, None
         fresh = [world for row in rows.tolist() if (world := self.simulated[row]) is not None]
         self._widen(
             max((world.n_objects for world in fresh), default=0),
@@ -163,6 +166,8 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             )
         going = np.array([self.errors[row] is None for row in rows.tolist()], bool)
         rows, position, velocity = rows[going], position[going], velocity[going]
+        if self._state is not None:
+            position = shutting(self.robot, position, self._state.joint_position[rows])
         self._position[rows], self._velocity[rows] = position, velocity
 
         self._go_on(

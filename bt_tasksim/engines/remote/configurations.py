@@ -20,6 +20,7 @@ from bt_tasksim.scene.shapes import KINDS
 
 MOST_ACTORS = 128
 MOST_BOXES = 2048
+MOST_GRASPS = 64
 FREQUENCIES = (1, 10_000)
 """Hz, of physics and of control."""
 _FAR = 1000.0
@@ -144,6 +145,10 @@ def _check_object(actor: Any) -> None:
     _within((actor.mass,), (1e-6, 1e4), f"{where}: mass")
     _within((actor.friction,), (0.0, 100.0), f"{where}: friction")
     _within(actor.colour, (0.0, 1.0), f"{where}: colour")
+    if len(actor.grasps) > MOST_GRASPS:
+        raise InputError(f"{where}: at most {MOST_GRASPS} grasps, found {len(actor.grasps)}")
+    if actor.symmetry is not None:
+        _within((actor.symmetry,), (0, 360), f"{where}: symmetry")
 
 
 def _pose(pose: tuple[float, ...], where: str) -> None:

@@ -98,7 +98,11 @@ _OBSERVATION = {
     "motion": ArraySpec((6,)),
 }
 _TARGET = {"position": ArraySpec(("joints",)), "velocity": ArraySpec(("joints",))}
-_COMMAND = {"tool": ArraySpec((7,), optional=True), "hand": ArraySpec(("closures",), optional=True)}
+_COMMAND = {
+    "tool": ArraySpec((7,), optional=True),
+    "hand": ArraySpec(("closures",), optional=True),
+    "posture": ArraySpec(("arm",), values="any", optional=True),
+}
 IMAGE = {
     "colour": ArraySpec(("height", "width", 3), "|u1"),
     "depth": ArraySpec(("height", "width"), "<f4", optional=True),

@@ -20,7 +20,7 @@ from bt_tasksim.engines.remote.address import Address
 from bt_tasksim.engines.remote.authentication import KeyAuthenticator
 from bt_tasksim.engines.remote.keys import Key
 from bt_tasksim.engines.remote.schema import Frame
-from bt_tasksim.engines.remote.session import Session
+from bt_tasksim.engines.remote.session import ServedSession
 from bt_tasksim.engines.remote.sockets import end, prepare, receive, send
 
 _WAKE = 200
@@ -51,7 +51,7 @@ class EngineServer:
 
     def __init__(
         self,
-        session: Session,
+        session: ServedSession,
         address: Address,
         key: Key | None = None,
         refused: Callable[[str], None] = lambda sentence: None,

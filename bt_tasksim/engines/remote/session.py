@@ -26,7 +26,7 @@ ERRORS: tuple[type[BtTasksimError], ...] = (UnreachableError, InputError, LostEn
 """Errors that travel by name, those of a narrower kind first."""
 
 
-class Session:
+class ServedSession:
     """An engine, its owner and its episode.
 
     Args:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from bt_tasksim.core import child
+from bt_tasksim.core.closing import Closing
 from bt_tasksim.core.document import read_document
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.interrupts import ending
@@ -41,7 +42,7 @@ LOOPBACK = "127.0.0.1"
 DOMAIN = 42
 
 
-class Twin:
+class Twin(Closing):
     """Bridge and node of a cell; `close` ends both.
 
     Attributes:
@@ -219,12 +220,6 @@ class Twin:
                 if process is not None:
                     _end(process)
             shutil.rmtree(self._home, ignore_errors=True)
-
-    def __enter__(self) -> Twin:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def _end(process: subprocess.Popen[Any]) -> None:

@@ -8,6 +8,8 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.registry import register
 from bt_tasksim.scene import meshes
 from bt_tasksim.scene.geometry import BoxPiece, Shape, ShapeSize, polygon, prism_shape
+from bt_tasksim.scene.grip_places import box_grips
+from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.shape_kind import GraspAxis, ShapeKind, level_grasp_axes
 
 
@@ -24,6 +26,10 @@ class BoxKind(ShapeKind):
     def grasp_axes(self, size: ShapeSize) -> tuple[GraspAxis, ...]:
         """See `ShapeKind.grasp_axes`."""
         return level_grasp_axes(size)
+
+    def grips(self, size: ShapeSize) -> Grips:
+        """See `ShapeKind.grips`."""
+        return box_grips(size.size)
 
 
 def box_shape(size: ShapeSize) -> Shape:

@@ -11,6 +11,8 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.registry import register
 from bt_tasksim.scene import meshes
 from bt_tasksim.scene.geometry import BoxPiece, Piece, Shape, ShapeSize, upright_piece
+from bt_tasksim.scene.grip_places import AROUND, elliptic_grips
+from bt_tasksim.scene.grips import Grips, firm_about
 from bt_tasksim.scene.shape_kind import ShapeKind
 from bt_tasksim.scene.surfaces import Ellipse, PrismSurface
 
@@ -20,6 +22,11 @@ BASE = 0.005
 """Metres, and at most a quarter of the height."""
 SIDES = 16
 """Flat sides of what collides."""
+RIM = 0.012
+"""Metres below the rim where a finger inside and one outside hold, at most a quarter of the height."""
+RIM_FIRM = 0.3
+HOLLOW_FIRM = 0.9
+"""Firmness: a thin wall is held along a line, and a hollow thing gives way."""
 
 
 @register("shape", "cup")
@@ -58,3 +65,15 @@ class CupKind(ShapeKind):
             weigh=lambda: meshes.mass_properties(visual),
             surface=PrismSurface(Ellipse(radius, radius), h),
         )
+
+    def grips(self, size: ShapeSize) -> Grips:
+        """See `ShapeKind.grips`: about it, or with one finger in it, from above."""
+        across, height = min(size.size[:2]), size.size[2]
+        angle = 2 * np.pi * np.arange(AROUND) / AROUND
+        way = np.stack([np.cos(angle), np.sin(angle), np.zeros(AROUND)], axis=-1)
+        rim = (across - WALL) / 2 * way + [0.0, 0.0, height / 2 - min(RIM, height / 4)]
+        down = [[0.0, 0.0, -1.0]] * AROUND
+        firm = RIM_FIRM * firm_about(rim, np.zeros(3))
+        by_the_rim = Grips.of(rim, way, [WALL] * AROUND, down, firm)
+        around = elliptic_grips((across, across, height), HOLLOW_FIRM, lids=False)
+        return Grips.joined([around, by_the_rim])

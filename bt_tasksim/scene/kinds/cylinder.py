@@ -7,6 +7,8 @@ import numpy as np
 from bt_tasksim.core.registry import register
 from bt_tasksim.scene import meshes
 from bt_tasksim.scene.geometry import Shape, ShapeSize, prism_shape, upright_piece
+from bt_tasksim.scene.grip_places import elliptic_grips
+from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.shape_kind import ShapeKind
 from bt_tasksim.scene.surfaces import Ellipse
 
@@ -25,6 +27,10 @@ class CylinderKind(ShapeKind):
     def shape(self, size: ShapeSize) -> Shape:
         """See `ShapeKind.shape`."""
         return elliptic_shape(size)
+
+    def grips(self, size: ShapeSize) -> Grips:
+        """See `ShapeKind.grips`."""
+        return elliptic_grips(size.size)
 
 
 def elliptic_shape(size: ShapeSize) -> Shape:

@@ -9,6 +9,8 @@ import numpy as np
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.scene.geometry import Shape, ShapeSize, Size, polygon, prism_shape, upright_piece
+from bt_tasksim.scene.grip_places import across, heights, not_too_wide
+from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.shape_kind import GraspAxis, ShapeKind
 
 
@@ -36,6 +38,14 @@ class DiamondKind(ShapeKind):
         x, y, _ = size.size
         width, turn = diamond_width(x, y), 2 * math.atan2(y, x)
         return ((0.0, 1.0, 0.0), width), ((-math.sin(turn), math.cos(turn), 0.0), width)
+
+    def grips(self, size: ShapeSize) -> Grips:
+        """See `ShapeKind.grips`: across its pairs of faces, and from below to above."""
+        z = size.size[2]
+        faces = [
+            across(axis, width, [(0, 0, h) for h in heights(z)]) for axis, width in self.grasp_axes(size)
+        ]
+        return not_too_wide([*faces, across((0, 0, 1), z, [(0, 0, 0)])])
 
 
 def diamond_width(long: float, short: float) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from bt_tasksim.core.registry import register
 from bt_tasksim.scene.geometry import Shape, ShapeSize
+from bt_tasksim.scene.grip_places import elliptic_grips
+from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.kinds.cylinder import elliptic_shape
 from bt_tasksim.scene.shape_kind import ShapeKind
 
@@ -17,3 +19,7 @@ class OvalKind(ShapeKind):
     def shape(self, size: ShapeSize) -> Shape:
         """See `ShapeKind.shape`."""
         return elliptic_shape(size)
+
+    def grips(self, size: ShapeSize) -> Grips:
+        """See `ShapeKind.grips`."""
+        return elliptic_grips(size.size)

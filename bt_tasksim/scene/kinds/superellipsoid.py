@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +11,10 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.scene import meshes
+from bt_tasksim.scene.antipodal import FRICTION
 from bt_tasksim.scene.geometry import ConvexPiece, Shape, ShapeSize
+from bt_tasksim.scene.grip_places import superelliptic_grips
+from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.shape_kind import GraspAxis, ShapeKind, level_grasp_axes
 from bt_tasksim.scene.surfaces import SuperellipsoidSurface
 
@@ -51,6 +55,12 @@ class SuperellipsoidKind(ShapeKind):
     def grasp_axes(self, size: ShapeSize) -> tuple[GraspAxis, ...]:
         """See `ShapeKind.grasp_axes`."""
         return level_grasp_axes(size)
+
+    def grips(self, size: ShapeSize) -> Grips:
+        """See `ShapeKind.grips`, where its surface is not too steep."""
+        half = (size.size[0] / 2, size.size[1] / 2, size.size[2] / 2)
+        exponents = (max(size.exponents[0], SHARPEST), max(size.exponents[1], SHARPEST))
+        return superelliptic_grips(half, exponents, math.atan(FRICTION))
 
 
 @lru_cache(maxsize=1)

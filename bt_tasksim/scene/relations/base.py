@@ -14,6 +14,7 @@ from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, ObjectModel, PlaceModel, WorldModel
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.outlines import Slab, rectangle, slabs, whole_outline
 from bt_tasksim.scene.specs import Goal
 
 TOUCHING = 1e-4
@@ -50,9 +51,41 @@ class FinalState:
         """What is known beforehand of an object."""
         return self.world.object(name)
 
+    def is_object(self, name: str) -> bool:
+        """It is an object, and no place."""
+        return name in self.world.index
+
+    def parts(self, name: str) -> tuple[Slab, ...]:
+        """The convex pieces of an object from above, where it is."""
+        actor = self.configuration.objects[self.world.object_index(name)]
+        return slabs(actor.shape().collision, self.pose(name))
+
+    def outline(self, name: str) -> Array:
+        """Outline ``(n, 2)`` from above of an object where it is, or of a place, robot base frame, metres."""
+        if self.is_object(name):
+            return whole_outline(self.parts(name))
+        place = self.place(name)
+        return rectangle(place.pose, place.centre, place.extent)
+
+    def lowest(self, name: str) -> float:
+        """Height in metres of an object's lowest point, or of a place's origin."""
+        if self.is_object(name):
+            return min(part.low for part in self.parts(name))
+        return float(self.place(name).pose[2])
+
+    def surface(self, name: str) -> Array:
+        """The frame ``(7,)`` in which things stand on a place, or on an object where it is.
+
+        That of an object is level, above its middle, at the height of its highest point.
+        """
+        if not self.is_object(name):
+            return self.place(name).pose
+        top = max(part.high for part in self.parts(name))
+        return poses.pose([*self.pose(name)[:2].tolist(), top])
+
     def in_place(self, goal: Goal) -> Array:
-        """Pose ``(7,)`` of the goal's object in the frame of the goal's place."""
-        return poses.multiply(poses.inverse(self.place(goal.place).pose), self.pose(goal.object))
+        """Pose ``(7,)`` of the goal's object in the frame of the goal's place, or of an object's top."""
+        return poses.multiply(poses.inverse(self.surface(goal.place)), self.pose(goal.object))
 
     def touched(self, name: str) -> bool:
         """The hand touches an object."""
@@ -81,17 +114,27 @@ class Placement:
 
 
 class GoalRelation(abc.ABC):
-    """A relation between an object and a place, judged by the physics state at the end.
+    """A relation of an object to a place or to another object, judged by the physics state.
 
     A subclass in one file, ``@register("goal relation", "beside")``, is all that a new relation takes.
     """
 
     in_hand: ClassVar[bool] = False
     """The object is to be held at the end; else it must be let go and at rest, and nothing knocked over."""
+    needs_place: ClassVar[bool] = True
+    """A goal names a place or an object besides."""
 
     @abc.abstractmethod
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """Whether the goal's object is as the goal asks."""
+
+
+def lean(rotation: Array, model: ObjectModel) -> float:
+    """Angle in radians between upright and ``rotation (4,)``; any face of a cubic object may be down."""
+    if model.cubic:
+        up = poses.to_matrix(rotation)[2]
+        return float(np.arccos(np.clip(np.max(np.abs(up)), -1.0, 1.0)))
+    return float(poses.tilt(rotation))
 
 
 def turn(rotation: Array, model: ObjectModel) -> float:

@@ -29,6 +29,7 @@ class Lifted(GoalRelation):
     """See the file."""
 
     in_hand = True
+    needs_place = False
 
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""

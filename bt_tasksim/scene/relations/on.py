@@ -1,4 +1,7 @@
-"""On: the object stands upright on the origin of a place, with its heading up to the object's symmetry."""
+"""On: the object stands upright on the origin of a place, with its heading up to the object's symmetry.
+
+Or on another object: on the middle of its top, wherever that is, with any heading.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import numpy as np
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS
-from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, turn
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, lean, turn
 from bt_tasksim.scene.specs import Goal
 
 STANDS = register_reason(
@@ -35,7 +38,7 @@ class On(GoalRelation):
         """See `GoalRelation.evaluate`."""
         local, model = final.in_place(goal), final.model(goal.object)
         distance = float(np.linalg.norm(local[:3] - [0.0, 0.0, model.extent[2] / 2]))
-        angle = turn(local[3:], model)
+        angle = lean(local[3:], model) if final.is_object(goal.place) else turn(local[3:], model)
         reason = STANDS
         if distance > goal.position_tolerance:
             reason = NOT_IN_PLACE

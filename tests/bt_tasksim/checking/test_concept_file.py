@@ -90,7 +90,7 @@ def test_files_that_hold_no_concept(tmp_path, capsys, text, words):
 
 def test_missing_files_and_trees_without_the_concept(tmp_path, capsys):
     assert main(["check", str(tmp_path / "none.py")]) == 2
-    assert "there is no tree file" in capsys.readouterr().err
+    assert "there is no file" in capsys.readouterr().err
     assert main(["check", str(write(tmp_path)), "--tree", "pick_and_place"]) == 2
     assert "has no leaf of Nudge; its concepts: Bring, Grasp, Pick, Place, Release" in capsys.readouterr().err
 

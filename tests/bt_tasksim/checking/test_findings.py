@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.functions import ConceptFunctions, zeros
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Metres, ObjectName, Radians
@@ -396,6 +397,21 @@ def test_what_a_learner_lacks(found):
     assert any("says that nothing is unknown" in line for line in found(broken(is_task_model=True)))
     lines = found(broken(is_programmed=False, is_task_model=True))
     assert any("neither programmed nor to be learned" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("declared", "words"),
+    [
+        (ConditionOf("Holdin", target="target"), "the condition 'Holdin', which does not exist"),
+        (ConditionOf("Holding", thing="target"), "gives Holding a 'thing', which it does not take"),
+        (ConditionOf("Holding", target="thing"), "its parameter 'thing', which it does not have"),
+    ],
+)
+def test_conditions_that_do_not_exist(found, declared, words):
+    sound = found(broken(establishes=(ConditionOf("Holding", target="target"),)))
+    assert not any("'establishes'" in line for line in sound)
+    for name in ("establishes", "requires"):
+        assert any(f"'{name}'" in line and words in line for line in found(broken(**{name: (declared,)})))
 
 
 def test_words_and_units_in_docstrings(found):

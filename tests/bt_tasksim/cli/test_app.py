@@ -49,7 +49,9 @@ def test_old_command_lines_mean_what_they_meant(line):
     if line.startswith("run "):
         was = {"video_camera": "overview", "video_size": "", "video_fps": 10.0, **was}
     if line.startswith("new "):
-        was = {"like": None, **was}
+        was = {"like": None, "urdf": None, **was}
+    if line.startswith("check "):
+        was = {"robot": None, **was}
     if line.startswith("decompose"):
         was = {**was, "logs": [was["log"]]}
         del was["log"]

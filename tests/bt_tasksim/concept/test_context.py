@@ -303,11 +303,12 @@ def test_what_is_seen_of_some_worlds_is_theirs(three):
     whole, some = context.seen(context.rows, np.arange(3.0)), context.seen(rows(0, 2), np.array([0.5, 0.7]))
     assert np.array_equal(some.tool, whole.tool[[0, 2]]) and some.elapsed.tolist() == [0.5, 0.7]
     for name, column in (("cup", 0), ("box", 1)):
-        np.testing.assert_array_equal(whole.object(name), context.observation.objects[:, column])
+        np.testing.assert_array_equal(whole.observed(name), context.observation.objects[:, column])
+        np.testing.assert_array_equal(some.observed(name), whole.observed(name)[[0, 2]])
         np.testing.assert_array_equal(some.object(name), whole.object(name)[[0, 2]])
     first = observed(3).objects[:, 0]
-    np.testing.assert_array_equal(whole.object("cup")[[0, 2]], first[[0, 2]])
-    np.testing.assert_array_equal(whole.object("box")[1], first[1], "its only object")
+    np.testing.assert_array_equal(whole.observed("cup")[[0, 2]], first[[0, 2]])
+    np.testing.assert_array_equal(whole.observed("box")[1], first[1], "its only object")
     assert np.isnan(whole.object("box")[[0, 2]]).all() and np.isnan(whole.object("cup")[1]).all()
     assert (
         some.model("cup").present.tolist() == [True, True]

@@ -419,10 +419,21 @@ def test_a_command_of_ones_own_is_carried_out_below_a_class_that_computes_both_a
     class Other(Hasty):
         timeout_s = 1.0
 
-    for kind in (Both, Hasty, Other):
+    class Mixin:
+        def command(self, action, seen, memory):
+            asked.append("command")
+            return Command(tool=seen.tool)
+
+    class Mixed(Mixin, Both):
+        pass
+
+    class Same(Both):
+        pass
+
+    for kind in (Both, Same, Hasty, Other, Mixed):
         asked.clear()
         toy(kind("cup")).tick(1)
-        assert asked == (["both"] if kind is Both else ["command"])
+        assert asked == (["both"] if kind in (Both, Same) else ["command"])
 
 
 def test_neither_a_name_nor_a_policy_is_the_models():
@@ -439,7 +450,7 @@ def test_abstract_models_are_refused(make):
 
 def test_a_contradiction_is_refused_when_the_value_is_made():
     for make in (Bring, Bring.value):
-        with pytest.raises(InputError, match="bring: give either 'to' or 'position'"):
+        with pytest.raises(InputError, match="bring: give either 'to', 'position' or 'beside'"):
             make("cup")
 
 

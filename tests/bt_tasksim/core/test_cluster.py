@@ -112,7 +112,7 @@ def test_errors_come_as_they_are_and_what_ends_every_actor_is_named(local, work)
     [
         ("make", "error", LeafError, "^leaf 'a' is broken$"),
         ("make", "mine", InputError, r"^fleet_work.py:\d+: ZeroDivisionError: no such thing$"),
-        ("no_good", "0", InputError, "^there is no tree file 'a.py'$"),
+        ("no_good", "0", InputError, r"^fleet_work.py:\d+: there is no tree file 'a.py'$"),
     ],
 )
 def test_an_error_ends_it_in_one_sentence(work, make, item, kind, sentence):

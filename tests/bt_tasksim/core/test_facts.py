@@ -300,3 +300,16 @@ def test_unlike_worlds_say_the_same_in_any_company(rows_alike):
     facts = WorldFacts.of([UNLIKE[k % 4] for k in range(65)])
     index = np.arange(65) % len(facts.place_columns)
     rows_alike(lambda rows: asked(facts.map(lambda values: values[rows]), index[rows]), 65)
+
+
+def test_each_world_knows_what_it_was_made_of_however_its_rows_came_about():
+    facts = WorldFacts.of(UNLIKE)
+    rows = np.array([2, 0])
+    some = facts.map(lambda values: values[rows])
+    assert [some.model_of(k) for k in range(2)] == [UNLIKE[2], UNLIKE[0]]
+    both = joined([some, facts])
+    assert [both.model_of(k) for k in range(6)] == [UNLIKE[2], UNLIKE[0], *UNLIKE]
+    other = WorldFacts.of([UNLIKE[3]], *_names(facts))
+    changed = facts.replaced(np.array([1]), other)
+    assert [changed.model_of(k) for k in range(4)] == [UNLIKE[0], UNLIKE[3], UNLIKE[2], UNLIKE[3]]
+    assert len(changed.models) == changed.worlds, "worlds that have ended are not kept"

@@ -163,6 +163,9 @@ BAD: list[tuple[str, Any, str]] = [
     ("arm.drive", {"stiffness": 1, "damping": 1}, "'arm.drive.force_limit' is missing"),
     ("hand.speed", "fast", "'hand.speed' should be a number"),
     ("hand.closed", [0.04, 0.04], "are the same"),
+    ("hand.press", -1, "'hand.press' should not be negative"),
+    ("hand.press", 1e9, "'hand.press' should be at most"),
+    ("hand.press", "hard", "'hand.press' should be a number"),
     ("hand.open", [0.04, 0.3], "'hand.open' puts joint 'panda_finger_joint2' at 0.3"),
     ("hand.closed", [-0.02, 0.0], "from 0 to 0.04"),
     ("hand.synergies", {"spread": [1]}, "'hand.synergies.spread' should be 2 numbers"),
@@ -246,6 +249,23 @@ def test_a_changed_file_is_read_anew(tmp_path: Path) -> None:
     assert load_robot(str(path)).hand_speed == 2.5
     path.write_text(text.replace("speed: 2.5", "speed: 1.25"))
     assert load_robot(str(path)).hand_speed == 1.25
+
+
+def test_a_hand_presses_where_its_file_says_so(tmp_path: Path) -> None:
+    assert {name: load_robot(name).hand_press for name in ROBOTS} == {
+        "panda": 30.0,
+        "panda_wristcam": 30.0,
+        "xarm7_ability": 0.0,
+        "so100": 0.0,
+    }
+    for name in ROBOTS:
+        robot = load_robot(name)
+        assert robot.hand_press <= robot.drive_array("force_limit")[len(robot.arm_joints) :].min()
+    path, text = tmp_path / "mine.yaml", asset("robots", "panda.yaml").read_text()
+    path.write_text(text.replace("press: 30", "press: 12.5"))
+    assert load_robot(str(path)).hand_press == 12.5
+    path.write_text(text.replace("press: 30", ""))
+    assert load_robot(str(path)).hand_press == 0.0
 
 
 def test_five_joints_need_a_mask(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from bt_tasksim.scene.mesh_file import mesh_shape
 from bt_tasksim.scene.meshes import TriangleMesh, circle, cup, prism, rounded_rectangle
 from bt_tasksim.scene.overlap import check_configuration
 from bt_tasksim.scene.scene_file import load_scene
+from bt_tasksim.scene.specs import Goal
 
 
 def save(path, *bodies, drop=0):
@@ -124,7 +125,7 @@ def test_bad_objects(tmp_path, objects, words):
         ("fixtures: [shelv]", "did you mean 'shelf'"),
         ("spots: [{name: a}]", r"'spots\[0\].on' is missing"),
         ("spots: [{name: a, on: table, extent: [0, 1]}]", r"'spots\[0\].extent\[0\]' should be positive"),
-        ("{objects: {cup: on table}, goal: {object: cup}}", "'goal.place' is missing"),
+        ("{objects: {cup: on table}, goal: {object: cup}}", "the goal 'on' of 'cup' names no place"),
         ("{objects: {cup: on table}, goal: {object: cup, place: table, relation: lifte}}", "'lifted'"),
         ("{objects: {cup: on table}, disturbed: cap}", "did you mean 'cup'"),
     ],
@@ -142,14 +143,13 @@ def test_the_line_is_that_of_the_field(tmp_path):
         load_scene(write(tmp_path, "robot: panda\nobjects:\n  cup: on table\nfixtrues: [shelf]\n"))
 
 
-def test_a_goal_on_an_object_says_that_places_are_meant(tmp_path):
+def test_a_goal_may_be_on_an_object(tmp_path):
     file = write(
         tmp_path,
         "objects:\n  cup: on table\n  tin: cylinder on table\nspots: [{name: mat, on: table}]\n"
         "goal:\n  object: cup\n  place: tin\n",
     )
-    with pytest.raises(InputError, match=r"line 7: .*goals on objects are not supported.*: mat, table"):
-        load_scene(file)
+    assert load_scene(file).goal == Goal("cup", on="tin")
 
 
 STOOL = """name: stool
@@ -210,11 +210,11 @@ def test_missing_and_binary_files(tmp_path):
         load_scene(file)
 
 
-def test_a_hollow_mesh_says_that_it_is_filled(tmp_path):
-    save(tmp_path / "cup.obj", cup(0.035, 0.1, 0.004, 0.005, segments=24))
-    with pytest.warns(UserWarning, match="has hollows, which its convex hull fills"):
+def test_a_mesh_of_thin_walls_says_that_they_are_thicker(tmp_path):
+    save(tmp_path / "cup.obj", cup(0.035, 0.1, 0.001, 0.001))
+    with pytest.warns(UserWarning, match="has thin walls, which its 32 convex parts make thicker"):
         geometry = mesh_shape(str(tmp_path / "cup.obj"), (0.07, 0.07, 0.1))
-    assert len(geometry.collision) == 1
+    assert len(geometry.collision) == 32
 
 
 def test_separate_bodies_keep_hollows(tmp_path):

@@ -149,6 +149,7 @@ def test_many_episodes_have_a_process_for_each_core(monkeypatch):
 
 def test_worlds_on_a_gpu_are_one_process(monkeypatch):
     monkeypatch.setattr("os.cpu_count", lambda: 16)
+    monkeypatch.setattr("bt_tasksim.execution.worlds.available_memory", lambda: 10**12)
     monkeypatch.setattr("bt_tasksim.engines.physics.mujoco_warp.MujocoWarpPhysics.check_device", str)
     assert usual_workers(EngineOptions(engines="mujoco_warp", device="cuda"), 20_000, 4096) == 1
     assert usual_workers(EngineOptions(engines="mujoco_warp"), 20_000) == 16

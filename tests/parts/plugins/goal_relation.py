@@ -1,4 +1,4 @@
-"""A goal relation from outside: an object stands beside a place, and not on it."""
+"""A goal relation from outside: an object stands near a place, and not on it."""
 
 import numpy as np
 
@@ -9,17 +9,17 @@ from bt_tasksim.core.units import METRES
 from bt_tasksim.scene.relations import FinalState, GoalRelation, Placement
 from bt_tasksim.scene.specs import Goal
 
-IS_BESIDE = register_reason("is_beside", "{object} is {gap} beside {place}", gap=METRES)
-NOT_BESIDE = register_reason("not_beside", "{object} is not beside {place}: {gap} off its edge", gap=METRES)
+IS_NEAR = register_reason("is_near", "{object} is {gap} from {place}", gap=METRES)
+NOT_NEAR = register_reason("not_near", "{object} is not near {place}: {gap} off its edge", gap=METRES)
 
 
-@register("goal relation", "beside")
-class Beside(GoalRelation):
+@register("goal relation", "near")
+class Near(GoalRelation):
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         place, local = final.place(goal.place), final.in_place(goal)
         middle, half = np.array(place.centre), np.array(place.extent) / 2
         gap = float(np.max(np.abs(local[:2] - middle) - half))
         reached = 0.0 < gap < goal.position_tolerance
-        reason = IS_BESIDE if reached else NOT_BESIDE
+        reason = IS_NEAR if reached else NOT_NEAR
         outcome = reason(object=goal.object, place=goal.place, gap=gap)
         return Placement(reached, outcome, abs(gap), float(poses.tilt(final.pose(goal.object)[3:])))

@@ -26,10 +26,10 @@ def test_evaluate_writes_what_is_promised(call):
 
 
 def test_evaluate_counts_failures_with_a_seed_and_a_reason(call, tree_file):
-    name = tree_file('sequence("far", Grasp("cup"), Pick("cup", distance=2.0))')
+    name = tree_file('sequence("far", Grasp("cup"), Pick("cup", distance=10.0))')
     code, out, _ = call("evaluate", name, "--episodes", 2)
     assert code == 0 and "tree on panda" in out and "0 of 2 (0.0 %" in out
-    assert "2 x pick cup: out_of_reach, such as seed 0: " in out
+    assert "2 x grasp cup: no_way, such as seed 0: " in out and "that cannot also be lifted" in out
 
 
 OWN = """

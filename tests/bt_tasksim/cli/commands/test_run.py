@@ -32,13 +32,13 @@ def test_run_and_evaluate_take_the_policy_of_the_command_line(call, until, polic
     assert code == 0 and json.loads(Path("e.json").read_text())["policies"] == named
 
 
-def test_a_goal_out_of_reach_is_a_failed_run_with_the_leaf_and_the_distance(until, tree_file):
+def test_a_goal_out_of_reach_is_a_failed_run_with_the_leaf_and_the_place(until, tree_file):
     name = tree_file('sequence("far", Grasp("cup"), Pick("cup"), Bring("cup", position=(3.0, 0.0, 0.4)))')
     out, err = until(1, "run", name, "--out", "far", said="bring cup")
     assert err == ""
     assert out.startswith("FAILURE: bring cup: ")
-    assert json.loads(Path("far/result.json").read_text())["reason"] == "out_of_reach"
-    assert " m: the nearest pose misses by " in out and " mm and " in out and " degrees" in out
+    assert "the arm does not reach (3." in out
+    assert json.loads(Path("far/result.json").read_text())["reason"] == "no_way"
     assert json.loads(Path("far/result.json").read_text())["success"] is False
 
 

@@ -12,11 +12,11 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError, UnreachableError
 from bt_tasksim.core.poses import Array, host
 from bt_tasksim.core.world import Command, WorldState
-from bt_tasksim.engines.kinematics import inverse
 from bt_tasksim.engines.kinematics.batch import BatchKinematics, Solution
-from bt_tasksim.engines.kinematics.failures import Reach
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.kinematics import inverse
+from bt_tasksim.robot.kinematics.failures import Reach
 from tests.array_libraries import LIBRARIES
 
 STEPS, WORLDS = 12, 65

@@ -35,13 +35,17 @@ class Bench:
         self.post.reset(
             dataclasses.replace(self.world, objects=blind), self.world.world_model(["left", "right"], 0.08)
         )
-        self.time, self.looked = 0.0, []
+        self.time, self.looked, self.asked = 0.0, [], []
 
     def tick(self, tool, contacts=(False, False), look=False, shown=True, taken=None):
         names = self.post.cameras(look)
         self.looked.append(bool(names))
-        things = [(box(self.pose, SIZE), self.colour)] if shown else []
-        images = {name: dataclasses.replace(image(things)[0], taken=taken) for name in names}
+        self.asked.append(names)
+        things = [(box(self.pose, SIZE), self.colour)]
+        images = {
+            name: dataclasses.replace(image(things if shown in (True, name) else [])[0], taken=taken)
+            for name in names
+        }
         force = np.array([[0, 1.0, 0], [0, -1.0, 0]]) * np.array(contacts)[:, None]
         n = len(self.robot.joints)
         state = WorldState(
@@ -209,12 +213,32 @@ def test_a_brush_with_one_finger_is_followed_by_a_look():
     assert bench.error(seen) < 0.001
 
 
+def test_what_one_camera_does_not_see_another_does_and_goes_on_to():
+    bench, other = Bench(), "scene_right"
+    assert bench.error(bench.tick(AWAY, look=True, shown=other)) < 0.001
+    assert bench.post.unseen() == {}
+    for _ in range(10):
+        bench.tick(above(bench), (True, True), shown=other)
+    assert [names for names in bench.asked if names] == [("scene", other), (other,)]
+
+
+def test_what_is_lost_all_cameras_look_for():
+    bench = Bench()
+    bench.tick(AWAY, look=True)
+    for _ in range(30):
+        bench.tick(above(bench), (True, True), shown=False)
+    looks = [names for names in bench.asked if names]
+    assert looks[0] == ("scene", "scene_right") and len(looks[1]) == 1
+    assert looks[2] == ("scene", "scene_right"), "it had not been seen by the one that saw it best"
+
+
 def test_what_never_was_seen_is_not_a_number_and_said_to_be_missing():
     bench = Bench()
     seen = bench.tick(AWAY, look=True, shown=False)
     assert np.all(np.isnan(seen.objects))
     said = bench.post.unseen()
-    assert said == {"pack": "pack is not seen: camera 'scene' shows fewer than 30 pixels of its colour"}
+    why = "cameras 'scene' and 'scene_right' show fewer than 30 pixels of its colour"
+    assert said == {"pack": f"pack is not seen: {why}"}
     assert bench.error(bench.tick(AWAY, look=True)) < 0.001
     assert bench.post.unseen() == {}
 

@@ -14,7 +14,7 @@ from bt_tasksim.robot.description import load_robot
 from bt_tasksim.robot.urdf_links import load_links
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.shapes import KINDS
-from bt_tasksim.scene.specs import ObjectSpec
+from bt_tasksim.scene.specs import FixtureSpec, ObjectSpec
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -53,7 +53,8 @@ def test_an_object_has_its_mass_and_shape(kind):
 
 
 def test_fixtures_stand_where_they_were_drawn():
-    configuration = drawn("cup", fixtures=["shelf", "trash_bin", "stand"])
+    apart = [FixtureSpec("trash_bin", at=(-0.1, -0.6)), FixtureSpec("stand", at=(-0.1, 0.6))]
+    configuration = drawn("cup", fixtures=["shelf", *apart])
     world = build_world(mujoco, load_robot("panda"), configuration)
     data = mujoco.MjData(world.model)
     mujoco.mj_kinematics(world.model, data)

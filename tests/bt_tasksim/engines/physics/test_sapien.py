@@ -1,13 +1,16 @@
 """SAPIEN: what PhysX reports of a contact, and the same again bit for bit."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from physics_cases import assert_identical, episode, holding, runner_of, scene
+from physics_cases import Still, assert_identical, episode, holding, lifted, runner_of, scene
 
 from bt_tasksim.concept.context import one_world
 from bt_tasksim.core.world import Command
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physics.sapien import SapienPhysics
+from bt_tasksim.engines.physics.sapien_stepping import FINE
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.trees.load import load_source
@@ -31,6 +34,55 @@ def test_the_hands_skin_keeps_what_it_presses_from_overlapping(robot, kind):
     hidden = runner.pipeline.hidden()
     assert hidden.hand_force[0] > 10.0 and hidden.hand_distance[0] == 0.0, "what rests on the skin touches"
     assert hidden.penetration < 2e-4, runner.pipeline.physics.deepest_pair
+
+
+@pytest.mark.parametrize("kind", ["cylinder", "box"])
+@pytest.mark.parametrize("mass", [0.03, 0.06])
+def test_fingers_that_press_do_not_sink_into_light_things(kind, mass):
+    runner = holding(kind, mass)
+    for _ in range(20):
+        runner.pipeline.step(Command())
+    hidden = runner.pipeline.hidden()
+    assert hidden.hand_force[0] > 20.0
+    assert hidden.penetration < 2e-4, runner.pipeline.physics.deepest_pair
+
+
+def steps_of(runner, closure):
+    """Lengths in seconds of PhysX's steps in a control period in which the hand goes there."""
+    world, found = runner.pipeline.physics.simulated.world, []
+    system = world.system
+
+    def step():
+        found.append(world.scene.timestep)
+        system.step()
+
+    world.system = SimpleNamespace(step=step, get_contacts=system.get_contacts)
+    runner.pipeline.step(Command(hand=np.array([closure])))
+    world.system = system
+    return np.array(found)
+
+
+def test_steps_are_finer_where_the_hand_lets_go_of_something():
+    runner = holding("box", 0.2)
+    usual = steps_of(runner, 1.0)
+    letting_go = steps_of(runner, 0.0)
+    assert usual.sum() == pytest.approx(0.05) and letting_go.sum() == pytest.approx(0.05)
+    assert len(letting_go) == FINE * len(usual)
+    for _ in range(40):
+        runner.pipeline.step(Command())
+    assert len(steps_of(runner, 1.0)) == len(usual), "it has come to rest"
+    runner.pipeline.step(Command(hand=np.array([1.0])))
+    assert len(steps_of(runner, 0.0)) == len(usual), "there is nothing in the hand"
+
+
+@pytest.mark.parametrize("height", [0.1, 0.25, 0.45])
+def test_what_falls_flat_lands_no_deeper_than_two_millimetres_however_fast(height):
+    world = Still(lifted(scene("box", 0.18).sample(1), height))
+    world.step(30)
+    hidden = world.physics.hidden()
+    assert hidden.penetration < 2e-3, world.physics.deepest_pair
+    assert abs(world.state.objects[0, 2] - hidden.objects[0, 2]) < 1e-6
+    assert hidden.support[0, 1], "it stands on the table"
 
 
 @pytest.mark.parametrize("robot", ["panda", "xarm7_ability"])

@@ -147,6 +147,21 @@ def test_a_world_with_more_objects_widens_the_arrays_and_changes_no_other(engine
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+def test_where_all_worlds_begin_anew_nothing_is_left_of_what_was(engine):
+    grasp, *_, three = episodes(engine)
+    batch, row = batch_of(engine, 1), np.array([0])
+    for episode, objects in ((three, 3), (grasp, 1), (three, 3)):
+        batch.reset(row, [episode.configuration])
+        target = episode.targets[0]
+        batch.step(JointTarget(target.position[None], target.velocity[None]), row)
+        assert batch.state(row).objects.shape == (1, objects, 7)
+        n_bodies = objects + len(episode.configuration.fixtures)
+        assert batch.hidden(row).support.shape == (1, objects, n_bodies)
+        assert_row(batch.state(row), 0, episode.states[0])
+        assert_row(batch.hidden(row), 0, episode.hidden[0])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_target_that_is_no_number_fails_its_world_alone(engine, threads):
     grasp, throw, *_ = episodes(engine)

@@ -1,6 +1,7 @@
 """Drawn worlds for another process: files by name and content, and nothing that no engine should build."""
 
 import dataclasses
+import json
 import shutil
 
 import pytest
@@ -8,7 +9,9 @@ import pytest
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.resources import asset
 from bt_tasksim.engines.remote.configurations import as_received, find_mesh, for_sending, mesh_name
+from bt_tasksim.engines.remote.plain import from_plain
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import ObjectSpec
 from bt_tasksim.trees.load import load_source, scenarios
@@ -135,3 +138,13 @@ def test_a_disturbance_names_an_object_of_the_world(robot):
     other = dataclasses.replace(world, disturbance=dataclasses.replace(world.disturbance, object="gone"))
     with pytest.raises(InputError, match="what is disturbed is not in the world; known: cube"):
         as_received(other, robot)
+
+
+def test_given_grasps_arrive_and_are_bounded(robot):
+    sent = for_sending(Scene(objects={"it": "bracket.yaml on table"}).sample(0), robot)
+    assert len(sent.objects[0].grasps) == 3
+    arrived = as_received(from_plain(ActorConfiguration, json.loads(sent.to_json()), "it"), robot)
+    assert arrived.objects[0].grasps == sent.objects[0].grasps
+    many = dataclasses.replace(sent.objects[0], grasps=sent.objects[0].grasps * 22)
+    with pytest.raises(InputError, match="at most 64 grasps, found 66"):
+        as_received(dataclasses.replace(sent, objects=(many,)), robot)

@@ -27,7 +27,7 @@ from bt_tasksim.engines.remote.memory import MemoryWatch
 from bt_tasksim.engines.remote.messages import Message, decode, encode
 from bt_tasksim.engines.remote.schema import REPLIES
 from bt_tasksim.engines.remote.server import EngineServer
-from bt_tasksim.engines.remote.session import Session
+from bt_tasksim.engines.remote.session import ServedSession
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.training.evaluation import Job, evaluate
 
@@ -425,7 +425,9 @@ class Slow(KinematicsEngine):
 def serving(engine, robot, key=None, **limits):
     """A server of kinematics in a thread, and the sentences of what it refuses."""
     said, stop = [], threading.Event()
-    session = Session(engine, "kinematics", "slow", robot, watch=MemoryWatch(own=limits.pop("own", 1 << 30)))
+    session = ServedSession(
+        engine, "kinematics", "slow", robot, watch=MemoryWatch(own=limits.pop("own", 1 << 30))
+    )
     server = EngineServer(session, Address("127.0.0.1", 0), key, said.append, **limits)
     thread = threading.Thread(target=server.serve, args=(stop.is_set,))
     thread.start()

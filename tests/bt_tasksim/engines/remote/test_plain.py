@@ -89,7 +89,7 @@ def test_a_sentence_says_where_and_what():
     assert "joint_position should be a list of at most" in refused(
         lambda d: d.update(joint_position=[0.0] * (LONGEST_LIST + 1))
     )
-    assert "goal: position_tolerance" in refused(lambda d: d["goal"].update(position_tolerance=1e300))
+    assert "goals[0]: position_tolerance" in refused(lambda d: d["goals"][0].update(position_tolerance=1e300))
 
 
 def test_what_is_no_data_is_not_sent():

@@ -157,7 +157,7 @@ def test_served_perception_sees_in_pictures_what_it_sees_here(folder, robot, wor
         own = CameraPostProcess(robot)
         for engine in (remote, own):
             engine.reset(world, model)
-        assert remote.cameras(True) == own.cameras(True) == ("scene",)
+        assert remote.cameras(True) == own.cameras(True) == ("scene", "scene_right")
         for k in range(3):
             now = dataclasses.replace(state, time=np.float64(0.05 * k))
             images = {"scene": image} if k == 0 else {}

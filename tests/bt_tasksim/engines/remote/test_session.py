@@ -14,7 +14,7 @@ from bt_tasksim.engines.remote.configurations import for_sending
 from bt_tasksim.engines.remote.handshake import identity, mismatch
 from bt_tasksim.engines.remote.messages import BadMessageError, Message, decode, encode
 from bt_tasksim.engines.remote.schema import REPLIES, sizes_of
-from bt_tasksim.engines.remote.session import Session, error_of, plain_sentence
+from bt_tasksim.engines.remote.session import ServedSession, error_of, plain_sentence
 from bt_tasksim.robot.description import load_robot
 
 from .conftest import hello
@@ -48,7 +48,7 @@ class Stage:
 
     def __init__(self, state, robot, world):
         self.arm, self.robot, self.world, self.refused = Arm(state), robot, world, []
-        self.session = Session(self.arm, "physics", "arm", robot, refused=self.refused.append)
+        self.session = ServedSession(self.arm, "physics", "arm", robot, refused=self.refused.append)
         self.there = True
 
     def frames(self, frames, client=ME):
@@ -195,7 +195,7 @@ def test_ten_thousand_malformed_messages_move_nothing(robot, world, sizes):
             calls.append("step")
             return super().step(target)
 
-    session = Session(Counted(robot), "physics", "sapien", robot)
+    session = ServedSession(Counted(robot), "physics", "sapien", robot)
 
     def answer(frames):
         return decode(session.answer(ME, frames, lambda owner: True), REPLIES, sizes)

@@ -19,8 +19,8 @@ import numpy as np
 import pinocchio as pin
 
 from bt_tasksim.core.poses import Array, array_namespace, constant, from_matrix
-from bt_tasksim.engines.kinematics.linear import total
-from bt_tasksim.engines.kinematics.rows import chosen, some
+from bt_tasksim.robot.kinematics.linear import total
+from bt_tasksim.robot.kinematics.rows import chosen, some
 
 _NEARLY_PI = 3e-2
 """rad from half a turn, within which the axis is read from the symmetric part of a rotation matrix."""

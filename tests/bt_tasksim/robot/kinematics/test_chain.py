@@ -7,10 +7,10 @@ import pinocchio as pin
 import pytest
 
 from bt_tasksim.core.poses import Array
-from bt_tasksim.engines.kinematics.chain import Chain, difference, placements, poses_of, turned
-from bt_tasksim.engines.kinematics.linear import solve_symmetric, total
-from bt_tasksim.engines.kinematics.models import arm_model, full_model
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.kinematics.chain import Chain, difference, placements, poses_of, turned
+from bt_tasksim.robot.kinematics.linear import solve_symmetric, total
+from bt_tasksim.robot.kinematics.models import arm_model, full_model
 from tests.array_libraries import agree
 
 SLIDING = """<robot name="crane"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>

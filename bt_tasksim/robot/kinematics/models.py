@@ -16,7 +16,7 @@ from bt_tasksim.robot.urdf_visuals import read_urdf
 
 _ENDLESS = 1e3
 """rad, which a joint without limits does not reach."""
-_XYZQUAT = np.array([0, 1, 2, 4, 5, 6, 3])
+_XYZQUAT, _WXYZ = np.array([0, 1, 2, 4, 5, 6, 3]), np.array([0, 1, 2, 6, 3, 4, 5])
 
 
 def se3(pose: Array) -> pin.SE3:
@@ -33,7 +33,18 @@ def se3(pose: Array) -> pin.SE3:
         )
     if abs(square - 1.0) > 1e-9:
         p = np.concatenate([p[:3], p[3:] / np.sqrt(square)])
-    return pin.XYZQUATToSE3(p[_XYZQUAT])
+    return pin.XYZQUATToSE3(free_flyer(p))
+
+
+def free_flyer(pose: Array) -> Array:
+    """A pose ``(7,)`` as Pinocchio's coordinates ``(7,)`` have it, the quaternion x y z w."""
+    return np.asarray(pose, float)[_XYZQUAT]
+
+
+def pose_of(placement: pin.SE3) -> Array:
+    """The pose ``(7,)`` of a placement in Pinocchio's form."""
+    found: Array = pin.SE3ToXYZQUAT(placement)[_WXYZ]
+    return found
 
 
 def full_model(robot: RobotDescription) -> tuple[pin.Model, Array]:

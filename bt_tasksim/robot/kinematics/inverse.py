@@ -20,10 +20,11 @@ import numpy as np
 import pinocchio as pin
 
 from bt_tasksim.core.poses import Array, array_namespace, clip, constant, host, indices
-from bt_tasksim.engines.kinematics.chain import Chain, difference
-from bt_tasksim.engines.kinematics.failures import Reach
-from bt_tasksim.engines.kinematics.linear import solve_symmetric, total
-from bt_tasksim.engines.kinematics.rows import (
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.chain import Chain, difference
+from bt_tasksim.robot.kinematics.failures import Reach
+from bt_tasksim.robot.kinematics.linear import solve_symmetric, total
+from bt_tasksim.robot.kinematics.rows import (
     at_least,
     chosen,
     either,
@@ -37,12 +38,14 @@ from bt_tasksim.engines.kinematics.rows import (
     taken_of,
     where_true,
 )
-from bt_tasksim.robot.description import RobotDescription
 
 _TOLERANCE = 5e-5
 """Largest component of the remaining error, m and rad, of a pose that counts as solved exactly."""
 _MISS = (1e-3, 5e-3)
 """A nearest pose that misses by no more (m, rad) counts as reached; arms are not more accurate."""
+_BESIDE = (1.5e-2, 3e-2)
+"""A posture that was asked for is taken where its tool is no farther (m, rad) from a pose that cannot be
+reached: a tool may be corrected by some millimetres on a way that was planned without that."""
 _LENGTH = 0.3
 """Metres that weigh as much as one radian where position and rotation cannot both be had."""
 _DAMPING = 1e-7
@@ -138,7 +141,7 @@ class InverseKinematics:
         rng = np.random.default_rng(0)
         self._starts = constant(rng.uniform(robot.arm_lower, robot.arm_upper, (_RESTARTS, self._n)).T, like)
 
-    def near(self, goal: Array, last: Array, seen: Array) -> Postures:
+    def near(self, goal: Array, last: Array, seen: Array, posture: Array | None = None) -> Postures:
         """Joints for placements, continuous with the last ones where that is possible.
 
         A row fails where no posture brings the tool there, or only one that the arm would have to swing to
@@ -148,8 +151,17 @@ class InverseKinematics:
             goal: Placements of the tool ``(3, 4, N)``.
             last: The joints before ``(n, N)``.
             seen: ``(n + 1, 3, 4, N)``, what `Chain.seen` says of those.
+            posture: Joints ``(n, N)`` to come near to, instead of going on from the last ones; NaN where
+                there are none.
         """
         pull = self._pull * (self._rest - last)
+        given = np.zeros(0, int)
+        if posture is not None and some(asked := ~either(posture != posture)):  # a number equals itself
+            xp = array_namespace(goal)
+            given = where_true(asked)
+            start = clip(taken(posture, given), self._lower, self._upper)
+            last, seen = put_in((last, seen), given, (start, self.chain.seen(start)))
+            pull = xp.where(asked, xp.zeros_like(pull), pull)
         pull = pull * (_PULL_LIMIT / at_least(_largest(pull), _PULL_LIMIT))
         reached = self._iterate(last, goal, _TRACK, pull, seen)
         rows = goal.shape[-1]
@@ -158,7 +170,21 @@ class InverseKinematics:
         if every(solved):
             return found
         hard = where_true(~solved)
-        return _with(found, hard, self._again(*taken_of((goal, last), hard)))
+        found = _with(found, hard, self._again(*taken_of((goal, last), hard)))
+        failed = np.intersect1d(np.flatnonzero(found.code != Reach.REACHED), given)
+        return self._taken_as_asked(found, failed, goal, last, seen) if len(failed) else found
+
+    def _taken_as_asked(
+        self, found: Postures, rows: np.ndarray, goal: Array, asked: Array, seen: Array
+    ) -> Postures:
+        """With those of some rows whose postures ``(n, N)`` bring the tool about where it is to be."""
+        asked, seen, goal = taken_of((asked, seen, goal), rows)
+        missed = self._missed(seen, goal)
+        near = np.flatnonzero((missed.distance <= _BESIDE[0]) & (missed.angle <= _BESIDE[1]))
+        if not len(near):
+            return found
+        those = Postures(*taken_of((asked, seen), near), *np.zeros((3, len(near))))
+        return _with(found, rows[near], those)
 
     def _again(self, goal: Array, last: Array) -> Postures:
         """`near` for rows that a few iterations have not brought there."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bt_tasksim.core.poses import host
-from bt_tasksim.engines.kinematics import rows as of
+from bt_tasksim.robot.kinematics import rows as of
 from tests.array_libraries import LIBRARIES, agree
 
 VALUES = np.random.default_rng(0).normal(size=(3, 2, 5))

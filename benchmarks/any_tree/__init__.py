@@ -1,0 +1,1 @@
+"""Behaviour trees with any objects: what they are tried on."""

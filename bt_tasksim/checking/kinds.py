@@ -1,0 +1,82 @@
+"""What ``bt-tasksim check`` is given: a concept, a tree with its scene, a robot, a scene or an object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from bt_tasksim.checking.report import Report
+from bt_tasksim.core.document import read_document
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.registry import parts
+
+ROBOT = {"urdf", "arm", "hand", "tool", "tips", "base_link"}
+"""Fields of which a robot's file has one at least, and no other file."""
+SCENE = {"objects", "goal", "goals", "spots", "fixtures", "disturbed"}
+"""Likewise of a scene's."""
+FIXTURE = {"boxes", "places"}
+"""Likewise of furniture's."""
+
+
+def check_file(file: str, tree: str | None = None, robot: str | None = None) -> Report:
+    """Check what a file holds, see `concept_file.check`, `check_robot`, `check_scene` and `check_mesh`.
+
+    Args:
+        file: The file, or the name of a robot.
+        tree: The tree in which concepts are seen at work.
+        robot: Name or file of the robot for a scene or an object; by default the scene's own.
+
+    Raises:
+        InputError: There is no such file, it is of no kind that is checked, or it cannot be read.
+        MachineError: A library is not installed.
+    """
+    path = Path(file)
+    if not path.suffix:
+        if file not in parts("robot"):
+            raise InputError(f"there is no robot '{file}'{nearest(file, parts('robot'))}; or name a file")
+        return _robot(file)
+    if not path.is_file():
+        raise InputError(f"there is no file '{file}'")
+    if path.suffix == ".py":
+        return _code(file, tree, robot)
+    from bt_tasksim.scene.mesh_file import FORMATS
+
+    if path.suffix.lower().removeprefix(".") in FORMATS:
+        from bt_tasksim.checking.object_check import check_mesh
+
+        return check_mesh(file, **({} if robot is None else {"robot": robot}))
+    content = read_document(file, "file").value
+    keys = set(content) if isinstance(content, Mapping) else set()
+    if keys & ROBOT:
+        return _robot(file)
+    if keys & SCENE:
+        return _scene(file, robot)
+    if keys & FIXTURE:
+        raise InputError(f"'{file}' is furniture: name it in the 'fixtures' of a scene, and check that")
+    raise InputError(
+        f"'{file}' is neither a robot's file (urdf, arm, hand ...) nor a scene's (objects, goal ...): "
+        "give one of these, a mesh, or a Python file with a concept or a scene()"
+    )
+
+
+def _code(file: str, tree: str | None, robot: str | None) -> Report:
+    """The concepts of a Python file; where it has none, its scene."""
+    from bt_tasksim.checking import concept_file
+    from bt_tasksim.trees.load import has_scene, own_nodes
+
+    if tree is None and not own_nodes(file, needed=False) and has_scene(file):
+        return _scene(file, robot)
+    return concept_file.check(file, tree)
+
+
+def _robot(robot: str) -> Report:
+    from bt_tasksim.checking.robot_file import check_robot
+
+    return check_robot(robot)
+
+
+def _scene(file: str, robot: str | None) -> Report:
+    from bt_tasksim.checking.scene_file import check_scene
+    from bt_tasksim.trees.load import load_scene_of
+
+    return check_scene(load_scene_of(file, robot))

@@ -1,0 +1,73 @@
+"""What a check has found: a line for each thing that is wrong, and what was looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+ERROR, WARNING = "ERROR", "WARNING"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong.
+
+    Attributes:
+        level: `ERROR` or `WARNING`.
+        concept: Name of what is checked: of the concept, the robot, the scene or the object.
+        function: Name of its function, or of the field or thing in it; empty for the whole.
+        what: What is wrong.
+        remedy: What to do.
+        line: Line in the file; 0 where none is to blame.
+        file: Name of that file.
+    """
+
+    level: str
+    concept: str
+    function: str
+    what: str
+    remedy: str
+    line: int = 0
+    file: str = ""
+
+    def __str__(self) -> str:
+        where = f"{self.concept}.{self.function}" if self.function else self.concept
+        line = f" ({self.file}:{self.line})" if self.line else ""
+        return f"{self.level} {where}{line}: {self.what}; {self.remedy}"
+
+
+@dataclass
+class Report:
+    """What a check has found.
+
+    Attributes:
+        findings: What is wrong.
+        checked: What was checked, a line for each thing.
+        seen: What was measured, in lines to read.
+    """
+
+    findings: list[Finding] = field(default_factory=list)
+    checked: list[str] = field(default_factory=list)
+    seen: list[str] = field(default_factory=list)
+
+    @property
+    def errors(self) -> int:
+        """How many findings are errors."""
+        return sum(f.level == ERROR for f in self.findings)
+
+    def add(self, level: str, thing: str, part: str, what: str, remedy: str) -> None:
+        """Note a finding, see `Finding`."""
+        self.findings.append(Finding(level, thing, part, what, remedy))
+
+    def lines(self) -> list[str]:
+        """What is printed: what was measured, a line for each finding, errors first, and what was checked."""
+        order = sorted(self.findings, key=lambda f: (f.concept, f.level != ERROR))
+        counted = f"{_count(self.errors, 'error')}, {_count(len(self.findings) - self.errors, 'warning')}"
+        return [
+            *self.seen,
+            *map(str, order),
+            *(f"{'not ok' if self.errors else 'ok'}: {c}; {counted}" for c in self.checked),
+        ]
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"

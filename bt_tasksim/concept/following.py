@@ -1,0 +1,27 @@
+"""What comes after a leaf in its tree, as far as sequences say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.composites import Sequence
+
+
+def following(leaf: Behaviour) -> tuple[Any, ...]:
+    """The models of the leaves that are ticked after a leaf has succeeded, in order.
+
+    They are the later siblings in each sequence above it. What stands under a fallback is among them, since
+    it may be ticked; a fallback's later children are none, since they are not ticked after a success.
+    """
+    found: list[Any] = []
+    node = leaf
+    while node.parent is not None:
+        parent = node.parent
+        if isinstance(parent, Sequence):
+            place = next(k for k, child in enumerate(parent.children) if child is node)
+            for sibling in parent.children[place + 1 :]:
+                models = (getattr(each, "model", None) for each in sibling.iterate())
+                found += [model for model in models if model is not None]
+        node = parent
+    return tuple(found)

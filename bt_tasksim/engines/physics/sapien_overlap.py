@@ -1,0 +1,67 @@
+"""By how much two shapes in SAPIEN overlap, where PhysX says that they do so deeply.
+
+PhysX gives each contact a normal and says how deep the shapes are along that. Where the thin end of one of a
+mesh's convex pieces is met aside, that may be a direction in which they are centimetres deep, while half a
+millimetre in another one would part them. What counts is the least way that parts them (S. Cameron and
+R. Culley, "Determining the minimum translational distance between two convex polyhedra", ICRA 1986).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import coal
+import numpy as np
+
+from bt_tasksim.core import poses
+from bt_tasksim.engines.physics.sapien_world import array
+from bt_tasksim.scene.hulls import convex
+
+if TYPE_CHECKING:
+    from sapien import physx
+
+
+def least_overlap(contact: physx.PhysxContact, said: float, step: float) -> float:
+    """Metres by which the two shapes of a contact overlap; never more than what PhysX said.
+
+    Args:
+        contact: The contact.
+        said: Metres along the contact's own normal, as the bodies were before the last step.
+        step: Seconds of that step: it is looked where the bodies are, and where they were.
+    """
+    solids = [_solid(shape) for shape in contact.shapes]
+    if any(solid is None for solid in solids):
+        return said
+    pairs = list(zip(contact.bodies, contact.shapes, strict=True))
+    deepest = max(_deep(solids, [_placement(*pair, back) for pair in pairs]) for back in (0.0, step))
+    return min(said, deepest)
+
+
+def _deep(solids: Sequence[Any], placed: Sequence[Any]) -> float:
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    request.enable_signed_distance = True
+    return -float(coal.distance(solids[0], placed[0], solids[1], placed[1], request, result))
+
+
+def _solid(shape: physx.PhysxCollisionShape) -> Any:
+    """A shape as coal's; None for those that are neither boxes nor convex meshes."""
+    from sapien import physx
+
+    if isinstance(shape, physx.PhysxCollisionShapeBox):
+        return coal.Box(*(2.0 * np.asarray(shape.half_size, float)))
+    if isinstance(shape, physx.PhysxCollisionShapeConvexMesh):
+        return convex(np.asarray(shape.vertices, float) * np.asarray(shape.scale, float))
+    return None
+
+
+def _placement(body: physx.PhysxRigidBaseComponent, shape: physx.PhysxCollisionShape, back: float) -> Any:
+    """Where a shape is, or was so many seconds back."""
+    pose = array(body.entity.pose)
+    if back and hasattr(body, "linear_velocity"):
+        turn = poses.from_rotation_vector(-back * np.asarray(body.angular_velocity, float))
+        pose = np.concatenate(
+            [pose[:3] - back * np.asarray(body.linear_velocity, float), poses.quat_multiply(turn, pose[3:])]
+        )
+    placed = poses.multiply(pose, array(shape.local_pose))
+    return coal.Transform3s(poses.to_matrix(placed[3:]), placed[:3].copy())

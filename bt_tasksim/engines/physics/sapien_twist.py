@@ -1,0 +1,113 @@
+"""What keeps a thing that two soft pads hold from turning between them, which PhysX does not know.
+
+A soft pad touches a patch and not a point, and so resists being twisted by up to two thirds of friction times
+force times the patch's radius (R. D. Howe and M. R. Cutkosky, "Practical force-motion models for sliding
+manipulation", Int. J. Robotics Research 15(6), 1996). PhysX's own patches do not: an egg swings between two
+fingers like a pendulum, and a cylinder that is held beside its middle creeps by some degrees a second. The
+resistance is that of a bristle that bends and slips (C. Canudas de Wit and others, "A new model for control
+of systems with friction", IEEE Trans. Automatic Control 40(3), 1995).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.sapien_world import floats
+from bt_tasksim.robot.description import Pads
+
+if TYPE_CHECKING:
+    from sapien import physx
+
+STIFF, DAMPED = 0.25, 0.5
+"""The bristle's stiffness and damping, as shares of the thing's inertia about the axis over the square of a
+step, and over a step: so it is as stiff as steps of any length allow."""
+PADS = 2
+"""Fingertips of a hand that holds things between two pads; one with more of them holds by more points."""
+PRESSED = 0.5
+"""Newtons from which a fingertip holds."""
+
+
+class Twist:
+    """The pads' resistance in one world.
+
+    Args:
+        pads: The pads.
+        opposition: Groups of fingertips that press against each other.
+        hand: The link that carries the tool.
+        closing: Unit vector ``(3,)`` along which the hand closes, in that link's frame.
+        bodies: The objects.
+        inertia: Frame of the principal axes and principal moments (kg m^2), by object.
+    """
+
+    def __init__(
+        self,
+        pads: Pads,
+        opposition: Sequence[Sequence[int]],
+        hand: physx.PhysxArticulationLinkComponent,
+        closing: Array,
+        bodies: Sequence[physx.PhysxRigidDynamicComponent],
+        inertia: Sequence[tuple[list[float], list[float]]],
+    ) -> None:
+        self._most = 2.0 / 3.0 * pads.friction * pads.min_patch_radius
+        self._opposition, self._hand, self._bodies, self._inertia = opposition, hand, bodies, inertia
+        self._closing, self._across = closing, closing.tolist()
+        self._held = -1
+        self._turned = self._slipped = 0.0
+
+    @property
+    def holds(self) -> bool:
+        """Something is held."""
+        return self._held >= 0
+
+    def look(self, tip_force: Sequence[Sequence[float]], hand_force: Sequence[float]) -> None:
+        """What is held, and how firmly, for the next steps.
+
+        Args:
+            tip_force: On each fingertip, N.
+            hand_force: Of the robot on each object, N.
+        """
+        if len(tip_force) != PADS:
+            return
+        sides = [max((math.hypot(*tip_force[tip]) for tip in side), default=0.0) for side in self._opposition]
+        which = max(range(len(hand_force)), key=hand_force.__getitem__, default=-1)
+        if which < 0 or min(sides) < PRESSED or hand_force[which] < PRESSED:
+            self._held = -1
+            return
+        hand, thing = (list(floats(body.entity_pose)) for body in (self._hand, self._bodies[which]))
+        if which != self._held:
+            self._held, self._turned, self._slipped = which, 0.0, 0.0
+            self._back = poses.composed(poses.inverted(thing), hand)
+        closing = poses.rotate(np.array(hand[3:]), self._closing)
+        self._limit = self._most * sum(sides)
+        self._axis = closing.tolist()
+        frame, moments = self._inertia[which]
+        turned = poses.quat_multiply(np.array(thing[3:]), np.array(frame[3:]))
+        along = poses.rotate(poses.quat_conjugate(turned), closing)
+        self._moment = float(np.sum(along * along * np.array(moments)))
+
+    def resist(self, step: float) -> None:
+        """Act for the next step of so many seconds.
+
+        How far the thing has turned in the hand is seen from where both are: PhysX's speeds hold what parts
+        bodies that overlap, too.
+        """
+        body = self._bodies[self._held]
+        hand, thing = (list(floats(part.entity_pose)) for part in (self._hand, body))
+        w, *vector = poses.composed(poses.composed(poses.inverted(hand), thing), self._back)[3:]
+        sign = 2.0 if w >= 0.0 else -2.0
+        turned = sign * sum(v * n for v, n in zip(vector, self._across, strict=True))
+        stiffness, damping = STIFF * self._moment / (step * step), DAMPED * self._moment / step
+        torque = -stiffness * (turned - self._slipped) - damping * (turned - self._turned) / step
+        if abs(torque) > self._limit:
+            torque = math.copysign(self._limit, torque)
+            most = self._limit / stiffness
+            self._slipped = min(max(self._slipped, turned - most), turned + most)
+        self._turned = turned
+        x, y, z = self._axis
+        body.add_force_torque([0.0, 0.0, 0.0], [torque * x, torque * y, torque * z])

@@ -1,0 +1,166 @@
+"""A robot's bodies: convex shapes that move with its joints, from the collision shapes of its URDF.
+
+Shapes that are not convex count as their convex hulls. Which of the robot's own bodies are to be kept apart
+is found by sampling postures, as MoveIt's setup assistant does: neighbours, pairs that always touch, and
+pairs that touch in the rest posture are not asked about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from bt_tasksim.core.poses import Array
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.models import full_model
+from bt_tasksim.robot.urdf_links import load_links
+from bt_tasksim.scene.hulls import convex
+
+_POSTURES = 400
+"""Random postures by which pairs of bodies are told apart."""
+_ALWAYS = 0.8
+"""Share of them from which on two bodies touch by the way that they are built."""
+_MOST_CORNERS = 200
+"""Corners of a hull; of a finer one a sample is taken, with what it leaves out added around it."""
+
+
+class RobotBodies:
+    """The bodies of a robot.
+
+    Args:
+        robot: The robot.
+
+    Attributes:
+        model: Pinocchio's model of all joints, with a frame ``tool``.
+        order: Where each of the robot's joints is in the model's ``q``.
+        shapes: The bodies alone, as Pinocchio's geometry.
+        links: Name of the link of each body ``(n,)``.
+        hand: Booleans ``(n,)``: it belongs to the hand.
+        fingers: Booleans ``(n,)``: a joint of the hand moves it.
+        moves: Booleans ``(n,)``: the arm moves it.
+        apart: Pairs of bodies ``(k, 2)`` that are to be kept apart.
+
+    Raises:
+        InputError: The description does not fit its URDF.
+    """
+
+    def __init__(self, robot: RobotDescription) -> None:
+        self.robot = robot
+        self.model, self.order = full_model(robot)
+        self.shapes = _shapes(robot, self.model)
+        self.links = [self.model.frames[g.parentFrame].name for g in self.shapes.geometryObjects]
+        below = _below(robot)
+        self.hand = np.array([link in below for link in self.links], bool)
+        moved = {self.model.getJointId(name) for name in robot.hand_joints}
+        self.fingers = np.array([g.parentJoint in moved for g in self.shapes.geometryObjects], bool)
+        fixed = [g.parentJoint == 0 for g in self.shapes.geometryObjects]
+        self.moves = ~np.array(fixed, bool)
+        self.tool_joint = self.model.frames[self.model.getFrameId("tool")].parentJoint
+        self.tool_placement = self.model.frames[self.model.getFrameId("tool")].placement
+        self.apart = self._kept_apart()
+
+    def configuration(self, arm: Array, hand: Array) -> Array:
+        """Pinocchio's ``q`` for joints of the arm ``(n_arm,)`` and of the hand ``(n_hand,)``."""
+        q = np.array(pin.neutral(self.model))
+        q[self.order] = np.concatenate([arm, hand])
+        return q
+
+    def _kept_apart(self) -> Array:
+        robot, shapes = self.robot, self.shapes.copy()
+        joints = [g.parentJoint for g in shapes.geometryObjects]
+        pairs = [
+            (i, j)
+            for i in range(shapes.ngeoms)
+            for j in range(i + 1, shapes.ngeoms)
+            if joints[i] != joints[j] and not (self.hand[i] and self.hand[j])
+        ]
+        for i, j in pairs:
+            shapes.addCollisionPair(pin.CollisionPair(i, j))
+        data, found = self.model.createData(), shapes.createData()
+        rng = np.random.default_rng(0)
+        postures = rng.uniform(robot.arm_lower, robot.arm_upper, (_POSTURES, len(robot.arm_joints)))
+        touched = np.zeros(len(pairs))
+        for arm in postures:
+            q = self.configuration(arm, robot.hand_open)
+            pin.computeCollisions(self.model, data, shapes, found, q, False)
+            touched += [result.isCollision() for result in found.collisionResults]
+        pin.computeCollisions(
+            self.model, data, shapes, found, self.configuration(robot.rest, robot.hand_open), False
+        )
+        at_rest = np.array([result.isCollision() for result in found.collisionResults], bool)
+        kept = (touched > 0) & (touched < _ALWAYS * _POSTURES) & ~at_rest
+        kept &= [not self._neighbours(joints[i], joints[j]) for i, j in pairs]
+        return np.array([pair for pair, keep in zip(pairs, kept, strict=True) if keep], int).reshape(-1, 2)
+
+    def _neighbours(self, a: int, b: int) -> bool:
+        """Whether a joint carries another one, or the one that does: their limits keep their bodies apart."""
+        for low, high in ((a, b), (b, a)):
+            carrier = self.model.parents[high]
+            if low in (carrier, self.model.parents[carrier]) and low != 0:
+                return True
+        return False
+
+
+def bodies_of(robot: RobotDescription) -> RobotBodies:
+    """The bodies of a robot, made once.
+
+    Raises:
+        InputError: The description does not fit its URDF.
+    """
+    found: RobotBodies = robot.derived("bodies", RobotBodies)
+    return found
+
+
+def _shapes(robot: RobotDescription, model: pin.Model) -> Any:
+    """The robot's collision shapes, each convex, about a root at the base link."""
+    folders = [str(robot.urdf.parent), str(robot.urdf.parent.parent)]
+    plain = pin.buildModelFromUrdf(str(robot.urdf))
+    found = pin.buildGeomFromUrdf(plain, str(robot.urdf), pin.GeometryType.COLLISION, package_dirs=folders)
+    base = plain.frames[plain.getFrameId(robot.base_link)].placement
+    shapes = pin.GeometryModel()
+    for shape in found.geometryObjects:
+        link = plain.frames[shape.parentFrame].name
+        frame = model.getFrameId(link)
+        joint = model.frames[frame].parentJoint
+        placement = base.inverse() * shape.placement if joint == 0 else shape.placement
+        shapes.addGeometryObject(
+            pin.GeometryObject(shape.name, joint, frame, placement, _convex(shape.geometry))
+        )
+    return shapes
+
+
+def _convex(geometry: Any) -> Any:
+    """A shape that is convex: itself, or its hull, with few corners."""
+    if not isinstance(geometry, coal.BVHModelBase):
+        return geometry
+    vertices = np.array(geometry.vertices(), float).reshape(-1, 3)
+    from scipy.spatial import ConvexHull
+
+    corners = vertices[ConvexHull(vertices).vertices]
+    if len(corners) <= _MOST_CORNERS:
+        return convex(corners)
+    directions = np.random.default_rng(0).normal(size=(4 * _MOST_CORNERS, 3))
+    few = corners[np.unique(np.argmax(directions @ corners.T, axis=1))]
+    hull = ConvexHull(few)
+    beyond = float(np.max(hull.equations[:, :3] @ corners.T + hull.equations[:, 3:], initial=0.0))
+    shape = convex(few)
+    shape.setSweptSphereRadius(max(beyond, 0.0))
+    return shape
+
+
+def _below(robot: RobotDescription) -> set[str]:
+    """Names of the links that the wrist link carries, and its own."""
+    parents: Mapping[str, str] = {item.link: item.parent for item in load_links(robot.urdf)}
+
+    def carried(link: str) -> bool:
+        while link:
+            if link == robot.wrist_link:
+                return True
+            link = parents.get(link, "")
+        return False
+
+    return {link for link in parents if carried(link)}

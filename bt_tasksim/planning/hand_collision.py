@@ -1,0 +1,100 @@
+"""Whether a hand alone would touch anything at a tool pose, whichever way its arm may bring it there.
+
+It is asked before joints are looked for: of hundreds of grasps most are excluded by the hand itself.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.bodies import RobotBodies, bodies_of
+from bt_tasksim.planning.pairs import Pairs
+from bt_tasksim.planning.things import Held, Leave, Thing, Touch
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.models import free_flyer
+
+
+class HandCollisions:
+    """A hand among things.
+
+    Args:
+        bodies: The robot's.
+        hand: Positions ``(n_hand,)`` of the hand's joints.
+        things: What stands around.
+        held: What is in the hand, if anything.
+        leave: What may touch.
+    """
+
+    def __init__(
+        self,
+        bodies: RobotBodies,
+        hand: Array,
+        things: Sequence[Thing],
+        held: Held | None = None,
+        leave: Leave | None = None,
+    ) -> None:
+        model = pin.Model()
+        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "tool")
+        self._pairs = Pairs(model, pin.GeometryModel(), (), leave)
+        shapes = hand_shapes(bodies, hand)
+        for name, placement, shape in shapes:
+            self._pairs.add(name, joint, placement, [shape])
+        own = range(len(shapes))
+        inside = self._pairs.add_held(held, joint, pin.SE3.Identity())
+        self._pairs.stand(things, own, own, inside)
+
+    def free(self, tool: Array) -> bool:
+        """Nothing touches at a tool pose ``(7,)``."""
+        return self._pairs.free(free_flyer(tool))
+
+    def first(self, tool: Array) -> Touch | None:
+        """The first of what touches at a tool pose ``(7,)``; None where nothing does."""
+        return self._pairs.first(free_flyer(tool))
+
+    def touches(self, tool: Array) -> list[Touch]:
+        """What touches at a tool pose ``(7,)``."""
+        return self._pairs.touches(free_flyer(tool))
+
+
+def beyond(robot: RobotDescription) -> float:
+    """Metres that both sides of a half closed hand reach beyond the tool's origin, along its approach."""
+    found: float = robot.derived("beyond", _beyond)
+    return found
+
+
+def _beyond(robot: RobotDescription) -> float:
+    ends: dict[str, float] = {}
+    for name, placement, shape in hand_shapes(bodies_of(robot), (robot.hand_open + robot.hand_closed) / 2):
+        deepest = float((_corners(shape) @ placement.rotation.T + placement.translation)[:, 2].max())
+        ends[name] = max(ends.get(name, -math.inf), deepest)
+    tips = [max(ends.get(link, -math.inf) for link in tip.links) for tip in robot.tips]
+    return min(max(tips[k] for k in group) for group in robot.opposition)
+
+
+def _corners(shape: Any) -> Array:
+    """Points ``(n, 3)`` in whose hull a shape is: its own corners, or those of its box."""
+    if hasattr(shape, "num_points"):
+        return np.array([shape.point(k) for k in range(shape.num_points)])
+    shape.computeLocalAABB()
+    box = shape.aabb_local
+    return np.array(list(itertools.product(*zip(box.min_, box.max_, strict=True))))
+
+
+def hand_shapes(bodies: RobotBodies, hand: Array) -> list[tuple[str, Any, Any]]:
+    """Links of the hand, their placements in the tool frame, and their shapes."""
+    data, placed = bodies.model.createData(), bodies.shapes.createData()
+    q = bodies.configuration(bodies.robot.rest, hand)
+    pin.updateGeometryPlacements(bodies.model, data, bodies.shapes, placed, q)
+    tool = data.oMi[bodies.tool_joint] * bodies.tool_placement
+    shapes = bodies.shapes.geometryObjects
+    return [
+        (bodies.links[i], tool.actInv(placed.oMg[i]), shapes[i].geometry)
+        for i in np.flatnonzero(bodies.hand).tolist()
+    ]

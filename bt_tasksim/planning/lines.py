@@ -1,0 +1,32 @@
+"""Lines in the space of an arm's joints, and in which order to ask about the points on them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bt_tasksim.core.poses import Array
+
+STEP = 0.06
+"""Radians of the joint that turns most, between two questions on a line."""
+
+
+def line(a: Array, b: Array, step: float = STEP) -> Array:
+    """Joints ``(n, n_arm)`` from ``a`` to ``b``, both ``(n_arm,)`` and both among them."""
+    n = max(2, int(np.ceil(float(np.abs(b - a).max()) / step)) + 1)
+    found: Array = a + np.linspace(0.0, 1.0, n)[:, None] * (b - a)
+    return found
+
+
+def halves(points: Array) -> Array:
+    """Points ``(n, ...)``, the middle one first and then ever finer between: what is touched shows early."""
+    n = len(points)
+    if n < 3:
+        return points
+    order, queue = [], [(0, n)]
+    while queue:
+        low, high = queue.pop(0)
+        if low < high:
+            middle = (low + high) // 2
+            order.append(middle)
+            queue += [(low, middle), (middle + 1, high)]
+    return points[order]

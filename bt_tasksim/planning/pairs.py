@@ -1,0 +1,126 @@
+"""Shapes that move with the joints of a model, and which of them may not touch which.
+
+Pinocchio moves them, and a tree of their boxes tells coal which of them to compare (J. Pan, S. Chitta and
+D. Manocha, "FCL: a general purpose library for collision and proximity queries", ICRA 2012; coal is its
+heir).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import pinocchio as pin
+
+from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.things import Held, Leave, Thing, Touch, shapes_of
+from bt_tasksim.robot.kinematics.models import se3
+from bt_tasksim.scene.hulls import convex
+
+_TOUCHING = 1e-6
+"""Metres apart at which bodies count as touching: of two that lie in one another, centre in centre or aside
+along a diagonal, coal may say that they are 2e-12 m apart when it is not asked for points of contact."""
+
+
+class _Work(NamedTuple):
+    """What Pinocchio writes into, and the tree of boxes."""
+
+    data: Any
+    found: Any
+    tree: Any
+
+
+class Pairs:
+    """Pairs of shapes that are asked about. All are added before the first question.
+
+    Args:
+        model: Pinocchio's model of the joints.
+        shapes: Its geometry to begin with, to which it adds.
+        names: Names of the shapes in it.
+        leave: What may touch.
+    """
+
+    def __init__(self, model: pin.Model, shapes: Any, names: Iterable[str], leave: Leave | None) -> None:
+        self._model, self._shapes, self._names, self._leave = model, shapes, list(names), leave or Leave()
+
+    def add(self, name: str, joint: int, placement: Any, shapes: Iterable[Any]) -> range:
+        """Add shapes that move with a joint; their numbers."""
+        first = self._shapes.ngeoms
+        for shape in shapes:
+            called = f"{name} {self._shapes.ngeoms}"
+            self._shapes.addGeometryObject(pin.GeometryObject(called, joint, placement, shape))
+            self._names.append(name)
+        return range(first, self._shapes.ngeoms)
+
+    def add_held(self, held: Held | None, joint: int, tool: Any) -> range:
+        """Add what is in the hand, if anything, where ``tool`` is the tool's placement on its joint."""
+        if held is None:
+            return range(0)
+        return self.add(held.name, joint, tool * se3(held.grip), map(convex, held.pieces))
+
+    def stand(
+        self, things: Iterable[Thing], robot: Sequence[int], hand: Collection[int], held: Sequence[int]
+    ) -> None:
+        """Things stand around.
+
+        Args:
+            things: The things.
+            robot: Numbers of the robot's shapes that are compared with them.
+            hand: Numbers of those that are the hand's.
+            held: Numbers of the shapes of what is held.
+        """
+        leave = self._leave
+        for thing in things:
+            if thing.name in leave.robot:
+                continue
+            shapes = shapes_of(thing)
+            for shape in shapes:
+                shape.setSweptSphereRadius(thing.margin)
+            solids = self.add(thing.name, 0, se3(thing.pose), shapes)
+            movers = [i for i in robot if not (thing.name in leave.hand and i in hand)]
+            if thing.name not in leave.held:
+                movers += held
+            self.compare((i, k) for i in movers for k in solids)
+
+    def compare(self, pairs: Iterable[tuple[int, int]]) -> None:
+        """Compare pairs of shapes, by number, unless they may touch."""
+        for i, k in pairs:
+            if (self._names[i], self._names[k]) not in self._leave.pairs:
+                self._shapes.addCollisionPair(pin.CollisionPair(i, k))
+
+    @cached_property
+    def _work(self) -> _Work:
+        found = self._shapes.createData()
+        for request in found.collisionRequests:
+            request.security_margin = _TOUCHING
+        tree = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._model, self._shapes, found)
+        return _Work(self._model.createData(), found, tree)
+
+    def free(self, q: Array) -> bool:
+        """Nothing touches for Pinocchio's ``q``."""
+        work = self._work
+        touched: bool = pin.computeCollisions(self._model, work.data, work.tree, q, True)
+        return not touched
+
+    def touches(self, q: Array) -> list[Touch]:
+        """What touches for Pinocchio's ``q``, in the order in which it was added."""
+        data, found, _ = self._work
+        pin.computeCollisions(self._model, data, self._shapes, found, q, False)
+        pairs = zip(self._shapes.collisionPairs, found.collisionResults, strict=True)
+        names = [(self._names[p.first], self._names[p.second]) for p, result in pairs if result.isCollision()]
+        return list(dict.fromkeys(names))
+
+    def first(self, q: Array) -> Touch | None:
+        """The first of what touches for Pinocchio's ``q``; None where nothing does."""
+        data, found, _ = self._work
+        if not pin.computeCollisions(self._model, data, self._shapes, found, q, True):
+            return None
+        pairs = zip(self._shapes.collisionPairs, found.collisionResults, strict=True)
+        return next(
+            (self._names[p.first], self._names[p.second]) for p, result in pairs if result.isCollision()
+        )
+
+    def placement(self, joint: int) -> Any:
+        """Where a joint is for the ``q`` that was asked about last."""
+        return self._work.data.oMi[joint]

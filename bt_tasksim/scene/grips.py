@@ -1,0 +1,156 @@
+"""Where two fingers may hold an object: candidates in its own frame, apart from hands and tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
+
+_ACROSS = 0.7
+"""Cosine of the angle from which two closing axes differ."""
+_MOST_AXES = 3
+_FAR = 100.0
+
+
+@dataclass(frozen=True)
+class GivenGrip:
+    """One place where two fingers may hold an object, as somebody gives it; plain numbers, see `Grips`.
+
+    Attributes:
+        point: Middle ``(3,)`` between the contacts in the object's frame, metres.
+        closing: Direction ``(3,)`` along which fingers close.
+        width: Between the contacts, metres.
+        approach: Direction ``(3,)`` along which the hand comes; None: any across the closing one.
+        firmness: From 0 to 1.
+
+    Raises:
+        InputError: A number is not finite, a direction zero, the width not positive, or the firmness beyond
+            its bounds.
+    """
+
+    point: tuple[float, float, float]
+    closing: tuple[float, float, float]
+    width: float
+    approach: tuple[float, float, float] | None = None
+    firmness: float = 1.0
+
+    def __post_init__(self) -> None:
+        numbers = (*self.point, *self.closing, *(self.approach or ()), self.width, self.firmness)
+        if not all(math.isfinite(v) and abs(v) <= _FAR for v in numbers):
+            raise InputError("a grasp's numbers should be finite, and in metres")
+        if any(sum(v * v for v in way) < 1e-12 for way in (self.closing, self.approach) if way is not None):
+            raise InputError("a grasp's 'closing' and 'approach' should be directions, and not zero")
+        if not (self.width > 0.0 and 0.0 <= self.firmness <= 1.0):
+            raise InputError("a grasp's width should be positive, and its firmness between 0 and 1")
+
+
+@dataclass(frozen=True, eq=False)
+class Grips:
+    """Candidates for grasps, in the object's frame.
+
+    Attributes:
+        points: Middles ``(g, 3)`` between the two contacts, metres.
+        closing: Unit vectors ``(g, 3)`` along which fingers close; their sign is of no meaning.
+        widths: Distances ``(g,)`` between the contacts, metres.
+        approach: Unit vectors ``(g, 3)`` along which the hand comes; NaN where any direction across the
+            closing one will do.
+        firmness: How well each holds ``(g,)``, from 0 to 1: flat faces that are opposite each other, near the
+            centre of mass, hold best.
+    """
+
+    points: Array
+    closing: Array
+    widths: Array
+    approach: Array
+    firmness: Array
+
+    def __len__(self) -> int:
+        return len(self.widths)
+
+    @classmethod
+    def of(
+        cls,
+        points: Sequence[Sequence[float]] | Array,
+        closing: Sequence[Sequence[float]] | Array,
+        widths: Sequence[float] | Array,
+        approach: Sequence[Sequence[float]] | Array | None = None,
+        firmness: Sequence[float] | Array | None = None,
+    ) -> Grips:
+        """Candidates from sequences; by default from anywhere, and all as firm."""
+        n = len(widths)
+        come = np.full((n, 3), np.nan) if approach is None else np.array(approach, float).reshape(n, 3)
+        firm = np.ones(n) if firmness is None else np.array(firmness, float)
+        axes = np.array(closing, float).reshape(n, 3)
+        return cls(
+            np.array(points, float).reshape(n, 3),
+            axes / np.linalg.norm(axes, axis=-1, keepdims=True),
+            np.array(widths, float),
+            come / np.linalg.norm(come, axis=-1, keepdims=True),
+            firm,
+        )
+
+    def taken(self, which: Array) -> Grips:
+        """Some of them, by number or mask."""
+        return Grips(
+            self.points[which],
+            self.closing[which],
+            self.widths[which],
+            self.approach[which],
+            self.firmness[which],
+        )
+
+    @classmethod
+    def given(cls, grips: Sequence[GivenGrip]) -> Grips:
+        """As somebody gives them, the firmest first."""
+        whole = cls.of(
+            [grip.point for grip in grips],
+            [grip.closing for grip in grips],
+            [grip.width for grip in grips],
+            [grip.approach or (np.nan,) * 3 for grip in grips],
+            [grip.firmness for grip in grips],
+        )
+        return whole.taken(np.argsort(-whole.firmness, kind="stable"))
+
+    def axes(self, widest: float = np.inf) -> tuple[tuple[tuple[float, float, float], float], ...]:
+        """Closing axes and widths of the firmest ones that are level and unlike each other, at most three.
+
+        Args:
+            widest: Metres; wider ones are left out.
+        """
+        axes: list[tuple[tuple[float, float, float], float]] = []
+        for closing, width in zip(self.closing, self.widths.tolist(), strict=True):
+            unlike = all(abs(float(closing @ np.array(axis))) < _ACROSS for axis, _ in axes)
+            fits = width <= widest and abs(closing[2]) < 1.0 - _ACROSS
+            if len(axes) < _MOST_AXES and unlike and fits:
+                x, y, z = (closing if closing[np.argmax(np.abs(closing))] > 0 else -closing).tolist()
+                axes.append(((x, y, z), width))
+        return tuple(axes)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Grips]) -> Grips:
+        """All of them together, the firmest first."""
+        whole = cls(
+            *(
+                np.concatenate([getattr(part, name) for part in parts])
+                for name in ("points", "closing", "widths", "approach", "firmness")
+            )
+        )
+        return whole.taken(np.argsort(-whole.firmness, kind="stable"))
+
+
+LEVER = 0.05
+"""Metres from the centre of mass at which a grip is half as firm."""
+
+
+def firm_about(points: Array, centre: Array) -> Array:
+    """How firm grips at points ``(g, 3)`` are for their distance from the centre of mass, from 0 to 1.
+
+    Held aside of it, a thing turns between two fingers under its own weight.
+    """
+    aside = points - centre
+    return 1.0 / (1.0 + np.sum(aside * aside, axis=-1) / LEVER**2)

@@ -1,0 +1,28 @@
+"""Convex hulls in space as coal's shapes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import coal
+import numpy as np
+
+from bt_tasksim.core.poses import Array
+
+_KEPT = 1024
+"""Hulls that are remembered."""
+
+
+def convex(corners: Array) -> Any:
+    """The convex hull of corners ``(n, 3)`` as coal's shape, one of its own for each who asks."""
+    return _hull(np.ascontiguousarray(corners, float).tobytes()).clone()
+
+
+@lru_cache(maxsize=_KEPT)
+def _hull(corners: bytes) -> Any:
+    """The hull of corners; to make one takes a millisecond, and the same things are asked about again."""
+    points = coal.StdVec_Vec3s()
+    for corner in np.frombuffer(corners).reshape(-1, 3):
+        points.append(corner)
+    return coal.Convex.convexHull(points, False, "")

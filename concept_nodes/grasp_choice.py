@@ -1,0 +1,468 @@
+"""Which grasp to take: one in reach that keeps clear of everything and also serves what follows.
+
+The usual grasp is taken where it does. Else others are tried (`bt_tasksim.concept_nodes.grasp_candidates`),
+first what costs least to ask: does the hand touch something there, can what follows be done with that grasp,
+can the arm come to it.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from bt_tasksim.concept.aim import Aim
+from bt_tasksim.concept_nodes.closer import ROOMS
+from bt_tasksim.concept_nodes.grasp_candidates import HOLLOW, Candidates
+from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, TWO, Firm, deeper
+from bt_tasksim.concept_nodes.grasp_opening import Opening, wide_along
+from bt_tasksim.concept_nodes.holding import HOLDING
+from bt_tasksim.concept_nodes.view import WorldView
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.arm import LEANS
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.hand_collision import HandCollisions
+from bt_tasksim.planning.route import Pace, Route, followed, hurries
+from bt_tasksim.planning.surroundings import pieces_of
+from bt_tasksim.planning.things import Held, Leave
+from bt_tasksim.planning.ways import WayFinder
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.hand import SLIDE, opened_about, standing_side
+
+UNLIKE = (0.015, 0.4)
+"""Metres or radians by which a grasp differs from one that has failed."""
+STANDOFFS = (1.0, 0.6, 0.35)
+"""Shares of the standoff that are tried: a small arm, or one in a shelf, has no room for all of it."""
+REACH = 0.008
+"""Metres that the arm has to reach beyond where an approach begins: corrections of the grasp move it by so
+much."""
+SLIDES = (1.0, 0.7, 0.4)
+"""Shares of the way up to the object that a finger which stands still goes, as far as there is room."""
+ENOUGH = 3
+"""Postures from which an approach may begin."""
+FROM_GRIP = 0.018
+"""Metres that the usual grasp of a simple solid may be from a known grip of it; farther off, fingers that
+close on a rounded side squeeze it out."""
+STILL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+SAME_GRIP = (0.012, 0.02, 0.96)
+"""Metres aside of a known grip, metres along its closing axis, and the cosine of the angle between the axes,
+within which a grasp is taken to hold as that grip does."""
+MOST = 60
+"""Grasps in reach of which it is asked whether they serve."""
+FARTHEST = 400
+"""Grasps for which joints are looked for."""
+UNSURE = {BARELY: 0.5, HARDLY: 1.5}
+"""What a grasp costs more that the fingers would not hold surely, in radians of turn from the usual one."""
+TURNS = 0.1
+"""Radians by which an object may turn in a hand of many fingers when it closes: measured on the Ability hand,
+23 of 32 things turned by less."""
+GENTLE = 0.5
+"""Peak acceleration of the tool on a straight approach that begins at rest, m/s^2: at 3 the Panda's drives
+overshoot its end by 6 to 9 mm, and the palm meets the object."""
+SLOWER = 0.4
+"""Share of the usual speed at which a hand goes closely past things."""
+
+
+class Choice(NamedTuple):
+    """A grasp, and how to come to it.
+
+    Attributes:
+        goal: Tool pose ``(7,)``.
+        standoff: Metres before it from which the hand comes straight on.
+        routes: The motions that lead there; none where the usual way does.
+        tight: The opened hand has little room there, beside the object and what else is around.
+        usual: It is the usual grasp.
+        closure: How far the hand is closed as it comes.
+    """
+
+    goal: Array
+    standoff: float
+    routes: Sequence[Route]
+    tight: bool
+    usual: bool = False
+    closure: float = 0.0
+
+
+class _Begins(NamedTuple):
+    """Where the straight approach to a grasp may begin.
+
+    Attributes:
+        standoff: Metres before the grasp.
+        starts: Postures ``(k, n_arm)`` there.
+    """
+
+    standoff: float
+    starts: Array
+
+
+class Chooser:
+    """The choice of a grasp in one world.
+
+    Args:
+        view: The world.
+        target: The object.
+        standoff: Metres before the grasp from which the hand comes straight on.
+        pace: How fast the tool may go.
+        later: The concepts that come after the grasp.
+        closer: How much closer than usual what follows may come to things.
+        firmly: Grasps that the fingers would hardly hold do not count.
+    """
+
+    def __init__(
+        self,
+        view: WorldView,
+        target: str,
+        standoff: float,
+        pace: Pace,
+        later: Sequence[Any],
+        closer: float,
+        firmly: bool = False,
+    ) -> None:
+        self._view, self._target, self._standoff, self._pace = view, target, standoff, pace
+        self._firmly = firmly
+        self._close = close = closer > ROOMS[0]
+        self._openings: dict[float, Opening] = {}
+        if close:
+            self._pace = pace = Pace(SLOWER * pace.speed, acceleration=SLOWER**2 * pace.acceleration)
+        self._aims = _aims(view, target, later, closer)
+        self._why: Counter[str] = Counter()
+        self._gently = pace._replace(acceleration=GENTLE)
+
+    def usual(self, goal: Array, way: Sequence[Array]) -> Choice | None:
+        """The usual grasp, if it serves.
+
+        Args:
+            goal: Tool pose ``(7,)``.
+            way: Tool poses ``(7,)`` of the usual way to where the straight approach begins.
+        """
+        solid = self._view.model(self._target).solid
+        if solid is not None and solid.given:
+            return None  # held as somebody said, and not as is usual
+        if self._slide and self._view.model(self._target).kind == HOLLOW:
+            return None  # a jaw that swings slips off what is not upright where it meets it
+        hand = self._opening(wide_along(self._view, self._target, poses.to_matrix(goal[3:])[:, 1]))
+        if not self._grips_there(goal) or self._firm.holds(deeper(goal)) != SURELY:
+            return None
+        if self._view.model(self._target).kind == HOLLOW and not hand.free(goal):
+            return None
+        # It is as deep as the robot's file says; others, from wherever they come, stay clear.
+        at = hand.deep
+        begins = self._serves(goal, hand, at)
+        if begins is None:
+            return None
+        straight = begins.standoff == self._standoff and not self._slide
+        lines = _straight([*way, goal], hand.coming, at) if straight else None
+        if lines is not None:
+            # An arm that is hurried through a turn of its elbow falls behind, and overshoots the grasp.
+            hurried = any(hurries(at.arm, line, self._pace) for line in lines)
+            coming, on = lines
+            routes = (
+                (followed(at.arm, coming, self._pace), followed(at.arm, on, self._gently)) if hurried else ()
+            )
+            tight = hand.tight(goal)
+            return Choice(goal, begins.standoff, routes, tight, usual=True, closure=hand.closure)
+        found = self._come(goal, begins, hand, at)
+        return None if found is None else found._replace(usual=True)
+
+    def _opening(self, width: float) -> Opening:
+        """The hand that comes about what is ``width`` metres wide."""
+        hand = opened_about(self._view.robot, width)
+        closure = float(self._view.robot.closure(hand))
+        if closure not in self._openings:
+            self._openings[closure] = Opening(self._view, self._target, hand, self._close)
+        return self._openings[closure]
+
+    def other(self, candidates: Candidates, skipped: int = 0, usual: Choice | None = None) -> Choice:
+        """The first of other grasps that serves.
+
+        Args:
+            candidates: What to try.
+            skipped: How many that would serve are passed over, as long as there are others.
+            usual: The usual grasp, which is passed over first.
+
+        Raises:
+            NoWayError: None does; says how many were excluded by what.
+        """
+        served, tried, last = 0, 0, usual
+        skipped -= usual is not None
+        for goal, hand in self._free(candidates):
+            if served == MOST or tried == FARTHEST:
+                break
+            if last is not None and _alike(goal, last.goal):
+                continue
+            tried += 1
+            at = hand.beside
+            reached = self._reaches(goal, at)
+            served += reached
+            begins = self._serves(goal, hand, at) if reached else None
+            found = None if begins is None else self._come(goal, begins, hand, at)
+            if found is None:
+                candidates.no_good(goal)
+                continue
+            if skipped <= 0:
+                return found
+            skipped, last = skipped - 1, found
+        if last is not None:
+            return last
+        said = ", ".join(f"{count} {why}" for why, count in self._why.most_common()) or "none fits the hand"
+        raise NoWayError(f"no grasp of {self._target} serves: of {sum(self._why.values())} {said}")
+
+    def _has_room(self, tool: Array, hand: Opening) -> bool:
+        """Whether the hand has room at a grasp ``(7,)``; says what it would touch."""
+        if hand.free(tool):
+            return True
+        touch = hand.alone.first(tool)
+        return self._no(f"where the hand would touch {touch[1] if touch else 'something'}")
+
+    def _free(self, candidates: Candidates) -> Iterator[tuple[Array, Opening]]:
+        """Those at which the hand alone touches nothing, moved to hold well; those that do not come later."""
+        waiting: list[tuple[float, int, Array, Opening]] = []
+        for number in itertools.count():
+            try:
+                cost, goal, width = candidates.taken()
+            except StopIteration:
+                break
+            while waiting and waiting[0][0] <= cost:
+                yield heapq.heappop(waiting)[2:]
+            hand = self._opening(width)
+            if not self._has_room(goal, hand):
+                continue
+            centred = self._firm.centred(goal)
+            if centred is not goal and not hand.free(centred):
+                centred = goal
+            how = self._firm.holds(centred)
+            if how == SURELY:
+                yield centred, hand
+            elif how == HARDLY and self._firmly:
+                self._no("that would hardly be held")
+            else:
+                heapq.heappush(waiting, (cost + UNSURE[how], number, centred, hand))
+        while waiting:
+            yield heapq.heappop(waiting)[2:]
+
+    @cached_property
+    def _firm(self) -> Firm:
+        return Firm(self._view, self._target)
+
+    def _grips_there(self, goal: Array) -> bool:
+        """Whether fingers that close at a tool pose ``(7,)`` meet the object: they may close on a hollow."""
+        model = self._view.model(self._target)
+        if model.solid is None or (model.symmetry == 0 and not model.cubic and model.kind != HOLLOW):
+            return True  # around its own axis a body of revolution is the same everywhere
+        most = SAME_GRIP[0] if model.kind == HOLLOW else FROM_GRIP
+        return bool((self._near(goal, most) & (model.solid.grips.widths < self._view.robot.opening)).any())
+
+    def _near(self, goal: Array, most: float) -> Array:
+        """Which of the object's grips ``(k,)`` a hand at a tool pose ``(7,)`` has, ``most`` metres aside."""
+        solid, pose = self._view.model(self._target).solid, self._view.objects[self._target]
+        assert solid is not None
+        points = poses.localise(goal, poses.transform(pose, solid.grips.points))
+        axes = poses.rotate(poses.quat_conjugate(goal[3:]), poses.rotate(pose[3:], solid.grips.closing))
+        near = (np.hypot(points[:, 0], points[:, 2]) < most) & (abs(points[:, 1]) < SAME_GRIP[1])
+        found: Array = near & (abs(axes[:, 1]) > SAME_GRIP[2])
+        return found
+
+    def _reaches(self, goal: Array, at: WayFinder) -> bool:
+        """Whether the arm comes to a grasp without touching anything, from wherever."""
+        end = at.ends(goal[None])
+        if not end.reached[0]:
+            return self._no("out of reach")
+        if not end.free[0]:
+            return self._no(f"where the hand would touch {_other(at.collisions.touches(end.joints[0]))}")
+        return True
+
+    def _serves(self, goal: Array, hand: Opening, at: WayFinder) -> _Begins | None:
+        """Where the approach to a grasp may begin; None where the grasp is no good."""
+        closed = poses.shifted(goal, self._slide * poses.to_matrix(goal[3:])[:, 1])
+        for aim in self._aims:
+            if not aim.by(closed, hand.hand, self._turns):
+                return self._no(f"that cannot also {aim.words}") or None
+        why = ""
+        for share in STANDOFFS:
+            begins = self._beginnings(goal, hand.coming, at, share * self._standoff)
+            if not isinstance(begins, str):
+                return begins
+            why = why or begins
+        return self._no(why) or None
+
+    @property
+    def _turns(self) -> tuple[float, ...]:
+        """Radians about the tool's x axis by which what follows has to be possible, too.
+
+        In that plane the fingers of a hand of many of them swing, and turn what they close on.
+        """
+        return (TURNS, -TURNS) if not self._close and self._firm.asks else ()
+
+    def _beginnings(self, goal: Array, coming: WayFinder, at: WayFinder, standoff: float) -> _Begins | str:
+        """Postures from which the hand comes straight on; or why there are none, in words."""
+        back = poses.shifted(goal, -standoff * poses.z_axis(goal[3:]))
+        farther = poses.shifted(back, -REACH * poses.z_axis(goal[3:]))
+        starts: list[Array] = []
+        for leans in coming.leanings:
+            for q in () if starts else itertools.islice(coming.postures(back, leans), ENOUGH):
+                straight = at.straight([back, goal], start=q) is not None
+                if straight and coming.arm.joints(farther, q, leans=leans) is not None:
+                    starts.append(q)
+        if starts:
+            return _Begins(standoff, np.array(starts))
+        for finder, tool, when in ((coming, back, " on its way"), (at, goal, "")):
+            end = finder.ends(tool[None])
+            if not end.reached[0]:
+                return "out of reach"
+            if not end.free[0]:
+                return f"where the hand would touch {_other(finder.collisions.touches(end.joints[0]))}{when}"
+        return "to which the hand cannot come straight"
+
+    def _come(self, goal: Array, begins: _Begins, hand: Opening, at: WayFinder) -> Choice | None:
+        back = poses.shifted(goal, -begins.standoff * poses.z_axis(goal[3:]))
+        try:
+            way = hand.coming.search_posture(begins.starts, self._pace)
+        except NoWayError:
+            return self._no("to which no way was found") or None
+        line = at.straight([back, goal], start=way.joints[-1], spacing=0.01)
+        if line is None:
+            return self._no("to which no way was found") or None
+        straight = followed(at.arm, np.concatenate([way.joints[-1:], line]), self._gently)
+        tight = hand.tight(goal)
+        return self._slid(Choice(goal, begins.standoff, (way, straight), tight, closure=hand.closure), at)
+
+    @cached_property
+    def _slide(self) -> float:
+        """Metres along the tool's y axis that the hand goes at last; 0 where all of its fingers move."""
+        side = standing_side(self._view.robot)
+        return 0.0 if side is None else -math.copysign(SLIDE, side)
+
+    def _slid(self, choice: Choice, at: WayFinder) -> Choice:
+        """With the finger that does not move brought up to the object, where there is room for that."""
+        if not self._slide:
+            return choice
+        goal, here = choice.goal, choice.routes[-1].joints[-1]
+        for share in SLIDES:
+            closed = poses.shifted(goal, share * self._slide * poses.to_matrix(goal[3:])[:, 1])
+            line = at.straight([goal, closed], start=here)
+            if line is not None:
+                slide = followed(at.arm, np.concatenate([here[None], line]), self._gently)
+                return choice._replace(goal=closed, routes=(*choice.routes, slide))
+        return choice
+
+    def _no(self, why: str) -> Literal[False]:
+        self._why[why] += 1
+        return False
+
+
+def rooms(robot: RobotDescription) -> list[tuple[float, bool]]:
+    """What is tried one after the other: how much closer than usual one may come to things, and only firmly.
+
+    What a jaw that swings or a hand of many fingers holds poorly it loses, so it rather goes closely past
+    things. A gripper of two fingers holds at every grip, and rather keeps room.
+    """
+    loses = standing_side(robot) is not None or len(robot.tips) > TWO
+    return [(closer, firmly) for firmly in ((True, False) if loses else (False,)) for closer in ROOMS]
+
+
+class _Served:
+    """An aim that a grasp has to serve."""
+
+    def __init__(self, view: WorldView, target: str, aim: Aim, closer: float) -> None:
+        self._view, self._target, self._aim = view, target, aim
+        self._things = view.things([target], closer=closer)
+        self._now = view.objects[target]
+        self._hands: dict[float, HandCollisions] = {}
+        self.words = aim.words
+
+    def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
+        """Whether a grasp at a tool pose ``(7,)`` serves it, also turned about the tool's x axis.
+
+        The hand's joints ``(n_hand,)`` are those with which it comes: so it is going to be when it lets go.
+        """
+        view, alone = self._view, self._alone(hand)
+        tools = poses.multiply(self._possible, poses.relative(self._now, goal)[None])
+        tools = np.array([tool for tool in tools if alone.free(tool)]).reshape(-1, 7)
+        if not len(tools):
+            return False
+        held = view.held(self._target, poses.relative(goal, self._now))
+        leave = Leave(held=self._aim.supports)
+        finder = WayFinder(view.robot, view.arm, hand, self._things, held, leave)
+        leans = finder.leanings[-1] if self._aim.on_the_way else LEANS
+
+        def reached(tool: Array) -> bool:
+            return bool(finder.ends(tool[None], leans=leans).free[0])
+
+        def turned(tool: Array) -> bool:
+            others = [_turned(tool, angle) for angle in turns]
+            return all(alone.free(other) and reached(other) for other in others)
+
+        return any(reached(tool) and turned(tool) for tool in tools)
+
+    def _alone(self, hand: Array) -> HandCollisions:
+        """The open hand where the object is to be, without the object, which is looked at by itself."""
+        closure = float(self._view.robot.closure(hand))
+        if closure not in self._hands:
+            self._hands[closure] = HandCollisions(bodies_of(self._view.robot), hand, self._things)
+        return self._hands[closure]
+
+    @cached_property
+    def _possible(self) -> Array:
+        """Poses ``(k, 7)`` of the aim in which the object alone touches nothing, whoever holds it."""
+        view, robot = self._view, self._view.robot
+        alone = Held(self._target, STILL, pieces_of(view.model(self._target)))
+        leave = Leave(hand={thing.name for thing in self._things}, held=self._aim.supports)
+        object_ = HandCollisions(bodies_of(robot), robot.hand_open, self._things, alone, leave)
+        return np.array([pose for pose in self._aim.poses if object_.free(pose)]).reshape(-1, 7)
+
+
+def _aims(view: WorldView, target: str, later: Sequence[Any], closer: float) -> list[_Served]:
+    """What is done with the target until it is let go, the last thing first: it is the hardest."""
+    found: list[_Served] = []
+    for model in later:
+        if getattr(model, "actor", None) != target:
+            continue
+        aim = model.aim(view)
+        if aim is not None:
+            found.insert(0, _Served(view, target, aim, closer))
+        if HOLDING in model.ends:
+            break
+    return found
+
+
+def _straight(way: Sequence[Array], coming: WayFinder, at: WayFinder) -> tuple[Array, Array] | None:
+    """Joints ``(n, n_arm)`` in which the arm, led by the tool alone, comes clear through poses ``(7,)``.
+
+    The last piece, to the grasp, is looked at in the posture in which the way before it ends: an arm of seven
+    joints has others, too.
+
+    Returns:
+        Those to where the straight approach begins, and those from there on; None where it does not come so.
+    """
+    if not coming.goes_straight:
+        return None
+    there = coming.straight(way[:-1])
+    on = None if there is None else at.straight(way[-2:], start=there[-1])
+    if there is None or on is None:
+        return None
+    return np.concatenate([coming.start[None], there]), np.concatenate([there[-1:], on])
+
+
+def _turned(tool: Array, angle: float) -> Array:
+    """A tool pose ``(7,)`` turned about its own x axis, radians."""
+    half = angle / 2
+    turn = np.array([np.cos(half), np.sin(half), 0.0, 0.0])
+    return np.concatenate([tool[:3], poses.quat_multiply(tool[3:], turn)])
+
+
+def _alike(a: Array, b: Array) -> bool:
+    """Whether two tool poses ``(7,)`` are the same grasp to a hand that has failed with one of them."""
+    near = float(np.linalg.norm(a[:3] - b[:3])) < UNLIKE[0]
+    return near and float(poses.angle_between(a[3:], b[3:])) < UNLIKE[1]
+
+
+def _other(touches: Sequence[tuple[str, str]]) -> str:
+    return touches[0][1] if touches else "something"

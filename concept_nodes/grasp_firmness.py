@@ -1,0 +1,88 @@
+"""Whether a hand of many fingers holds what it closes on at a tool pose.
+
+A gripper of two fingers holds at a grip as the grip says. A hand with more of them is asked what each of its
+fingers meets (`bt_tasksim.planning.closing`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bt_tasksim.concept_nodes.view import WorldView
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.closing import Squeeze, closing_of
+from bt_tasksim.planning.surroundings import pieces_of
+
+TWO = 2
+"""Fingertips of a hand that holds between two pads."""
+SLANTED = 0.01
+"""Metres by which the middle of an action is deeper for a horizontal approach than for one from above: where
+a slanted hand meets an object's edge first, its fingers are still before the object's middle. Not at a known
+grip, where the hand was looked at among things as deep as it goes."""
+SLIPS = math.radians(30.0)
+"""Radians between the line of a squeeze and a surface's normal beyond which others are tried first. Friction
+of pads on things is 0.75 to 1.05, whose cones are 37 to 46 degrees wide; estimates turn by some degrees."""
+AHEAD = 0.008
+"""Metres by which one side of a hand may push an object until it meets the other side."""
+SHALLOWER = 0.007
+"""Metres less deep at which the hand is to hold, too: estimates are wrong by millimetres, and fingertips that
+meet an upper edge slip over it."""
+CENTRED = 0.003
+"""Metres beside which a grasp is not moved."""
+FARTHEST = 0.02
+"""Metres by which it is moved at most."""
+
+SURELY, BARELY, HARDLY = range(3)
+"""How a hand holds: also where the estimate is wrong; where it is right; or probably not."""
+
+
+class Firm:
+    """How one object would be held.
+
+    Args:
+        view: The world.
+        target: The object.
+    """
+
+    def __init__(self, view: WorldView, target: str) -> None:
+        self._closing = closing_of(view.robot) if len(view.robot.tips) > TWO else None
+        self._pose, self._pieces = view.objects[target], pieces_of(view.model(target))
+
+    @property
+    def asks(self) -> bool:
+        """The hand has more than two fingertips."""
+        return self._closing is not None
+
+    def holds(self, tool: Array) -> int:
+        """How surely fingers that close at a tool pose ``(7,)`` hold the object: `SURELY` or worse."""
+        if self._closing is None:
+            return SURELY
+        if not _pressed_well(self._squeeze(tool)):
+            return HARDLY
+        shallower = poses.shifted(tool, -SHALLOWER * poses.z_axis(tool[3:]))
+        return SURELY if _pressed_well(self._squeeze(shallower)) else BARELY
+
+    def centred(self, tool: Array) -> Array:
+        """The tool pose ``(7,)``, or one beside it at which both sides meet the object at once."""
+        found = None if self._closing is None else self._squeeze(tool)
+        if found is None or not CENTRED < abs(found.ahead) <= FARTHEST:
+            return tool
+        return poses.shifted(tool, found.ahead * poses.to_matrix(tool[3:])[:, 1])
+
+    def _squeeze(self, tool: Array) -> Squeeze | None:
+        assert self._closing is not None
+        grip = poses.relative(tool, self._pose)
+        return self._closing.squeeze(self._closing.met(grip, self._pieces))
+
+
+def deeper(tool: Array) -> Array:
+    """Where the tool ends whose usual grasp is at a pose ``(7,)``: it goes on where it comes level."""
+    along = poses.z_axis(tool[3:])
+    return poses.shifted(tool, SLANTED * float(np.hypot(*along[:2])) * along)
+
+
+def _pressed_well(found: Squeeze | None) -> bool:
+    return found is not None and found.angle <= SLIPS and abs(found.ahead) <= AHEAD

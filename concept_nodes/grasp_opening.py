@@ -1,0 +1,104 @@
+"""A hand as wide open as it comes to a grasp, among what stands around: what it would touch, and its ways."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING, VERY_CLOSE
+from bt_tasksim.concept_nodes.view import WorldView, nearly
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.hand_collision import HandCollisions
+from bt_tasksim.planning.surroundings import pieces_of
+from bt_tasksim.planning.things import Leave
+from bt_tasksim.planning.ways import WayFinder
+
+ASIDE = (0.004, 0.003)
+"""Metres across and along the closing axis by which a hand should be able to come beside where it is meant
+to: estimates are wrong by some millimetres, and a mesh may have arms or a rim next to where it is held."""
+TIGHT = 0.008
+"""Metres beside where it is meant to be at which a hand with little room would touch something: four times
+the standard deviation of good estimates, since an arm is beside its path, too."""
+
+
+class Opening:
+    """A hand in one world, open so far.
+
+    Args:
+        view: The world.
+        target: What it takes.
+        hand: Joints ``(n_hand,)``.
+        close: It comes closer to things than usual.
+
+    Attributes:
+        hand: The joints.
+        closure: How far they are closed.
+    """
+
+    def __init__(self, view: WorldView, target: str, hand: Array, close: bool) -> None:
+        self._view, self._target, self._close = view, target, close
+        self._closer = VERY_CLOSE if close else CLOSER
+        self.hand, self.closure = hand, float(view.robot.closure(hand))
+
+    @cached_property
+    def coming(self) -> WayFinder:
+        """Ways to where the straight approach begins."""
+        return self._view.finder(hand=self.hand, closer=CLOSER if self._close else 0.0)
+
+    @cached_property
+    def deep(self) -> WayFinder:
+        """Ways of a hand that comes as deep as the robot's file says, whatever of it touches then."""
+        return self._view.finder(hand=self.hand, closer=self._closer, taken=self._target, palm=False)
+
+    @cached_property
+    def beside(self) -> WayFinder:
+        """Ways of a hand that stays clear of what it takes, but for its fingers."""
+        leave = self._leave
+        return self._view.finder(hand=self.hand, closer=self._closer, taken=self._target, leave=leave)
+
+    @cached_property
+    def alone(self) -> HandCollisions:
+        """The hand by itself."""
+        things = self._view.things(closer=self._closer, taken=self._target)
+        return HandCollisions(bodies_of(self._view.robot), self.hand, things, leave=self._leave)
+
+    @cached_property
+    def _leave(self) -> Leave:
+        """Fingers close on what is taken, and nothing but them comes near it: see `WorldView.things`."""
+        robot = self._view.robot
+        bodies = bodies_of(robot)
+        fingers = {link for tip in robot.tips for link in tip.links}
+        fingers |= {link for link, moves in zip(bodies.links, bodies.fingers, strict=True) if moves}
+        return Leave(pairs={(link, nearly(self._target)) for link in fingers})
+
+    def free(self, goal: Array) -> bool:
+        """Whether the hand alone touches nothing at a tool pose ``(7,)``, and a little beside it, either."""
+        if not self.alone.free(goal):
+            return False
+        return self._close or all(self.alone.free(tool) for tool in _beside(goal, *ASIDE))
+
+    def tight(self, goal: Array) -> bool:
+        """Whether it has little room at a tool pose ``(7,)``, beside the object and what else is around."""
+        things = self._view.things(closer=TOUCHING, taken=self._target, palm=False)
+        hand = HandCollisions(bodies_of(self._view.robot), self.hand, things)
+        return not all(hand.free(tool) for tool in _beside(goal, TIGHT, TIGHT))
+
+
+def wide_along(view: WorldView, target: str, axis: Array) -> float:
+    """How wide an object is along a direction ``(3,)``, metres."""
+    pose = view.objects[target]
+    corners: Sequence[Array] = [
+        poses.transform(pose, piece) @ axis for piece in pieces_of(view.model(target))
+    ]
+    every = np.concatenate(corners)
+    return float(every.max() - every.min())
+
+
+def _beside(tool: Array, across: float, along: float) -> list[Array]:
+    """Tool poses ``(7,)`` beside one, so many metres across the closing axis and along it, both ways."""
+    axes = zip(poses.to_matrix(tool[3:])[:, :2].T, (across, along), strict=True)
+    return [poses.shifted(tool, sign * far * axis) for axis, far in axes for sign in (1.0, -1.0)]

@@ -1,0 +1,67 @@
+"""The poses in which an object may stand somewhere, up to its symmetry: all of them, in one world."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bt_tasksim.concept_nodes.surface import top_frame
+from bt_tasksim.concept_nodes.view import WorldView
+from bt_tasksim.core import poses
+from bt_tasksim.core.fact_making import rotations
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import ObjectModel
+
+HEADINGS = 12
+"""Headings that are tried where any will do."""
+
+
+def standing_options(view: WorldView, target: str, reference: str, hover: float = 0.0) -> Array:
+    """Poses ``(k, 7)`` of an object that stands over a place or on another object.
+
+    Args:
+        view: The world.
+        target: The object.
+        reference: The place, or the other object.
+        hover: Free height below it, metres; over a container, above its rim.
+    """
+    model = view.model(target)
+    frame, rim = reference_frame(view, reference)
+    place = view.world.places.get(reference)
+    free = place is not None and place.kind == "bin"
+    height = standing_height(model) + hover + rim
+    turns = headings() if free or (model.symmetry == 0 and not model.cubic) else rotations(model)
+    position = poses.transform(frame, np.array([0.0, 0.0, height]))
+    turned = poses.quat_multiply(frame[None, 3:], turns)
+    return np.concatenate([np.broadcast_to(position, (len(turned), 3)), turned], axis=-1)
+
+
+def supports_of(view: WorldView, reference: str) -> frozenset[str]:
+    """Names of what an object touches that stands on a place or on another object."""
+    place = view.world.places.get(reference)
+    return frozenset([reference if place is None else place.fixture or "furniture"])
+
+
+def standing_height(model: ObjectModel) -> float:
+    """Height of an object's centre above what it stands on, metres."""
+    return max(model.extent) / 2 if model.cubic else model.extent[2] / 2
+
+
+def reference_frame(view: WorldView, name: str) -> tuple[Array, float]:
+    """Frame ``(7,)`` of a place or of the top of an object, and its rim's height, metres."""
+    place = view.world.places.get(name)
+    if place is not None:
+        return np.asarray(place.pose), place.height if place.kind == "bin" else 0.0
+    height = np.array([standing_height(view.model(name))])
+    return top_frame(view.objects[name][None], height)[0], 0.0
+
+
+def headings(count: int = HEADINGS) -> Array:
+    """Rotations ``(count, 4)`` about the upward axis, all around."""
+    return np.array([poses.yaw(2 * np.pi * k / count) for k in range(count)])
+
+
+def nearest_first(options: Array, rotation: Array) -> Array:
+    """The same poses ``(k, 7)``, those first that are turned least from a rotation ``(4,)``."""
+    angles = poses.angle_between(options[:, 3:], rotation[None])
+    found: Array = options[np.argsort(angles, kind="stable")]
+    return found

@@ -1,0 +1,151 @@
+"""One world as a search for ways looks at it: numbers of one row, with names."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from bt_tasksim.concept.resting import at_rest
+from bt_tasksim.concept.seen import Seen
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array, constant
+from bt_tasksim.core.transfer import fetched
+from bt_tasksim.core.world import ObjectModel, WorldModel
+from bt_tasksim.planning.surroundings import pieces_of, things_of
+from bt_tasksim.planning.things import Held, Leave, Thing
+from bt_tasksim.planning.ways import WayFinder
+from bt_tasksim.robot.description import RobotDescription
+
+PALM = 0.005
+"""Metres that a palm keeps from what its fingers close on, since the estimate may be wrong."""
+
+
+def nearly(name: str) -> str:
+    """What an object is called together with the room around it."""
+    return f"the room around {name}"
+
+
+class WorldView(NamedTuple):
+    """What is known and seen of one world, in NumPy.
+
+    Attributes:
+        robot: The robot.
+        world: What is known beforehand.
+        objects: Estimated poses ``(7,)`` by name; NaN where one was never seen.
+        tool: Tool pose ``(7,)``.
+        arm: The arm's joints ``(n_arm,)``.
+        hand: The hand's joints ``(n_hand,)``.
+    """
+
+    robot: RobotDescription
+    world: WorldModel
+    objects: Mapping[str, Array]
+    tool: Array
+    arm: Array
+    hand: Array
+
+    def model(self, name: str) -> ObjectModel:
+        """What is known beforehand of an object."""
+        return self.world.object(name)
+
+    def held(self, name: str, grip: Array | None = None) -> Held:
+        """An object as what the hand holds, by default as it now lies there.
+
+        Args:
+            name: The object.
+            grip: Its pose ``(7,)`` in the tool frame.
+        """
+        if grip is None:
+            grip = poses.relative(self.tool, self.objects[name])
+        return Held(name, grip, pieces_of(self.model(name)))
+
+    def things(
+        self, without: Collection[str] = (), closer: float = 0.0, taken: str = "", palm: bool = True
+    ) -> list[Thing]:
+        """Furniture and objects, ``closer`` as of `things_of`.
+
+        Around what is ``taken`` no room is kept; but, unless ``palm`` is false, it is there twice, and around
+        the second one, which is called `nearly` it, there is some: fingers may be excepted from that, and a
+        palm not.
+        """
+        others = {name: pose for name, pose in self.objects.items() if name not in without}
+        found = things_of(self.world, others, closer)
+        if taken not in others:
+            return found
+        around = [replace(t, name=nearly(taken), margin=PALM) for t in found if palm and t.name == taken]
+        return [*(replace(t, margin=0.0) if t.name == taken else t for t in found), *around]
+
+    def finder(
+        self,
+        without: Collection[str] = (),
+        *,
+        held: Held | None = None,
+        leave: Leave | None = None,
+        closer: float = 0.0,
+        hand: Array | None = None,
+        taken: str = "",
+        palm: bool = True,
+    ) -> WayFinder:
+        """Ways from where the arm is.
+
+        Args:
+            without: Objects that are not looked at.
+            held: What is in the hand.
+            leave: What may touch.
+            closer: Share from 0 to 1 by which one may come closer to things than usual.
+            hand: The hand's joints ``(n_hand,)``, by default the present ones.
+            taken: An object around which no room is kept: the hand closes on it.
+            palm: Around that there is room that only fingers may enter, see `things`.
+        """
+        return WayFinder(
+            self.robot,
+            self.arm,
+            self.hand if hand is None else hand,
+            self.things(without, closer, taken, palm),
+            held,
+            leave,
+        )
+
+
+def host_numbers(arrays: Sequence[Array]) -> tuple[Array, ...]:
+    """Arrays of any library in NumPy, to a billionth of their units.
+
+    Libraries may differ in the last bit of what they compute, and a search goes quite another way for it.
+    """
+    return tuple(np.round(np.asarray(values, float), 9) for values in fetched(arrays))
+
+
+def views(seen: Seen) -> list[WorldView]:
+    """Each world of a batch by itself."""
+    observation, columns = seen.observation, seen.world.columns
+    arrays = (seen.objects, observation.tool_pose, observation.arm_position, observation.hand_position)
+    objects, tool, arm, hand = (np.asarray(values, float) for values in fetched(arrays))
+    found = []
+    for k in range(len(tool)):
+        world = seen.world.model_of(k)
+        estimates = {model.name: objects[k, columns[model.name]] for model in world.objects}
+        found.append(WorldView(seen.robot, world, estimates, tool[k], arm[k], hand[k]))
+    return found
+
+
+def put_down(seen: Seen) -> Seen:
+    """The same view with what seems to stand right on what it stands on, see `at_rest`: nothing is held."""
+    (objects,) = fetched([seen.objects])
+    columns, corrected = seen.world.columns, np.array(objects, float)
+    for k in range(len(corrected)):
+        world = seen.world.model_of(k)
+        own = [columns[model.name] for model in world.objects]
+        corrected[k, own] = at_rest(world, corrected[k, own])
+    there = constant(corrected, seen.objects)
+    return Seen(
+        seen.observation,
+        seen.world,
+        seen.robot,
+        seen.elapsed,
+        seen.later,
+        seen.failures,
+        believed=lambda: there,
+    )

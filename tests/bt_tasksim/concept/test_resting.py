@@ -1,0 +1,70 @@
+"""What stands is put onto what it stands on, whatever it is seen to be wrong by; what leans is left alone."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bt_tasksim.concept.resting import at_rest
+from bt_tasksim.core import poses
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import ObjectSpec
+
+SCENE = Scene(
+    "panda",
+    fixtures=["table", "shelf", "tray"],
+    objects={
+        "box": ObjectSpec("box", on="table", centre=(-0.05, -0.15), area=(0.02, 0.02)),
+        "cube": ObjectSpec("cube", on="table", centre=(-0.05, 0.0), area=(0.02, 0.02)),
+        "top": "cylinder on box",
+        "cup": "cup on lower_board",
+    },
+)
+
+
+def world_of(seed):
+    drawn = SCENE.sample(seed)
+    return drawn.world_model(["left", "right"], 0.08), np.array([actor.pose for actor in drawn.objects])
+
+
+@given(st.integers(0, 50), st.integers(0, 2**32 - 1))
+def test_heights_and_tilts_that_are_seen_wrong_are_put_right(seed, errors):
+    world, true = world_of(seed)
+    rng = np.random.default_rng(errors)
+    off = rng.uniform(-1.0, 1.0, true.shape)
+    seen = true.copy()
+    seen[:, :3] += off[:, :3] * [0.004, 0.004, 0.02]
+    turned = poses.from_rotation_vector(off[:, 3:6] * 0.06)
+    seen[:, 3:] = poses.quat_multiply(turned, true[:, 3:])
+    found = at_rest(world, seen)
+    assert np.allclose(found[:, 2], true[:, 2], atol=1e-6)
+    assert np.array_equal(found[:, :2], seen[:, :2])
+    for k, model in enumerate(world.objects):
+        if not model.cubic:
+            assert poses.tilt(found[k, 3:]) < 1e-6
+        assert poses.angle_between(found[k, 3:], seen[k, 3:]) <= poses.tilt(seen[k, 3:]) + 1e-6
+    assert np.allclose(at_rest(world, found), found, atol=1e-9), "and once more changes nothing"
+
+
+def test_a_cube_may_lie_on_any_face():
+    world, seen = world_of(3)
+    tipped = poses.from_rotation_vector(np.array([np.pi / 2 + 0.05, 0.0, 0.0]))
+    seen[1, 3:] = poses.quat_multiply(seen[1, 3:], tipped)
+    axes = poses.to_matrix(at_rest(world, seen)[1, 3:])
+    assert np.max(np.abs(axes[2])) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda pose: np.concatenate([pose[:3], poses.from_rotation_vector(np.array([0.3, 0.0, 0.0]))]),
+        lambda pose: pose + np.array([0.0, 0.0, 0.05, 0.0, 0.0, 0.0, 0.0]),
+        lambda pose: pose + np.array([-3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        lambda pose: np.full(7, np.nan),
+    ],
+    ids=["leans", "is held", "is nowhere", "was not seen"],
+)
+def test_what_does_not_stand_is_left_as_it_is_seen(change):
+    world, seen = world_of(1)
+    seen[2] = change(seen[2])
+    assert np.array_equal(at_rest(world, seen)[2], seen[2], equal_nan=True)

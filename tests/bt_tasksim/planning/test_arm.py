@@ -1,0 +1,92 @@
+"""An arm for planning: joints lead to the pose, within limits, without jumps, and as the engine's arm has
+it."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bt_tasksim.core import poses
+from bt_tasksim.planning.arm import arm_of
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.robot.kinematics.chain import Chain, poses_of
+from bt_tasksim.robot.kinematics.models import arm_model
+
+
+def test_it_is_made_once_for_a_robot(panda):
+    assert arm_of(panda.robot) is panda.arm
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_joints_found_lead_to_the_pose_within_limits(each, seed):
+    robot, arm = each.robot, each.arm
+    rng = np.random.default_rng(seed)
+    there = np.clip(
+        robot.rest + rng.normal(scale=0.3, size=len(robot.rest)), robot.arm_lower, robot.arm_upper
+    )
+    target = arm.tool(there)
+    joints = arm.joints(target, robot.rest)
+    if joints is None:
+        return
+    assert (joints >= robot.arm_lower).all() and (joints <= robot.arm_upper).all()
+    found = arm.tool(joints)
+    assert np.allclose(found[:3], target[:3], atol=1e-3)
+    if robot.task_mask.all():
+        assert poses.angle_between(found[3:], target[3:]) < 1e-3
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_postures_end_within_the_limits_so_that_there_is_something_left(each, seed):
+    """Wherever it begins, at a limit too; but for joints that hardly move at all."""
+    robot, arm = each.robot, each.arm
+    rng = np.random.default_rng(seed)
+    start = np.clip(rng.normal(robot.rest, 1.0), robot.arm_lower, robot.arm_upper)
+    there = np.clip(rng.normal(start, 0.1), robot.arm_lower, robot.arm_upper)
+    joints = arm.joints(arm.tool(there), start)
+    if joints is None:
+        return
+    left = np.minimum(0.02, (robot.arm_upper - robot.arm_lower) / 4)
+    assert (joints >= robot.arm_lower + left - 1e-9).all() and (joints <= robot.arm_upper - left + 1e-9).all()
+
+
+def test_most_poses_near_rest_are_found(each):
+    robot, arm = each.robot, each.arm
+    rng = np.random.default_rng(1)
+    asked = np.clip(
+        robot.rest + rng.normal(scale=0.2, size=(40, len(robot.rest))), robot.arm_lower, robot.arm_upper
+    )
+    assert sum(arm.joints(tool, robot.rest) is not None for tool in arm.tools(asked)) >= 36
+
+
+def test_out_of_reach_is_none(each):
+    assert each.arm.joints(each.pose(3.0, 0.0, 0.3), each.robot.rest) is None
+    assert each.arm.along(each.robot.rest, each.pose(3.0, 0.0, 0.3)[None]) is None
+
+
+def test_along_a_line_no_joint_jumps(panda):
+    start = panda.posture(0.45, -0.2, 0.4)
+    tools = np.array([panda.pose(0.45, y, 0.4) for y in np.linspace(-0.18, 0.2, 20)])
+    joints = panda.arm.along(start, tools)
+    assert np.abs(np.diff(np.concatenate([start[None], joints]), axis=0)).max() < 0.2
+    assert np.allclose(panda.arm.tools(joints)[:, :3], tools[:, :3], atol=1e-3)
+
+
+def test_a_line_that_leaps_cannot_be_followed(panda):
+    start = panda.posture(0.45, -0.4, 0.4)
+    assert panda.arm.along(start, panda.pose(0.45, 0.4, 0.4)[None]) is None
+
+
+def test_no_answer_depends_on_the_one_before(panda):
+    first = panda.posture(0.5, 0.1, 0.3)
+    panda.posture(0.3, -0.3, 0.5)
+    assert np.array_equal(panda.posture(0.5, 0.1, 0.3), first)
+
+
+def test_its_tool_is_where_the_batched_kinematics_has_it(each):
+    robot = each.robot
+    q = np.random.default_rng(0).uniform(robot.arm_lower, robot.arm_upper, (5, len(robot.rest)))
+    chain = Chain.of(arm_model(robot, bodies_of(robot).model), "tool", q)
+    tools = poses_of(chain.seen(np.ascontiguousarray(q.T))[0])
+    assert np.allclose(tools[:, :3], each.arm.tools(q)[:, :3], atol=1e-9)
+    assert poses.angle_between(tools[:, 3:], each.arm.tools(q)[:, 3:]).max() < 1e-6

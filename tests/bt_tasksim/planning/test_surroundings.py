@@ -1,0 +1,49 @@
+"""What stands around in a world: furniture and objects where they are seen, with margins."""
+
+import numpy as np
+import pytest
+
+from bt_tasksim.core import poses
+from bt_tasksim.core.world import Obstacle, WorldModel
+from bt_tasksim.planning.surroundings import CLEAR_OF_FURNITURE, CLEAR_OF_OBJECTS, pieces_of, things_of
+from bt_tasksim.scene.shapes import ShapeSize, object_model
+
+
+@pytest.fixture
+def world():
+    """A board, and two boxes."""
+    models = tuple(
+        object_model(name, "box", ShapeSize((0.05, 0.06, 0.1), (1.0, 1.0), None)) for name in ("a", "b")
+    )
+    board = Obstacle(poses.pose([0.5, 0.0, 0.2]), (0.5, 0.5, 0.02), "shelf")
+    return WorldModel(models, {}, ("l", "r"), 0.08, 0.05, (board,))
+
+
+AT = poses.pose([0.4, 0.1, 0.05])
+
+
+def test_furniture_and_objects_have_their_margins(world):
+    board, a, b = things_of(world, {"a": AT, "b": AT}, uncertainty=0.004)
+    assert (board.name, board.size, board.margin) == ("shelf", (0.5, 0.5, 0.02), CLEAR_OF_FURNITURE)
+    assert [a.name, b.name] == ["a", "b"] and a.margin == pytest.approx(CLEAR_OF_OBJECTS + 0.004)
+    assert np.array_equal(a.pose, AT)
+
+
+def test_closer_scales_all_margins(world):
+    usual, near = things_of(world, {"a": AT}), things_of(world, {"a": AT}, closer=0.7)
+    assert [t.margin for t in near] == pytest.approx([0.3 * t.margin for t in usual])
+    assert all(t.margin == 0.0 for t in things_of(world, {"a": AT}, closer=1.0))
+
+
+def test_what_was_never_seen_is_left_out_and_rotations_are_made_whole(world):
+    things = things_of(world, {"a": np.full(7, np.nan), "b": AT * [1, 1, 1, 2, 1, 1, 1]})
+    assert [t.name for t in things] == ["shelf", "b"]
+    assert np.linalg.norm(things[-1].pose[3:]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("kind", ["box", "cylinder", "cup", "oval", "diamond"])
+def test_pieces_lie_within_the_extent_and_reach_its_sides(kind):
+    model = object_model("thing", kind, ShapeSize((0.05, 0.05, 0.1), (1.0, 1.0), None))
+    corners = np.concatenate(pieces_of(model))
+    assert np.allclose(corners.max(axis=0), np.array(model.extent) / 2, atol=2e-3)
+    assert np.allclose(corners.min(axis=0), -np.array(model.extent) / 2, atol=2e-3)

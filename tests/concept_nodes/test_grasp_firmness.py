@@ -1,0 +1,54 @@
+"""A hand of many fingers is asked whether it holds; one of two holds as the grip says."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, Firm, deeper
+from bt_tasksim.core import poses
+from bt_tasksim.robot.description import load_robot
+
+DOWN = np.array([0.0, 1.0, 0.0, 0.0])
+
+
+def firm(robot="xarm7_ability", size=(0.08, 0.045, 0.06)):
+    model = SimpleNamespace(solid=None, extent=np.array(size))
+    objects = {"box": poses.pose([0.0, 0.0, 0.03])}
+    return Firm(SimpleNamespace(robot=load_robot(robot), objects=objects, model=lambda name: model), "box")
+
+
+def above(z, x=0.0, y=0.0):
+    return poses.pose([x, y, z], DOWN)
+
+
+def test_it_holds_about_the_middle_barely_at_the_top_and_hardly_beside_it():
+    found = firm()
+    assert found.holds(above(0.04)) == SURELY
+    assert BARELY in {found.holds(above(z)) for z in np.arange(0.05, 0.08, 0.001)}
+    assert found.holds(above(0.12)) == HARDLY
+
+
+def test_a_grasp_beside_the_middle_is_moved_until_both_sides_meet_at_once():
+    found, tool = firm(), above(0.04, y=0.012)
+    assert found.holds(tool) == HARDLY, "one side pushes the box along until it meets the other"
+    moved = found.centred(tool)
+    assert abs(moved[1]) < 0.006 and found.holds(moved) == SURELY
+    assert moved[[0, 2]] == pytest.approx(tool[[0, 2]])
+
+
+def test_where_nothing_is_met_nothing_is_moved():
+    tool = above(0.2)
+    assert firm().centred(tool) is tool
+
+
+def test_a_level_grasp_goes_on_and_one_from_above_does_not():
+    assert deeper(above(0.04)) == pytest.approx(above(0.04))
+    level = poses.pose([0.0, 0.0, 0.03], poses.frame_from_axes(np.array([1.0, 0, 0]), np.array([0, 1.0, 0])))
+    assert deeper(level)[:3] == pytest.approx([0.01, 0.0, 0.03])
+
+
+def test_a_gripper_of_two_fingers_is_not_asked():
+    found, tool = firm("panda"), above(0.2)
+    assert not found.asks and found.holds(tool) == SURELY
+    assert found.centred(tool) is tool

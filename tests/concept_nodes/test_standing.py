@@ -1,0 +1,81 @@
+"""All poses in which an object may stand: upright, at its height, and each another one."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from bt_tasksim.concept.leaf import ONE
+from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.concept_nodes.standing import (
+    HEADINGS,
+    headings,
+    nearest_first,
+    standing_height,
+    standing_options,
+    supports_of,
+)
+from bt_tasksim.concept_nodes.surface import heading_of
+from bt_tasksim.concept_nodes.view import views
+from bt_tasksim.core import poses
+
+
+@pytest.fixture
+def view(toy):
+    """The toy's world."""
+    return views(toy(Grasp("cup")).context.seen(ONE, np.zeros(1)))[0]
+
+
+@pytest.mark.parametrize("name", ["cup", "box"])
+@pytest.mark.parametrize("hover", [0.0, 0.05])
+def test_options_are_upright_over_the_place_at_the_objects_height(view, name, hover):
+    options = standing_options(view, name, "goal", hover)
+    place, model = view.world.place("goal"), view.model(name)
+    assert np.allclose(poses.z_axis(options[:, 3:]), [0, 0, 1], atol=1e-9)
+    assert np.allclose(options[:, :2], place.pose[:2])
+    assert np.allclose(options[:, 2], place.pose[2] + model.extent[2] / 2 + hover)
+    turns = [
+        poses.angle_between(options[i, 3:], options[j, 3:]) for i in range(len(options)) for j in range(i)
+    ]
+    assert min(turns) > 0.1
+
+
+def test_what_is_round_may_have_any_heading_and_a_box_those_of_its_symmetry(view):
+    assert len(standing_options(view, "cup", "goal")) == HEADINGS
+    assert len(standing_options(view, "box", "goal")) == view.model("box").symmetry
+
+
+def test_on_another_object_it_stands_on_its_top(view):
+    options, box = standing_options(view, "cup", "box"), view.objects["box"]
+    top = box[2] + standing_height(view.model("box"))
+    assert np.allclose(options[:, :2], box[:2])
+    assert np.allclose(options[:, 2], top + view.model("cup").extent[2] / 2)
+
+
+def test_it_touches_the_fixture_of_the_place_or_the_other_object(view):
+    place = view.world.place("goal")
+    assert supports_of(view, "goal") == {place.fixture or "furniture"}
+    assert supports_of(view, "box") == {"box"}
+
+
+def test_a_cube_stands_on_its_longest_half():
+    from bt_tasksim.scene.shapes import ShapeSize, object_model
+
+    cube = object_model("die", "cube", ShapeSize((0.06, 0.06, 0.06), (1.0, 1.0), None))
+    assert standing_height(cube) == pytest.approx(0.03)
+    assert standing_height(dataclasses.replace(cube, cubic=False)) == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize("angle", np.linspace(-3.0, 3.0, 7))
+def test_headings_of_what_stands_and_of_what_lies(angle):
+    upright = poses.pose([0, 0, 0], poses.yaw(angle))
+    assert np.cos(heading_of(upright[None])[0] - angle) == pytest.approx(1.0)
+    lying = poses.quat_multiply(poses.yaw(angle), poses.from_rotation_vector(np.array([0.0, np.pi / 2, 0.0])))
+    assert np.cos(heading_of(poses.pose([0, 0, 0], lying)[None])[0] - angle) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_least_turned_come_first():
+    options = np.concatenate([np.zeros((HEADINGS, 3)), headings()], axis=1)
+    found = nearest_first(options, poses.yaw(1.0))
+    angles = poses.angle_between(found[:, 3:], poses.yaw(1.0)[None])
+    assert np.all(np.diff(angles) >= -1e-12) and angles[0] <= np.pi / HEADINGS + 1e-9

@@ -1,0 +1,341 @@
+"""From goals alone to a tree: what it holds, in which order, and that it reaches them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from draws import successes
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from py_trees.common import Status
+
+from bt_tasksim import Goal, Scene
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.concept.declared import ConditionOf
+from bt_tasksim.concept.parameters import ObjectName, PlaceName, Seconds
+from bt_tasksim.concept_nodes import AtPose, Beside, Lifted, StandsOn, Wait, catalogue
+from bt_tasksim.concept_nodes.carry import Carry
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.registry import register
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.scene.relations import relation_named
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation
+from bt_tasksim.scene.specs import ObjectSpec, SpotSpec
+from bt_tasksim.trees import check_tree, same_tree, tidy, tree_from_xml, tree_to_xml
+from bt_tasksim.trees.from_goals import in_order
+from bt_tasksim.trees.load import load_source
+from bt_tasksim.trees.walk import nodes_of
+
+
+def acts(tree):
+    """What a tree does, in order: concepts with their arguments."""
+    leaves = [node for node in nodes_of(tree) if not node.children]
+    return [repr(leaf.model) for leaf in leaves if not isinstance(leaf.model, Condition)]
+
+
+@pytest.mark.parametrize(
+    ("goal", "does"),
+    [
+        (
+            Goal("cup", "spot"),
+            ["Bring(target='cup', to='spot')", "Place(target='cup', on='spot')", "Release(target='cup')"],
+        ),
+        (
+            Goal("cup", "bin", relation="inside"),
+            ["Bring(target='cup', to='bin')", "Release(target='cup', into='bin')"],
+        ),
+    ],
+)
+def test_a_goal_is_reached_by_what_its_condition_needs(goal, does):
+    assert acts(tidy([goal])) == ["Grasp(target='cup')", "Pick(target='cup')", *does]
+
+
+def test_what_is_to_be_lifted_stays_in_the_hand_as_high_as_asked():
+    tree = tidy([Goal("cup", "table", relation="lifted", height=0.25)])
+    assert acts(tree) == ["Grasp(target='cup')", "Pick(target='cup', distance=0.25)"]
+    assert tree.children[0].model == Lifted.value("cup", above="table", height=0.25)
+
+
+def test_a_goal_is_asked_before_and_after():
+    tree = tidy([Goal("cup", "spot", position_tolerance=0.01)])
+    asked = AtPose.value("cup", on="spot", tolerance=0.01)
+    assert tree.children[0].model == asked and tree.children[1].children[-1].model == asked
+
+
+def test_a_goal_that_holds_moves_nothing(toy):
+    stage = toy(tidy([Goal("cup", "goal")]))
+    stage.world.stand("cup", "goal")
+    stage.look()
+    assert stage.tick() == Status.SUCCESS and not stage.world.steps
+
+
+def test_a_taken_spot_is_said(toy):
+    stage = toy(tidy([Goal("cup", "goal")]))
+    objects = stage.world.now.objects.copy()
+    objects[1, :2] = stage.world.model.place("goal").pose[:2]
+    stage.world.put(objects=objects)
+    stage.look()
+    assert stage.tick() == Status.FAILURE and not stage.world.steps
+    assert "goal is taken by box" in stage.tree.tip().feedback_message
+
+
+NAMES = "abcdef"
+
+
+@st.composite
+def arrangements(draw):
+    """Goals of towers without circles, in any order."""
+    count = draw(st.integers(1, len(NAMES)))
+    goals, free = [], [f"spot {k}" for k in range(count)]
+    for name in NAMES[:count]:
+        place = draw(st.sampled_from(free))
+        free.remove(place)
+        free.append(name)
+        goals.append(Goal(name, place))
+    return draw(st.permutations(goals))
+
+
+@given(arrangements())
+def test_towers_are_built_from_below_whatever_the_order_of_goals(goals):
+    order = in_order(goals)
+    assert sorted(g.object for g in order) == sorted(g.object for g in goals)
+    built = set()
+    for goal in order:
+        assert goal.place.startswith("spot") or goal.place in built
+        built.add(goal.object)
+
+
+@settings(max_examples=25, deadline=None)
+@given(arrangements(), st.sampled_from([None, "table"]))
+def test_a_tree_is_one_that_authors_can_write_and_keep(goals, parking):
+    tree = tidy(goals, parking=parking)
+    check_tree(tree)
+    assert same_tree(tree_from_xml(tree_to_xml(tree)), tree)
+    for goal in goals:
+        asked = [
+            n for n in nodes_of(tree) if not n.children and n.model == AtPose.value(goal.object, goal.place)
+        ]
+        assert len(asked) >= 2
+
+
+def test_what_is_held_in_the_end_comes_last():
+    lifted = Goal("a", "table", relation="lifted")
+    assert in_order([lifted, Goal("b", "spot")])[-1] == lifted
+
+
+@pytest.mark.parametrize(
+    ("goals", "sentence"),
+    [
+        ([], "there is no goal to make a tree from"),
+        (Goal("a", "spot"), "found one goal: write tidy"),
+        ([Goal("a", "spot"), Goal("a", "table")], "two goals are about 'a'"),
+        ([Goal("a", "b"), Goal("b", "c"), Goal("c", "a")], "in a circle: a on b on c on a"),
+        ([Goal("a", "spot"), Goal("b", "spot")], "'a' and 'b' cannot both stand on the middle of 'spot'"),
+        ([Goal(n, "table", relation="lifted") for n in "ab"], "the hand can hold one object"),
+        (
+            [Goal("a", "table", relation="lifted"), Goal("b", "a")],
+            "'b' cannot be on 'a', which is to be held in the end",
+        ),
+    ],
+)
+def test_goals_that_contradict_each_other_are_refused(goals, sentence):
+    with pytest.raises(InputError, match=sentence):
+        tidy(goals)
+
+
+@pytest.fixture
+def upside_down():
+    """A goal relation from outside, which nothing here asks about or brings about."""
+
+    @register("goal relation", "upside_down")
+    class UpsideDownRelation(GoalRelation):
+        def evaluate(self, goal, final):
+            raise NotImplementedError
+
+    return Goal("cup", "table", relation="upside_down")
+
+
+def asks_whether_it_is_upside_down():
+    """A condition from outside, about the object alone."""
+
+    @register("concept")
+    class UpsideDown(Condition):
+        """For tests."""
+
+        target: ObjectName
+        relation = "upside_down"
+
+        def holds(self, seen):
+            raise NotImplementedError
+
+
+def test_a_relation_that_nothing_asks_about_is_refused(upside_down):
+    with pytest.raises(InputError, match="no condition asks whether 'cup' is upside_down 'table'"):
+        tidy([upside_down])
+
+
+def test_a_relation_of_ones_own_is_reached_by_a_concept_of_ones_own(upside_down):
+    @register("concept")
+    class UpsideDown(Condition):
+        """For tests."""
+
+        target: ObjectName
+        place: PlaceName
+        relation = "upside_down"
+
+        def holds(self, seen):
+            raise NotImplementedError
+
+    with pytest.raises(InputError, match=r"no concept establishes UpsideDown\(target='cup', place='table'\)"):
+        tidy([upside_down])
+
+    @register("concept")
+    class Flip(Carry):
+        """For tests."""
+
+        target: ObjectName
+        place: PlaceName
+        establishes = (ConditionOf("UpsideDown", target="target", place="place"),)
+        requires = (ConditionOf("Over", target="target", place="place"),)
+
+        def begin(self, seen):
+            raise NotImplementedError
+
+    does = acts(tidy([upside_down]))
+    assert does[-3:] == ["Bring(target='cup', to='table')", "Flip(target='cup', place='table')", does[-1]]
+    assert does[-1] == "Release(target='cup')" and does[0] == "Grasp(target='cup')"
+
+
+def test_a_concept_that_needs_more_than_a_goal_says_is_named(upside_down):
+    asks_whether_it_is_upside_down()
+
+    @register("concept")
+    class Flip(Wait):
+        """For tests."""
+
+        target: ObjectName
+        establishes = (ConditionOf("UpsideDown", target="target"),)
+
+    with pytest.raises(InputError, match="Flip does, and nothing says its 'duration'"):
+        tidy([upside_down])
+
+
+def test_standing_anywhere_and_beside_is_reached_by_placing_so():
+    tree = tidy([Goal("cup", "table", relation="anywhere")])
+    assert tree.children[0].model == StandsOn.value("cup", "table")
+    assert acts(tree)[2:] == [
+        "Bring(target='cup', to='table', anywhere=True)",
+        "Place(target='cup', on='table', anywhere=True)",
+        "Release(target='cup')",
+    ]
+    tree = tidy([Goal("box", "cup", relation="beside", distance=0.08)])
+    assert tree.children[0].model == Beside.value("box", "cup", gap=0.08)
+    assert acts(tree)[2:] == [
+        "Bring(target='box', beside='cup')",
+        "Place(target='box', beside='cup')",
+        "Release(target='box')",
+    ]
+
+
+def test_what_may_stand_anywhere_leaves_the_middle_to_others():
+    anywhere, middle = Goal("a", "table", relation="anywhere"), Goal("b", "table")
+    assert in_order([anywhere, middle]) == [middle, anywhere]
+
+
+def test_nothing_waits_on_the_parking_place_that_is_not_kept_from_its_own():
+    tree = tidy([Goal("a", "spot"), Goal("b", "a", relation="beside")], parking="table")
+    waits = [node.name for node in nodes_of(tree) if "waits on" in node.name]
+    assert waits == ["a waits on table"]
+
+
+def test_needs_that_go_round_in_a_circle_are_said(upside_down):
+    asks_whether_it_is_upside_down()
+
+    @register("concept")
+    class Flip(Wait):
+        """For tests."""
+
+        target: ObjectName
+        duration: Seconds = 1.0
+        establishes = (ConditionOf("UpsideDown", target="target"),)
+        requires = (ConditionOf("UpsideDown", target="target"),)
+
+    with pytest.raises(InputError, match="UpsideDown needs UpsideDown"):
+        tidy([upside_down])
+
+
+def test_what_concepts_declare_exists():
+    known = catalogue()
+    declared = [(kind, one) for kind in known.values() if not issubclass(kind, Condition)
+                for one in (*kind.establishes, *kind.requires)]  # fmt: skip
+    assert len(declared) > 10
+    for kind, one in declared:
+        assert issubclass(known[one.condition], Condition)
+        assert one.parameters.keys() <= known[one.condition].parameters().keys()
+        assert {*one.parameters.values(), *one.given} <= kind.parameters().keys()
+
+
+# ---- in physics ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize(
+    ("scenario", "goal"),
+    [
+        ("pick_and_place", Goal("target", "goal")),
+        ("pick_and_throw", Goal("cup", "trash_bin", relation="inside")),
+        ("grasp_then_pick", Goal("target", "table", relation="lifted", height=0.3)),
+    ],
+)
+def test_it_does_what_the_scenarios_trees_do(scenario, goal):
+    scene = dataclasses.replace(load_source(scenario).scene, goal=goal)
+    results = successes(Runner(tidy([goal]), scene).run, range(7, 12), n=2)
+    assert all(result.status == Status.SUCCESS for result in results)
+
+
+def reached(runner, goals):
+    """Runs a seed: the tree succeeds, and physics says that each goal is reached."""
+
+    def run(seed):
+        result = runner.run(seed)
+        world = result.configuration.world_model([t.name for t in runner.robot.tips], runner.robot.opening)
+        final = FinalState(result.configuration, world, runner.pipeline.hidden())
+        there = [relation_named(goal.relation).evaluate(goal, final).reached for goal in goals]
+        return dataclasses.replace(result, success=result.status == Status.SUCCESS and all(there))
+
+    return run
+
+
+ASIDE = {"s1": 0.22, "s2": -0.22}
+SPOTS = [SpotSpec(name, on="table", centre=(0.0, y), area=(0.02, 0.02)) for name, y in ASIDE.items()]
+
+
+def cubes(**places):
+    objects = {name: ObjectSpec(kinds=("cube",), on=place, area=(0.0, 0.0)) for name, place in places.items()}
+    return Scene("panda", objects=objects, spots=SPOTS)
+
+
+@pytest.mark.physical
+def test_a_spot_that_is_taken_is_freed_first():
+    goals = [Goal("red", "s1"), Goal("blue", "s2")]
+    assert in_order(goals) == goals  # red, whose spot is taken, would be first
+    successes(reached(Runner(tidy(goals), cubes(red="table", blue="s1")), goals), range(7, 12))
+
+
+@pytest.mark.physical
+def test_two_that_stand_on_each_others_spots_change_places():
+    goals = [Goal("red", "s2"), Goal("blue", "s1")]
+    scene = cubes(red="s1", blue="s2")
+    successes(reached(Runner(tidy(goals, parking="table"), scene), goals), range(7, 12))
+    stuck = Runner(tidy(goals), scene).run(7)
+    assert stuck.status == Status.FAILURE and np.isclose(stuck.sim_time, 0.05, atol=0.2)
+
+
+@pytest.mark.physical
+def test_two_find_room_on_one_tray_and_one_beside_another():
+    goals = [Goal("cup", "tray", relation="anywhere"), Goal("box", "tray", relation="anywhere")]
+    scene = Scene("panda", fixtures=["tray"], objects={"cup": "on table", "box": "on table"})
+    successes(reached(Runner(tidy(goals), scene), goals), range(7, 12), n=4)
+    goals = [Goal("box", "cup", relation="beside")]
+    scene = Scene("panda", fixtures=["tray"], objects={"cup": "on tray", "box": "on table"})
+    successes(reached(Runner(tidy(goals), scene), goals), range(7, 12), n=4)

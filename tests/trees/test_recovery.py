@@ -1,0 +1,213 @@
+"""Around a sequence: which stages it has, when they are skipped, and that what is lost is taken again."""
+
+import numpy as np
+import pytest
+from draws import successes
+from py_trees.common import Status
+
+from bt_tasksim import Goal
+from bt_tasksim.concept_nodes import (
+    AtPose,
+    Bring,
+    Grasp,
+    HandEmpty,
+    Inside,
+    Lifted,
+    Over,
+    Pick,
+    Place,
+    Release,
+    Upright,
+    Wait,
+    Withdraw,
+)
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.execution.batch_runner import BatchRunner
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.trees import (
+    fallback,
+    reactive_sequence,
+    recovering,
+    retry,
+    same_tree,
+    sequence,
+    tidy,
+    tree_from_xml,
+    tree_to_xml,
+)
+from bt_tasksim.trees.backchain import asked_by, condition_named
+from bt_tasksim.trees.load import load_source, scenarios
+from bt_tasksim.trees.stages import cut, lasting
+from bt_tasksim.trees.walk import nodes_of
+
+
+def task(target="cube", on="goal"):
+    return [Grasp(target), Pick(target), Bring(target, to=on), Place(target, on=on), Release(target)]
+
+
+def value(asked):
+    return condition_named(asked.condition).value(**asked.arguments)
+
+
+@pytest.mark.parametrize(
+    ("leaves", "guard"),
+    [
+        (task(), AtPose.value("cube", on="goal")),
+        (task()[:4], AtPose.value("cube", on="goal")),
+        (task()[:3], Over.value("cube", "goal")),
+        (task()[:2], Lifted.value("cube", height=0.1)),
+        ([*task()[:3], Release("cube", into="bin")], Inside.value("cube", "bin")),
+        ([*task()[:3], Release("cube")], None),
+        ([*task()[:4], *task("cube", "bin")[1:3], Release("cube")], None),
+        ([*task()[:4], *task("cube", "there")[1:]], AtPose.value("cube", on="there")),
+        ([*task()[:4], Pick("cube")], Lifted.value("cube", height=0.1)),
+    ],
+)
+def test_what_lasts_is_what_was_brought_about_and_not_undone(leaves, guard):
+    found = lasting(leaves)
+    assert (None if found is None else value(found)) == guard
+
+
+def test_a_sequence_is_cut_where_the_hand_is_free():
+    first, second, wait, upright = task("a", "s1"), task("b", "s2"), Wait(1.0), Upright("b")
+    found = cut([wait, *first, *second, upright])
+    assert [len(stage.nodes) for stage in found] == [1, 5, 6]
+    assert [list(map(value, stage.guards)) for stage in found] == [
+        [],
+        [AtPose.value("a", on="s1")],
+        [AtPose.value("b", on="s2"), Upright.value("b")],
+    ]
+
+
+def test_a_condition_behind_a_stage_tells_that_it_is_done_where_nothing_else_does():
+    (stage,) = cut([*task()[:3], Release("cube"), Upright("cube")])
+    assert list(map(value, stage.guards)) == [Upright.value("cube")]
+
+
+def test_stages_may_be_nodes_of_their_own():
+    inner = sequence("carry", *task("a", "s1"))
+    own = fallback("b is there", Upright("b"), sequence("again", *task("b", "s2")))
+    tried = retry(3, sequence("fetch", *task("c", "s3")[:2]))
+    found = cut([inner, own, tried, *task("c", "s3")[2:]])
+    assert [(len(s.nodes), s.own, *map(value, s.guards)) for s in found] == [
+        (1, False, AtPose.value("a", on="s1")),
+        (1, True, Upright.value("b")),
+        (4, False, AtPose.value("c", on="s3")),
+    ]
+
+
+def test_every_stage_is_guarded_and_all_are_asked_at_the_end():
+    tree = recovering(sequence("two", *task("a", "s1"), *task("b", "s2")), attempts=3)
+    assert tree.attempts == 5  # one, and two more for each stage
+    free, first, second, *checks = tree.decorated.children
+    assert free.children[0].model == HandEmpty.value()
+    wanted = [AtPose.value("a", on="s1"), AtPose.value("b", on="s2")]
+    assert [stage.children[0].model for stage in (first, second)] == wanted
+    assert [stage.children[1].children[-1].model for stage in (first, second)] == wanted
+    assert [check.model for check in checks] == wanted
+
+
+def test_what_is_asked_already_is_not_asked_twice():
+    for tree in (
+        recovering(sequence("one", *task(), AtPose("cube", on="goal"))),
+        recovering(tidy([Goal("cube", "goal")])),
+    ):
+        asked = [node for node in nodes_of(tree) if asked_by(node) is not None]
+        assert sum(node.model == AtPose.value("cube", on="goal") for node in asked) == 2
+    two = recovering(tidy([Goal("a", "s1"), Goal("b", "s2")]))
+    asked = [n for n in nodes_of(two) if asked_by(n) is not None and n.model == AtPose.value("a", on="s1")]
+    assert len(asked) == 3 and two.attempts == 2 + 2 * 2
+
+
+@pytest.mark.parametrize("name", scenarios())
+def test_it_is_a_tree_like_any_other(name):
+    tree = recovering(load_source(name).build())
+    assert same_tree(tree_from_xml(tree_to_xml(tree)), tree)
+
+
+@pytest.mark.parametrize(
+    ("tree", "sentence"),
+    [
+        (
+            lambda: Grasp("cube"),
+            "recovering takes a sequence, or what tidy gives, and 'grasp cube' is a Grasp",
+        ),
+        (lambda: reactive_sequence("r", Upright("cube"), Wait(1.0)), "and 'r' is a Sequence: put it into"),
+        (lambda: sequence("idle", Wait(1.0)), "'idle' holds nothing that takes an object"),
+        (
+            lambda: sequence("throw", *task()[:3], Release("cube", name="let it fly")),
+            "nothing tells whether 'cube' is done after 'let it fly'",
+        ),
+        (lambda: sequence("a", sequence("b", *task())).children[0], "'b' stands under 'a'"),
+    ],
+)
+def test_what_it_cannot_recover_is_refused_and_left_as_it_was(tree, sentence):
+    given = tree()
+    children = list(given.children)
+    with pytest.raises(InputError, match=sentence):
+        recovering(given)
+    assert given.children == children and all(child.parent is given for child in children)
+
+
+@pytest.mark.parametrize("attempts", [0, -1, 1.5, True])
+def test_attempts_are_counted(attempts):
+    with pytest.raises(InputError, match="'attempts' should be a positive whole number"):
+        recovering(sequence("one", *task()), attempts=attempts)
+
+
+def test_a_stage_that_is_done_is_skipped(toy):
+    stage = toy(recovering(sequence("one", *task("cup", "goal"))))
+    stage.world.stand("cup", "goal")
+    stage.look()
+    assert stage.tick() == Status.SUCCESS and not stage.world.steps
+
+
+def test_the_hand_is_freed_before_anything_else(toy):
+    stage = toy(recovering(sequence("one", *task("cup", "goal"))))
+    stage.world.put(closure=np.float64(0.9), contacts=np.ones(2, bool))
+    stage.look()
+    stage.tick()
+    assert stage.tree.tip().model == Withdraw.value()
+
+
+# ---- in physics ------------------------------------------------------------------------------------------
+
+KNOCKED = "pick_and_place_recovering"
+
+
+@pytest.mark.physical
+def test_what_is_knocked_out_of_the_hand_is_taken_again():
+    """The plain sequence succeeds in 1 of 20 of these draws, the recovering one in all."""
+    scene = load_source(KNOCKED).scene
+    results = successes(Runner(recovering(sequence("plain", *task())), scene).run, range(7, 12))
+    assert all(result.status == Status.SUCCESS for result in results)
+    plain = Runner(sequence("plain", *task()), scene)
+    assert sum(plain.run(seed).success for seed in range(7, 12)) <= 2
+
+
+@pytest.mark.physical
+def test_it_ends_after_a_bounded_number_of_attempts():
+    scene = load_source(KNOCKED).scene
+    tree = recovering(sequence("one", *task(on="goal")[:4], Release("cube"), Upright("cube", angle=0.0)))
+    result = Runner(tree, scene).run(7)
+    assert result.status == Status.FAILURE and tree.rounds == 3
+    assert "attempt 3 of 3 failed" in result.why
+
+
+@pytest.mark.physical
+def test_a_batch_comes_to_the_same():
+    scene = load_source(KNOCKED).scene
+
+    def build():
+        return recovering(tidy([Goal("cube", "goal")]))
+
+    runner = Runner(build(), scene)
+    alone = {seed: runner.run(seed) for seed in (7, 8, 9)}
+    with BatchRunner(build, scene, None, 3, 1) as batch:
+        together = dict(batch.run(range(7, 10)))
+    for seed, one in alone.items():
+        assert (one.success, one.why, one.control_steps) == (
+            together[seed].success,
+            together[seed].why,
+            together[seed].control_steps,
+        )

@@ -1,0 +1,223 @@
+"""From goals alone to a tree that reaches them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept.condition import Condition
+from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.registry import parts
+from bt_tasksim.scene.specs import Goal
+from bt_tasksim.trees.backchain import (
+    Act,
+    ActChain,
+    Wanted,
+    after,
+    chain_to,
+    concept_leaf,
+    condition_leaf,
+    goals_of,
+    let_go,
+)
+from bt_tasksim.trees.nodes.fallback import fallback
+from bt_tasksim.trees.nodes.inverter import invert
+from bt_tasksim.trees.nodes.retry import retry
+from bt_tasksim.trees.nodes.sequence import sequence
+
+
+def tidy(goals: Sequence[Goal], *, parking: str | None = None, name: str = "tidy") -> Behaviour:
+    """A tree that reaches goals, made of what concepts say that they bring about and need.
+
+    Each goal becomes a fallback: it is as it should be, or a sequence of concepts makes it so. The sequence
+    is found backwards from the goal's condition (`bt_tasksim.trees.backchain`), and ends by asking it again.
+    What others are to stand on has its turn before them, and what is to be held in the end comes last.
+
+    Where there are several goals, one whose spot is taken, or on whose object something stands, is passed
+    over, and there are as many rounds as goals: what is in the way of another goal may go to its own one
+    first. Where spots are taken crosswise, ``parking`` names a place anywhere on which objects may stand
+    meanwhile; there are twice as many rounds then.
+
+    The tree is made of the nodes and leaves that authors use: show it, edit it, save it. Reactivity by
+    conditions that are asked anew and chains by pre- and postconditions are those of M. Colledanchise,
+    D. Almeida and P. Ögren, "Towards blended reactive planning and acting using behavior trees", ICRA 2019;
+    other than there sequences have memory, so that concepts are not begun anew while they act.
+
+    Args:
+        goals: What should be true at the end, one goal for an object.
+        parking: A place where an object may stand meanwhile.
+        name: Name of the tree's root.
+
+    Raises:
+        InputError: There is no goal, goals contradict each other, or no concept brings one about.
+    """
+    order = in_order(goals)
+    stages = [_stage(goal, several=len(order) > 1) for goal in order]
+    if len(order) == 1:
+        stages[0].name = name
+        return stages[0]
+    waiting = [] if parking is None else [leaf for goal in order for leaf in _parked(goal, parking)]
+    checks = [_check(goal) for goal in order]
+    rounds = len(order) * (1 if parking is None else 2)
+    return retry(rounds, sequence(name, *stages, *waiting, *checks), name=f"{name}, round by round")
+
+
+def in_order(goals: Sequence[Goal]) -> list[Goal]:
+    """Goals in an order in which they can be reached: towers from below, and what is held at last.
+
+    What may stand anywhere on a place comes after what may not.
+
+    Raises:
+        InputError: There is none, or goals contradict each other.
+    """
+    _check_goals(goals)
+    of = {goal.object: goal for goal in goals}
+    out: list[Goal] = []
+
+    def put(goal: Goal, above: tuple[str, ...]) -> None:
+        if goal.object in above:
+            circle = " on ".join((*above[above.index(goal.object) :], goal.object))
+            raise InputError(f"the goals go round in a circle: {circle}; let one of them go to a place")
+        if goal in out:
+            return
+        if goal.place in of:
+            put(of[goal.place], (*above, goal.object))
+        out.append(goal)
+
+    for goal in sorted(goals, key=lambda goal: (_condition(goal).in_hand, goal.relation == "anywhere")):
+        put(goal, ())
+    return out
+
+
+def _check_goals(goals: Sequence[Goal]) -> None:
+    if isinstance(goals, Goal):
+        raise InputError("tidy takes a sequence of goals, found one goal: write tidy([goal])")
+    if not goals:
+        raise InputError("there is no goal to make a tree from: give at least one Goal")
+    taken: dict[tuple[str, str], str] = {}
+    seen: set[str] = set()
+    held = [goal.object for goal in goals if _condition(goal).in_hand]
+    for goal in goals:
+        if goal.object in seen:
+            raise InputError(f"two goals are about '{goal.object}': give one for each object")
+        seen.add(goal.object)
+        if goal.place == goal.object:
+            raise InputError(f"'{goal.object}' cannot be {goal.relation} itself: name another place")
+        if goal.relation == "on":
+            other = taken.setdefault((goal.relation, goal.place), goal.object)
+            if other != goal.object:
+                raise InputError(
+                    f"'{other}' and '{goal.object}' cannot both stand on the middle of '{goal.place}': "
+                    f"give one of them another spot"
+                )
+        if goal.place in held:
+            raise InputError(
+                f"'{goal.object}' cannot be {goal.relation} '{goal.place}', which is to be held in the end"
+            )
+    if len(held) > 1:
+        raise InputError(f"the hand can hold one object in the end, and goals ask for {' and '.join(held)}")
+
+
+def _condition(goal: Goal) -> type[Condition]:
+    """The condition that asks about a goal's relation.
+
+    Raises:
+        InputError: There is none.
+    """
+    found: dict[str, type[Condition]] = {
+        kind.relation: kind
+        for kind in parts("concept").values()
+        if issubclass(kind, Condition) and kind.relation is not None
+    }
+    if goal.relation not in found:
+        raise InputError(
+            f"no condition asks whether '{goal.object}' is {goal.relation} '{goal.place}': write one whose "
+            f"'relation' is '{goal.relation}'{nearest(goal.relation, found)}"
+        )
+    return found[goal.relation]
+
+
+def _asked(goal: Goal) -> Wanted:
+    kind = _condition(goal)
+    return Wanted(kind.__name__, kind.from_goal(goal))
+
+
+def _check(goal: Goal) -> Behaviour:
+    """A leaf that asks whether a goal is reached."""
+    return condition_leaf(_asked(goal))
+
+
+def _stage(goal: Goal, several: bool) -> Behaviour:
+    """A fallback that reaches one goal."""
+    wanted, title = _asked(goal), f"{goal.object} {goal.relation} {goal.place}"
+    chain = _chain(goal, wanted)
+    blocked = [_not_now(need) for need in chain.given] if several else []
+    needs = [] if several else [condition_leaf(need) for need in chain.given]
+    work = sequence(f"get {title}", *needs, *_acts(chain), condition_leaf(wanted))
+    return fallback(title, condition_leaf(wanted), *blocked, work)
+
+
+def _not_now(need: Wanted) -> Behaviour:
+    """Passes a goal over, where something has to hold first that concepts cannot bring about."""
+    return invert(condition_leaf(need), name=f"not now: {_words(need)}")
+
+
+def _words(need: Wanted) -> str:
+    """Why a goal has to wait."""
+    if "place" not in need.arguments:
+        return f"no {need.condition}"
+    if need.arguments.get("anywhere"):
+        return f"no room on {need.arguments['place']}"
+    return (
+        f"{need.arguments['place']} is taken"
+        if len(need.arguments) > 1
+        else f"{need.arguments['place']} is covered"
+    )
+
+
+def _chain(goal: Goal, wanted: Wanted) -> ActChain:
+    """What reaches a goal, and lets go where the object is not to be held."""
+    try:
+        chain = chain_to(wanted)
+        return chain if _condition(goal).in_hand else let_go(chain)
+    except InputError as error:
+        raise InputError(f"goal '{goal.object} {goal.relation} {goal.place}': {error}") from error
+
+
+def _acts(chain: ActChain) -> list[Behaviour]:
+    """The leaves of a chain; what reaches a goal that later steps maintain is left out where it holds."""
+    kept = {goal for step in chain.steps for goal in goals_of(step, step.concept.maintains)}
+    return [
+        _guarded(step) if kept & set(goals_of(step, step.concept.reaches)) else concept_leaf(step)
+        for step in chain.steps
+    ]
+
+
+def _guarded(step: Act) -> Behaviour:
+    holds = after(step)
+    if not holds:
+        return concept_leaf(step)
+    return fallback(f"{step.actor} in hand", condition_leaf(holds[0]), concept_leaf(step))
+
+
+def _parked(goal: Goal, parking: str) -> list[Behaviour]:
+    """A fallback that brings an object to the parking place where its own spot is still taken by another."""
+    wanted = _asked(goal)
+    blocked = [
+        condition_leaf(a) for a in _chain(goal, wanted).given if a.arguments.get("place") == goal.place
+    ]
+    if not blocked:
+        return []
+    there = Wanted("StandsOn", {"target": goal.object, "place": parking})
+    chain = let_go(chain_to(there))
+    full = [_not_now(need) for need in chain.given]
+    return [
+        fallback(
+            f"{goal.object} need not wait",
+            condition_leaf(wanted),
+            *blocked,
+            *full,
+            sequence(f"{goal.object} waits on {parking}", *_acts(chain)),
+        )
+    ]

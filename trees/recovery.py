@@ -1,0 +1,112 @@
+"""Around a sequence: what goes wrong is put right, and goes on from there, a bounded number of times."""
+
+from __future__ import annotations
+
+from py_trees.behaviour import Behaviour
+from py_trees.composites import Sequence
+
+from bt_tasksim.concept_nodes import HandEmpty, Settle, Withdraw
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.trees.backchain import asked_by, condition_leaf
+from bt_tasksim.trees.nodes.fallback import fallback
+from bt_tasksim.trees.nodes.retry import Retry, retry
+from bt_tasksim.trees.nodes.sequence import sequence
+from bt_tasksim.trees.stages import Stage, acting, asks_itself, cut, same
+
+
+def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -> Behaviour:
+    """A tree that does the same, and recovers: a lost or missed object, or one out of place, is taken again.
+
+    The sequence is cut into stages, one for each time that something is held, by the goals that its concepts
+    ``reaches`` and ``ends``. A stage is guarded by what it ``establishes``: where that holds it is skipped,
+    and it is asked again after the stage, and at the end of all. Whatever fails begins another attempt. In
+    it the hand first opens and draws back, unless it is free, and waits until nothing moves; then the first
+    stage that is not done has its turn. Each attempt plans anew, from what is seen then.
+
+    A guard before each action, so that a tree goes on from whatever it finds, is the form of
+    M. Colledanchise, D. Almeida and P. Ögren, "Towards blended reactive planning and acting using behavior
+    trees", ICRA 2019.
+
+    Args:
+        tree: A sequence, such as one from a demonstration, or what `tidy` gives. Its nodes stand in the new
+            tree afterwards, and no more in this one.
+        attempts: How often a stage may be tried; what one of them does not need another one may use.
+        name: Name of the new tree; by default that of the old one.
+
+    Raises:
+        InputError: It is no sequence, nothing in it takes anything, or nothing tells whether a stage is done.
+    """
+    if isinstance(attempts, bool) or not isinstance(attempts, int) or attempts < 1:
+        raise InputError(f"recovering: 'attempts' should be a positive whole number, found {attempts!r}")
+    if tree.parent is not None:
+        raise InputError(f"'{tree.name}' stands under '{tree.parent.name}': recover the root of a tree")
+    rounds, body = (tree.attempts, tree.decorated) if isinstance(tree, Retry) else (1, tree)
+    children = _children(body)
+    row = cut(children)
+    stages = [stage for stage in row if stage.guards]
+    if not stages:
+        raise InputError(f"'{tree.name}' holds nothing that takes an object, so there is nothing to recover")
+    for child in children:
+        child.parent = None
+    if body not in children:
+        body.children.clear()
+    limit = -1 if rounds < 0 else rounds + (attempts - 1) * len(stages)
+    called = name or tree.name
+    work = sequence(called, hand_is_free(), *(_made(stage) for stage in row), *_checks(row))
+    return retry(limit, work, name=f"{called}, recovering")
+
+
+def hand_is_free() -> Behaviour:
+    """The hand is free; else it becomes so, whichever way the arm can go, and things come to rest."""
+    away = fallback(
+        "open and withdraw",
+        Withdraw(name="back"),
+        Withdraw(direction=(0.0, 0.0, 1.0), name="up"),
+        Withdraw(direction=(-1.0, 0.0, 0.0), name="towards the robot"),
+    )
+    free = sequence("begin anew", away, Settle(name="let things come to rest"))
+    return fallback("hand is free", HandEmpty(name="hand empty"), free)
+
+
+def _children(body: Behaviour) -> list[Behaviour]:
+    """The nodes of a sequence; a stage that asks itself whether it is done is like a sequence of one.
+
+    Raises:
+        InputError: It is no sequence with memory.
+    """
+    if type(body) is Sequence and body.memory and body.children:
+        return list(body.children)
+    if asks_itself(body) is not None:
+        return [body]
+    raise InputError(
+        f"recovering takes a sequence, or what tidy gives, and '{body.name}' is a {type(body).__name__}: "
+        f"put it into a sequence"
+    )
+
+
+def _made(stage: Stage) -> Behaviour:
+    """The node that stands for a stage in the new tree."""
+    if not stage.guards or stage.own:
+        return stage.nodes[0]
+    actor = next(leaf.model.actor for node in stage.nodes for leaf in acting(node))
+    asked = [asked_by(node) for node in stage.behind]
+    missing = [g for g in stage.guards if not any(one is not None and same(one, g) for one in asked)]
+    work = sequence(
+        f"{stage.nodes[0].name} to {stage.nodes[-1].name}", *stage.nodes, *map(condition_leaf, missing)
+    )
+    guards = [condition_leaf(guard) for guard in stage.guards]
+    guard = guards[0] if len(guards) == 1 else sequence(f"{actor} is so", *guards)
+    return fallback(f"{actor} is done", guard, work)
+
+
+def _checks(row: list[Stage]) -> list[Behaviour]:
+    """What is asked at the end of all, where it is not yet: a stage may undo what one before it did."""
+    if sum(bool(stage.guards) for stage in row) < 2:
+        return []
+    asked = [asked_by(stage.nodes[0]) for stage in row if not stage.guards]
+    return [
+        condition_leaf(guard)
+        for stage in row
+        for guard in stage.guards
+        if not any(one is not None and same(one, guard) for one in asked)
+    ]

@@ -1,0 +1,150 @@
+"""A sequence cut into stages: one for each time that something is taken, until the hand is free again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from py_trees.behaviour import Behaviour
+from py_trees.composites import Selector
+
+from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.trees.backchain import Wanted, act_of, after, asked_by, condition_named, goals_of
+from bt_tasksim.trees.walk import preorder
+
+Held = list[tuple[str, str]]
+"""Goals that were reached and not ended yet, with the objects that they are about."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Nodes that stand in a row in a sequence.
+
+    Attributes:
+        nodes: The nodes.
+        guards: The conditions that hold when they have done their work; none where they take nothing, and are
+            ticked in every attempt.
+        own: They are one node that asks its guard itself.
+    """
+
+    nodes: tuple[Behaviour, ...]
+    guards: tuple[Wanted, ...] = ()
+    own: bool = False
+
+    @property
+    def behind(self) -> tuple[Behaviour, ...]:
+        """The conditions behind the last of the nodes that acts."""
+        return self.nodes[_end(self.nodes) :]
+
+
+def cut(children: Sequence[Behaviour]) -> list[Stage]:
+    """The stages of a sequence, and what stands between them.
+
+    A stage begins with what ``reaches`` a goal and ends with what ``ends`` it; conditions right behind it
+    belong to it, and have to hold, too, where it is skipped.
+
+    Args:
+        children: The nodes of the sequence.
+
+    Raises:
+        InputError: Nothing tells whether a stage is done.
+    """
+    rows: list[list[Behaviour]] = []
+    taking: list[bool] = []
+    held: Held = []
+    for child in children:
+        goes_on = bool(held)
+        held = held_after(held, acting(child))
+        takes = any(leaf.model.reaches for leaf in acting(child))
+        behind = bool(taking) and taking[-1] and asked_by(child) is not None
+        if goes_on or (behind and asks_itself(rows[-1][0]) is None):
+            rows[-1].append(child)
+        else:
+            rows.append([child])
+            taking.append(takes)
+    return [_stage(row) if takes else Stage(tuple(row)) for row, takes in zip(rows, taking, strict=True)]
+
+
+def acting(root: Behaviour) -> Iterator[ConceptNode]:
+    """The concepts below a node, in order."""
+    return (node for _, node in preorder(root) if isinstance(node, ConceptNode))
+
+
+def held_after(held: Held, leaves: Iterator[ConceptNode] | Sequence[ConceptNode]) -> Held:
+    """Goals that are reached and not ended after some more concepts."""
+    for leaf in leaves:
+        step = act_of(leaf)
+        ended = goals_of(step, step.concept.ends)
+        held = [goal for goal in held if goal not in ended] + goals_of(step, step.concept.reaches)
+    return held
+
+
+def lasting(leaves: Sequence[ConceptNode]) -> Wanted | None:
+    """The condition that tells that concepts have done their work, and still holds after the last of them.
+
+    It is the strongest one about its object that the last concept establishes which establishes any. What can
+    hold only in the hand ends where the object is let go, and a concept that has the object in the hand
+    afterwards has moved it from where it stood.
+
+    Args:
+        leaves: The concepts, in order.
+    """
+    found: Wanted | None = None
+    held: Held = []
+    for leaf in leaves:
+        held = held_after(held, [leaf])
+        about = [asked for asked in after(act_of(leaf)) if leaf.model.actor in asked.arguments.values()]
+        lasts = [asked for asked in about if held or not _in_hand(asked)]
+        if found is not None and _in_hand(found) and not held:
+            found = None
+        found = lasts[0] if lasts else found
+    return found
+
+
+def asks_itself(node: Behaviour) -> Wanted | None:
+    """The condition with which a fallback begins: it says itself when it is done. None for other nodes."""
+    if isinstance(node, Selector) and len(node.children) > 1:
+        return asked_by(node.children[0])
+    return None
+
+
+def _stage(nodes: Sequence[Behaviour]) -> Stage:
+    """A stage, with what tells that it is done.
+
+    Raises:
+        InputError: Nothing does.
+    """
+    own = asks_itself(nodes[0]) if len(nodes) == 1 else None
+    if own is not None:
+        return Stage(tuple(nodes), (own,), own=True)
+    leaves = [leaf for node in nodes for leaf in acting(node)]
+    found = [lasting(leaves), *(asked_by(node) for node in nodes[_end(nodes) :])]
+    guards: list[Wanted] = []
+    for guard in found:
+        if guard is not None and not any(same(guard, other) for other in guards):
+            guards.append(guard)
+    if not guards:
+        last = leaves[-1]
+        raise InputError(
+            f"nothing tells whether '{last.model.actor}' is done after '{last.name}', so it cannot be "
+            f"skipped then: say where it goes (as with Release's 'into'), or put a condition behind it"
+        )
+    return Stage(tuple(nodes), tuple(guards))
+
+
+def _end(nodes: Sequence[Behaviour]) -> int:
+    """How many nodes there are up to the last one that acts."""
+    return 1 + max(k for k, node in enumerate(nodes) if any(acting(node)))
+
+
+def same(first: Wanted, second: Wanted) -> bool:
+    """Two conditions ask the same, whether defaults are given or not."""
+    kind = condition_named(first.condition)
+    return first.condition == second.condition and bool(
+        kind.value(**first.arguments) == kind.value(**second.arguments)
+    )
+
+
+def _in_hand(asked: Wanted) -> bool:
+    return condition_named(asked.condition).in_hand
