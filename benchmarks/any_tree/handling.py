@@ -199,6 +199,7 @@ class Mover:
         fits = np.flatnonzero(grips.widths < self._robot.opening - 0.002)
         if not len(fits):
             return
+        self._no(1)  # some grip fits, even if time is over before one is reached
         turns = 2 * np.pi * np.arange(AROUND) / AROUND
         tools, widths = [], []
         for k in fits:

@@ -36,7 +36,8 @@ def at_rest(world: WorldModel, estimates: Array) -> Array:
         if upright is None:
             continue
         bottom = float(pose[2]) - model.extent[2] / 2
-        places = [p for p in world.places.values() if _above(pose, p.pose, p.centre, p.extent)]
+        below = [p for p in world.places.values() if _above(pose, p.pose, p.centre, p.extent)]
+        places = [p for p in below if p.fixture]  # a goal in the air carries nothing
         level = max((z for p in places if abs(bottom - (z := float(p.pose[2]))) <= OFF), default=math.inf)
         for other, top in tops.items():
             on = _above(pose, found[other], (0.0, 0.0), world.objects[other].extent[:2])

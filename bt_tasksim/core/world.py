@@ -74,7 +74,7 @@ class PlaceModel:
         centre: Centre ``(2,)`` of the surface in the place's own frame, metres.
         height: Free height above the surface, metres (to the next board); walls' height for a bin.
         access: Unit vector ``(3,)``, robot base frame: the direction in which a hand comes to objects here.
-        fixture: Name of the fixture it belongs to.
+        fixture: Name of the fixture it belongs to; empty where nothing carries it, such as a goal in the air.
         exit: Unit vector ``(3,)``, robot base frame: the way in which a lifted object leaves the fixture.
         clearance: Distance in metres along ``exit`` after which a hand and what it holds are clear of the
             fixture.

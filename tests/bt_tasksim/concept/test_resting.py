@@ -1,5 +1,7 @@
 """What stands is put onto what it stands on, whatever it is seen to be wrong by; what leans is left alone."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -44,6 +46,16 @@ def test_heights_and_tilts_that_are_seen_wrong_are_put_right(seed, errors):
             assert poses.tilt(found[k, 3:]) < 1e-6
         assert poses.angle_between(found[k, 3:], seen[k, 3:]) <= poses.tilt(seen[k, 3:]) + 1e-6
     assert np.allclose(at_rest(world, found), found, atol=1e-9), "and once more changes nothing"
+
+
+def test_what_no_fixture_carries_carries_nothing():
+    """A goal in the air, a centimetre above where a cube stands on the table, is not what it stands on."""
+    world, seen = world_of(2)
+    air = dataclasses.replace(
+        world.places["table"], name="goal", fixture="", pose=seen[1] + np.eye(7)[2] * -0.01
+    )
+    floating = dataclasses.replace(world, places={**world.places, "goal": air})
+    assert np.array_equal(at_rest(floating, seen), at_rest(world, seen))
 
 
 def test_a_cube_may_lie_on_any_face():
