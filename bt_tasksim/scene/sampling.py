@@ -61,7 +61,7 @@ def draw_object(
         fixtures: The furniture.
 
     Raises:
-        InputError: None of 200 draws of its place was free.
+        InputError: None of 200 draws of its place was free, or a cube was asked for with unequal sides.
     """
     kind = spec.kinds[int(rng.integers(len(spec.kinds)))]
     entry = shape_kind(kind)
@@ -69,7 +69,8 @@ def draw_object(
     size = _draw_in(low, high, spec.split, rng)
     if entry.round:
         size = (size[0], size[0], size[2])
-    if entry.cubic and spec.size is None:
+    if entry.cubic:
+        _check_equal(name, spec)
         size = (size[0],) * 3
     e_low, e_high = (np.broadcast_to(np.array(v, float), 2) for v in spec.exponents)
     if isinstance(spec.exponents[0], tuple):
@@ -180,6 +181,16 @@ def tilt_access(
         level = np.sin(angle)
         access = np.array([level * np.cos(heading), level * np.sin(heading), -np.cos(angle)])
         places[actor.on] = dataclasses.replace(places[actor.on], access=access)
+
+
+def _check_equal(name: str, spec: ObjectSpec) -> None:
+    """Refuse ranges of size that no cube can have; where it may also be of another kind, x gives its side."""
+    if spec.size is None or len(spec.kinds) > 1 or all(len(set(sides)) == 1 for sides in spec.size):
+        return
+    raise InputError(
+        f"object '{name}': a {spec.kinds[0]} has equal sides, and not {spec.size[0]} to {spec.size[1]}: "
+        f"give three equal numbers each, or kind 'box'"
+    )
 
 
 def _draw_in(low: Any, high: Any, split: str, rng: np.random.Generator) -> tuple[float, ...]:

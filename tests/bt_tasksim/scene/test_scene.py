@@ -136,3 +136,14 @@ def test_something_in_a_cup_does_not_overlap_it():
 def test_json_that_is_no_world(text):
     with pytest.raises(InputError, match="not an actor configuration"):
         ActorConfiguration.from_json(text)
+
+
+def test_cubes_have_equal_sides_and_refuse_others():
+    sizes = ((0.02, 0.02, 0.02), (0.04, 0.04, 0.04))
+    scene = Scene(objects={"cube": ObjectSpec("cube", on="table", size=sizes)})
+    drawn = [scene.sample(seed).objects[0].size for seed in range(20)]
+    assert all(len(set(size)) == 1 and 0.02 <= size[0] <= 0.04 for size in drawn)
+    assert len({size[0] for size in drawn}) == 20
+    oblong = Scene(objects={"die": ObjectSpec("cube", on="table", size=((0.02, 0.03, 0.04),) * 2)})
+    with pytest.raises(InputError, match=r"die.*equal"):
+        oblong.sample(0)
