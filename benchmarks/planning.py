@@ -1,8 +1,7 @@
 """How long a way takes to be planned: ``python -m benchmarks.planning``.
 
 Random requests of three robots in three kinds of worlds: a table, the same with eight objects on it, and one
-    with
-a shelf and some objects. Each request is one as a concept makes it: the bodies of the world are built, a
+with a shelf and some objects. Each request is one as a concept makes it: the bodies of the world are built, a
 straight way of the tool is tried, and where that is not clear a way is searched for and timed.
 """
 

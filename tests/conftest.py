@@ -6,6 +6,7 @@ import dataclasses
 import os
 import signal
 import sys
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -37,11 +38,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("perturbations")
     group.addoption("--nudge", type=float, default=0.0, metavar="RAD", help="add RAD to all drive targets")
     group.addoption("--shift-seeds", type=int, default=0, metavar="N", help="draw worlds with seed + N")
+    group.addoption("--part", default="0/1", metavar="K/N", help="only the K-th of N parts, from 0 on")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Perturb physics here, and in all processes that tests start."""
     perturbation.install(config.getoption("--nudge"), config.getoption("--shift-seeds"), os.environ)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep one part of the tests; which one a test is in depends on its name alone."""
+    part, parts = (int(number) for number in config.getoption("--part").split("/"))
+    if parts > 1:
+        wanted = [zlib.crc32(item.nodeid.encode()) % parts == part for item in items]
+        config.hook.pytest_deselected(items=[i for i, keep in zip(items, wanted, strict=True) if not keep])
+        items[:] = [item for item, keep in zip(items, wanted, strict=True) if keep]
 
 
 @pytest.fixture(scope="session", autouse=True)

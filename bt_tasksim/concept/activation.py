@@ -107,7 +107,10 @@ class Activation:
         if self._later is None:
             self._later = following(self._leaf)
         found.later = self._later
+        model, context = self._model, self._context
         found.failures = self._failures[rows]
+        for goal in model.reaches:
+            found.failures = found.failures + context.no_ways(goal, model.actor, rows)
         return found
 
     def judge(self, rows: Array, fresh: Array) -> Judged:
@@ -227,6 +230,8 @@ class Activation:
             try:
                 self._remember(np.array([row]), self._model.begin(seen.at(np.array([k]))), "begin")
             except NoWayError as error:
+                for goal in self._model.maintains:
+                    self._context.no_way_with(goal, self._model.actor, row)
                 self._fail(statuses, position, row, CANNOT_START(NO_WAY(what=error)))
 
     def _going(self, rows: Array, statuses: Array) -> Judged:

@@ -98,6 +98,7 @@ class Context:
         """Seconds ``(N,)`` since each episode began."""
         self._refused: dict[int, Refusal] = {}
         self._held: dict[tuple[str, str], Array] = {}
+        self._no_ways: dict[tuple[str, str], Array] = {}
         most = {"tool": TOOL + len(robot.arm_joints), "hand": 1 + len(robot.synergies)}
         self._parts = {name: _Part(name, worlds, self.like, n) for name, n in most.items()}
         self._indices: dict[bytes, Index] = {}
@@ -191,6 +192,8 @@ class Context:
         self._observation = self._believed = None
         for held in self._held.values():
             held[rows] = False
+        for count in self._no_ways.values():
+            count[rows] = 0
         for row in rows.tolist():
             self.refused.pop(row, None)
 
@@ -292,6 +295,17 @@ class Context:
     def reached(self, goal: str, target: str, rows: Array) -> Array:
         """Boolean ``(k,)``: an earlier concept reached this goal and none has ended it."""
         return self._goal(goal, target)[rows]
+
+    def no_way_with(self, goal: str, target: str, row: int) -> None:
+        """A concept has found no way to do its part with a goal as an earlier one has reached it."""
+        if (goal, target) not in self._no_ways:
+            self._no_ways[goal, target] = np.zeros(self.worlds, np.int64)
+        self._no_ways[goal, target][row] += 1
+
+    def no_ways(self, goal: str, target: str, rows: Array) -> Array:
+        """How often ``(k,)`` that was so in the episode."""
+        counts = self._no_ways.get((goal, target))
+        return np.zeros(len(rows), np.int64) if counts is None else counts[rows]
 
     def _goal(self, goal: str, target: str) -> Array:
         if (goal, target) not in self._held:

@@ -338,3 +338,28 @@ def test_no_action_is_the_middle_of_an_action_and_not_done():
     context.advance(Story(2, 1).at(0, np.arange(2)))
     action = no_action(activation.judge(np.array([1]), np.array([True])), 3)
     assert action.motion.tolist() == [[0.0] * 3] and action.terminate.tolist() == [False]
+
+
+class Take(Task):
+    """What comes before: it reaches what a task maintains."""
+
+    maintains = ()
+    reaches = ("holding",)
+    ends = ()
+
+
+def test_a_task_without_a_way_counts_against_what_came_before_it_in_its_own_world():
+    story, context = Story(2, 1), Context(ROBOT, 2)
+    story.tool[0, 1, 0] = -0.2
+    worlds, fresh = np.arange(2), np.array([True, True])
+    take, task = (Activation(Running("leaf"), kind.value(), context) for kind in (Take, Task))
+    other = Activation(Running("leaf"), Take.value(target="box"), context)
+    context.begin([world(1), world(1)])
+    context.advance(story.at(0, worlds))
+    assert take.seen(worlds).failures.tolist() == [0, 0]
+    task.judge(worlds, fresh)
+    assert take.seen(worlds).failures.tolist() == [0, 1]
+    assert other.seen(worlds).failures.tolist() == [0, 0], "that is about another object"
+    context.begin([world(1)], np.array([1]))
+    context.advance(story.at(0, worlds))
+    assert take.seen(worlds).failures.tolist() == [0, 0], "and another episode"
