@@ -139,9 +139,11 @@ def measured(
     """Medians over rounds, both sides in turns; ``apart``: and then where the time goes."""
     processes, threads = options.processes, options.threads
     episodes, steps, rows = max(2 * worlds, 8), 150 * max(worlds, 16), []
+    if options.quick:
+        episodes, steps = worlds, 150 * worlds
     with Workers(partial(Episodes, worlds, threads), processes, "spawn") as fleet:
         list(fleet.spread(whole, [range(2)] * processes))  # whatever is made but once
-        for k in range(rounds or (2 if options.quick else 5)):
+        for k in range(rounds or (1 if options.quick else 5)):
             first = k * processes * episodes
             seeds = [range(first + n * episodes, first + (n + 1) * episodes) for n in range(processes)]
             rows.append({"steps_per_s": _rate(fleet.spread(whole, seeds))})
