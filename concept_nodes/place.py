@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,6 +91,8 @@ long: a hand that has just come to rest shakes, and so does what it holds."""
 ROOMS = ((PUT_DOWN, 0.0), (TOUCHING, 0.0), (TOUCHING, DROPPED))
 """What is tried one after the other: how much closer than usual one may come to things, and metres above its
 support where the way may end."""
+OTHERS = 8
+"""Rotations in which an object may stand, too, that are tried where it cannot come down as it is held."""
 SLOWLY, GENTLY = 0.02, 0.4
 """Metres above where the object should stand below which it goes slower, and the least share of the path's
 speed: what meets its support at 80 mm/s in the hand of a stiff arm strains the wrist with 60 to 80 N."""
@@ -232,7 +235,9 @@ class Place(ConceptModel[PlaceMemory]):
             goal = poses.shifted(goal, beyond[:, None] * d)
         tool_goal = poses.multiply(goal, poses.relative(now, seen.tool))
         (goals,) = host_numbers([tool_goal])
-        routes = {k: [self._down(view, goals[k])] for k, view in enumerate(views(seen))}
+        found = [self._found(view, goals[k]) for k, view in enumerate(views(seen))]
+        routes = {k: [route] for k, (_, route) in enumerate(found)}
+        tool_goal = poses.constant(np.array([goal for goal, _ in found]), now)
         path = plan([seen.tool, tool_goal], self.speed, samples=SAMPLES)
         path = with_routes(path, routes, len(seen.robot.arm_joints))
         nothing = xp.zeros_like(path.duration)
@@ -249,6 +254,28 @@ class Place(ConceptModel[PlaceMemory]):
         if self.anywhere:
             return straight_down(frame, now, model, edges(seen, self.on))
         return standing_pose(frame, now, model)
+
+    def _found(self, view: WorldView, goal: Array) -> tuple[Array, Route]:
+        """The tool pose ``(7,)`` to go to, and the way; turned by its symmetry where it cannot stay so.
+
+        Raises:
+            NoWayError: There is none; says what would touch what as it is held now.
+        """
+        try:
+            return goal, self._down(view, goal)
+        except NoWayError:
+            for turned in self._turned(view):
+                with suppress(NoWayError):
+                    return turned, self._down(view, turned)
+            raise
+
+    def _turned(self, view: WorldView) -> Array:
+        """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first."""
+        if self.on is None or self.anywhere or self.distance is not None:
+            return np.zeros((0, 7))
+        now = view.objects[self.target]
+        options = nearest_first(standing_options(view, self.target, self.on), now[3:])[1 : 1 + OTHERS]
+        return poses.multiply(options, poses.relative(now, view.tool)[None]) + self.overshoot * self._along
 
     def _down(self, view: WorldView, goal: Array) -> Route:
         """The way down to a tool pose ``(7,)``: straight where the arm can go straight, else as it can.

@@ -174,6 +174,27 @@ def test_where_it_cannot_go_straight_a_way_is_searched_for(toy):
     assert np.allclose(ended[0][-1], ended[1][-1], atol=1e-3)
 
 
+def test_a_hand_that_has_no_room_turns_what_looks_the_same_then(toy):
+    """Beside a wall there is room for a cup, and for the hand across the wall there is not."""
+    wall = Obstacle(poses.pose([0.45, 0.345, 0.15]), (0.6, 0.02, 0.3), "wall")
+    turned = {}
+    for obstacles in ((), (wall,)):
+        leaf = Place("cup", on="goal")
+        stage = toy(leaf)
+        stage.context.begin([dataclasses.replace(stage.world.model, obstacles=obstacles)])
+        tool = stage.world.now.tool_pose.copy()
+        tool[:3] = [0.45, 0.0, 0.3]
+        stage.world.put(tool_pose=tool)
+        stage.world.bend()
+        stage.world.hold("cup")
+        stage.look()
+        follow(stage)
+        assert stage.tick(600) == Status.SUCCESS, leaf.feedback_message
+        closing = poses.to_matrix(stage.world.steps[-1].tool[3:])[:, 1]
+        turned[len(obstacles)] = np.degrees(np.arccos(min(1.0, abs(closing[1]))))
+    assert turned[0] < 5.0 and turned[1] > 30.0
+
+
 def test_what_would_be_touched_where_it_is_put_down_is_said(toy):
     lid = Obstacle(poses.pose([0.45, 0.25, 0.15]), (0.6, 0.6, 0.02), "lid")
     leaf = Place("cup", on="goal")
