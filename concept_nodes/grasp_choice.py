@@ -59,8 +59,12 @@ MOST = 60
 """Grasps in reach of which it is asked whether they serve."""
 FARTHEST = 400
 """Grasps for which joints are looked for."""
-UNSURE = {BARELY: 0.5, HARDLY: 1.5}
+UNSURE = {SURELY: 0.0, BARELY: 0.5, HARDLY: 1.5}
 """What a grasp costs more that the fingers would not hold surely, in radians of turn from the usual one."""
+RISKY = 4.0
+"""The same for one that goes wrong always, where the best hardly ever do."""
+RISKIEST = 0.25
+"""How much likelier than the best ones a grasp may go wrong that counts as firm."""
 TURNS = 0.1
 """Radians by which an object may turn in a hand of many fingers when it closes: measured on the Ability hand,
 23 of 32 things turned by less."""
@@ -239,12 +243,15 @@ class Chooser:
             if centred is not goal and not hand.free(centred):
                 centred = goal
             how = self._firm.holds(centred)
-            if how == SURELY:
-                yield centred, hand
-            elif how == HARDLY and self._firmly:
+            risk = self._firm.risk(centred, width)
+            if self._firmly and (how == HARDLY or risk > RISKIEST):
                 self._no("that would hardly be held")
+                continue
+            more = UNSURE[how] + RISKY * risk
+            if more:
+                heapq.heappush(waiting, (cost + more, number, centred, hand))
             else:
-                heapq.heappush(waiting, (cost + UNSURE[how], number, centred, hand))
+                yield centred, hand
         while waiting:
             yield heapq.heappop(waiting)[2:]
 
