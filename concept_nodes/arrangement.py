@@ -14,6 +14,7 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
 from bt_tasksim.concept_nodes.hand_conditions import height_above, how_far_apart
+from bt_tasksim.concept_nodes.inside_of import beyond_walls
 from bt_tasksim.concept_nodes.surface import NEAR, apart, edges, straight_down
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Statement
@@ -28,8 +29,6 @@ WITHIN = Form(
 )
 STANDS = Form("{object} is {aside} off and {height} above {place}", {"aside": METRES, "height": METRES})
 ROOM = Form("{place} {state}")
-SUNK = 0.01
-"""Metres by which an object's centre may seem to be below a container's floor, as goals have it."""
 FINE = 15
 """Points along each side of a place at which room is looked for."""
 LEVEL = 0.02
@@ -38,11 +37,11 @@ LEVEL = 0.02
 
 @register("concept")
 class Inside(Condition):
-    """Is the object in the container, below its rim?
+    """Is the object in the container: below its rim, or standing on its floor?
 
     Args:
         target: The object.
-        place: The container.
+        place: The container, or another object that holds it.
     """
 
     target: ObjectName
@@ -52,9 +51,7 @@ class Inside(Condition):
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        local, box = self._local(seen), seen.place(self.place)
-        within = array_namespace(local).all(abs(local[:, :2] - box.centre) <= box.extent / 2, axis=-1)
-        return within & (local[:, 2] > -SUNK) & (local[:, 2] < box.height)
+        return beyond_walls(seen, self.target, self.place) <= 0.0
 
     def explain(self, seen: Seen) -> Statement:
         """Where it is."""
@@ -63,7 +60,9 @@ class Inside(Condition):
         return WITHIN(object=self.target, aside=aside, height=local[:, 2], place=self.place)
 
     def _local(self, seen: Seen) -> Array:
-        return poses.localise(seen.place(self.place).pose, seen.object(self.target)[:, :3])
+        known = self.place in seen.world.place_columns
+        frame = seen.place(self.place).pose if known else seen.object(self.place)
+        return poses.localise(frame, seen.object(self.target)[:, :3])
 
 
 @register("concept")

@@ -57,6 +57,8 @@ SAME_GRIP = (0.012, 0.02, 0.96)
 within which a grasp is taken to hold as that grip does."""
 MOST = 60
 """Grasps in reach of which it is asked whether they serve."""
+ASKED = 250
+"""Grasps of which a hand of many fingers is asked what its fingers meet: some milliseconds each."""
 FARTHEST = 400
 """Grasps for which joints are looked for."""
 UNSURE = {SURELY: 0.0, BARELY: 0.5, HARDLY: 1.5}
@@ -229,25 +231,29 @@ class Chooser:
     def _free(self, candidates: Candidates) -> Iterator[tuple[Array, Opening]]:
         """Those at which the hand alone touches nothing, moved to hold well; those that do not come later."""
         waiting: list[tuple[float, int, Array, Opening]] = []
+        asked = 0
         for number in itertools.count():
             try:
                 cost, goal, width = candidates.taken()
             except StopIteration:
+                break
+            if asked == ASKED and self._firm.asks:
                 break
             while waiting and waiting[0][0] <= cost:
                 yield heapq.heappop(waiting)[2:]
             hand = self._opening(width)
             if not self._has_room(goal, hand):
                 continue
+            asked += 1
             centred = self._firm.centred(goal)
             if centred is not goal and not hand.free(centred):
                 centred = goal
             how = self._firm.holds(centred)
-            risk = self._firm.risk(centred, width)
-            if self._firmly and (how == HARDLY or risk > RISKIEST):
+            # What is thin is held poorly wherever it is, so its width does not count here.
+            if self._firmly and (how == HARDLY or self._firm.risk(centred, np.inf) > RISKIEST):
                 self._no("that would hardly be held")
                 continue
-            more = UNSURE[how] + RISKY * risk
+            more = UNSURE[how] + RISKY * self._firm.risk(centred, width)
             if more:
                 heapq.heappush(waiting, (cost + more, number, centred, hand))
             else:

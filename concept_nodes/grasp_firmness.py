@@ -38,14 +38,17 @@ FARTHEST = 0.02
 """Metres by which it is moved at most."""
 
 RISK = (-3.53, 2.0, 76.0, 117.0)
-"""Log odds that what a hand of many fingers takes slips, or turns by more than 10 degrees, until it is carried:
-a constant, and so much for each radian of `Squeeze.angle`, for each metre across the fingers (along the tool's
-x axis) to the middle of the object, and for each metre of width below `NARROW`. Fitted by logistic regression
-to 304 random grasps that the Ability hand could come to, of every kind of object and twenty meshes, each taken,
-lifted and carried in SAPIEN, of which 51 went wrong; of the held-out fifths it ranks 87 % of the pairs of a
-good grasp and a bad one rightly. Squeezes with 8 degrees and less never failed, those with 30 and more half
-the time."""
+"""Log odds that what a hand of many fingers takes slips, or turns by more than 10 degrees, until it is
+carried: a constant, and so much for each radian of `Squeeze.angle`, for each metre along the tool's x axis
+(across the fingers) to the middle of the object, and for each metre of width below `NARROW`.
+
+Fitted by logistic regression to 304 random grasps of single things that the Ability hand could come to,
+taken, lifted and carried in SAPIEN, of which 51 went wrong; of the fifths held out it ranks 87 % of the pairs
+of a good grasp and a bad one rightly. Squeezes of 8 degrees and less never failed, those of 30 and more in
+half of the cases. `python -m benchmarks.any_tree.grasp_risk` makes such a table and fits it anew."""
 NARROW = 0.03
+WIDEST = 1.2
+"""Radians to which larger angles were cut."""
 
 SURELY, BARELY, HARDLY = range(3)
 """How a hand holds: also where the estimate is wrong; where it is right; or probably not."""
@@ -62,6 +65,7 @@ class Firm:
     def __init__(self, view: WorldView, target: str) -> None:
         self._closing = closing_of(view.robot) if len(view.robot.tips) > TWO else None
         self._pose, self._pieces = view.objects[target], pieces_of(view.model(target))
+        self._asked: tuple[Array, Squeeze | None] | None = None  # the last one, which is asked about again
 
     @property
     def asks(self) -> bool:
@@ -72,25 +76,37 @@ class Firm:
         """How surely fingers that close at a tool pose ``(7,)`` hold the object: `SURELY` or worse."""
         if self._closing is None:
             return SURELY
-        if not _pressed_well(self._squeeze(tool)):
+        found = self._squeeze(tool)
+        if not _pressed_well(found):
             return HARDLY
-        shallower = poses.shifted(tool, -SHALLOWER * poses.z_axis(tool[3:]))
-        return SURELY if _pressed_well(self._squeeze(shallower)) else BARELY
+        shallower = self._squeeze(poses.shifted(tool, -SHALLOWER * poses.z_axis(tool[3:])))
+        self._asked = tool, found
+        return SURELY if _pressed_well(shallower) else BARELY
 
     def risk(self, tool: Array, width: float) -> float:
         """How much likelier than with the best grasps the object slips or turns, see `RISK`; from 0 to 1.
 
         Args:
             tool: Tool pose ``(7,)``.
-            width: Of what is held, metres.
+            width: Of what is held, metres; infinite where it is not to count.
         """
-        found = None if self._closing is None else self._squeeze(tool)
-        if found is None:
+        if self._closing is None:
             return 0.0
-        least, angle, across, narrow = RISK
-        beside = abs(float(poses.localise(tool, self._middle[None])[0, 0]))
-        odds = least + angle * found.angle + across * beside + narrow * max(0.0, NARROW - width)
+        least, by_angle, by_across, by_narrow = RISK
+        angle, across = self.features(tool)
+        odds = (
+            least + by_angle * min(angle, WIDEST) + by_across * across + by_narrow * max(0.0, NARROW - width)
+        )
         return 1.0 / (1.0 + math.exp(-odds)) - 1.0 / (1.0 + math.exp(-least))
+
+    def features(self, tool: Array) -> tuple[float, float]:
+        """Of a squeeze at a tool pose ``(7,)``: its angle, and how far aside of it the object's middle is.
+
+        In radians, infinite where there is none; and metres along the tool's x axis.
+        """
+        found = self._squeeze(tool)
+        across = abs(float(poses.localise(tool, self._middle[None])[0, 0]))
+        return (math.inf if found is None else found.angle), across
 
     @cached_property
     def _middle(self) -> Array:
@@ -109,8 +125,10 @@ class Firm:
 
     def _squeeze(self, tool: Array) -> Squeeze | None:
         assert self._closing is not None
-        grip = poses.relative(tool, self._pose)
-        return self._closing.squeeze(self._closing.met(grip, self._pieces))
+        if self._asked is None or not np.array_equal(self._asked[0], tool):
+            grip = poses.relative(tool, self._pose)
+            self._asked = tool, self._closing.squeeze(self._closing.met(grip, self._pieces))
+        return self._asked[1]
 
 
 def deeper(tool: Array) -> Array:

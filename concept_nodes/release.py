@@ -18,6 +18,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.carry import straight_path
 from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING
 from bt_tasksim.concept_nodes.holding import HOLDING
+from bt_tasksim.concept_nodes.inside_of import beyond_walls
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, views
@@ -52,8 +53,6 @@ FELL_BESIDE = register_reason(
 )
 FALLEN = math.radians(40.0)
 """Radians of tilt from which on something that was let go has fallen over."""
-STANDS = 0.01
-"""Metres above a container's floor within which something stands on it, as goals have it."""
 FALLING = 0.6
 """Seconds after the hand has drawn back within which something has fallen."""
 OPEN = 0.15
@@ -200,12 +199,8 @@ class Release(ConceptModel[ReleaseMemory]):
         xp = array_namespace(seen.tool)
         if self.into is None or self.into not in seen.world.place_columns:
             return xp.zeros_like(seen.tool[:, 0])
-        place = seen.place(self.into)
-        local = poses.localise(place.pose, seen.object(self.target)[:, :3])
-        beyond = xp.abs(local[:, :2] - place.centre) - place.extent / 2
-        tall = seen.model(self.target).standing_height + STANDS
-        above = local[:, 2] - xp.maximum(place.height, tall)
-        far = xp.maximum(xp.maximum(xp.max(beyond, axis=-1), above), xp.zeros_like(above))
+        far = beyond_walls(seen, self.target, self.into)
+        far = xp.maximum(far, xp.zeros_like(far))
         return xp.where(xp.isfinite(far), far, xp.zeros_like(far))
 
     def done(self, seen: Seen, memory: ReleaseMemory) -> Array:

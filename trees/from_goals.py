@@ -71,6 +71,9 @@ def in_order(goals: Sequence[Goal]) -> list[Goal]:
     Raises:
         InputError: There is none, or goals contradict each other.
     """
+    if isinstance(goals, Goal):
+        raise InputError("tidy takes a sequence of goals, found one goal: write tidy([goal])")
+    goals = list(goals)
     _check_goals(goals)
     of = {goal.object: goal for goal in goals}
     out: list[Goal] = []
@@ -91,10 +94,14 @@ def in_order(goals: Sequence[Goal]) -> list[Goal]:
 
 
 def _check_goals(goals: Sequence[Goal]) -> None:
-    if isinstance(goals, Goal):
-        raise InputError("tidy takes a sequence of goals, found one goal: write tidy([goal])")
     if not goals:
         raise InputError("there is no goal to make a tree from: give at least one Goal")
+    for goal in goals:
+        if not isinstance(goal, Goal):
+            raise InputError(
+                f"'{goal}' is a function, or no goal at all, of which nobody knows what brings it about: "
+                f"give tidy the goals that are a Goal, [g for g in scene.goals if isinstance(g, Goal)]"
+            )
     taken: dict[tuple[str, str], str] = {}
     seen: set[str] = set()
     held = [goal.object for goal in goals if _condition(goal).in_hand]

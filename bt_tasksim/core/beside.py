@@ -19,7 +19,7 @@ def beside(folder: Path, name: str, what: str) -> Path:
         what: What is named, for the error, such as ``a mesh``.
 
     Raises:
-        InputError: The path is absolute or leads out of the folder.
+        InputError: The path is absolute or leads out of the folder, by itself or through a link.
     """
     parts = (*PurePosixPath(name).parts, *PureWindowsPath(name).parts)
     absolute = PurePosixPath(name).is_absolute() or PureWindowsPath(name).anchor
@@ -28,4 +28,10 @@ def beside(folder: Path, name: str, what: str) -> Path:
             f"{what} should lie in the folder of the file that names it, or below, and be named by the path "
             f"from there, found '{shown(name)}': copy it there"
         )
-    return (folder / name).resolve()
+    found = (folder / name).resolve()
+    if not found.is_relative_to(folder.resolve()):
+        raise InputError(
+            f"{what}, '{shown(name)}', is a link that leads out of the folder of the file that names it: "
+            f"copy the file itself there"
+        )
+    return found

@@ -39,7 +39,7 @@ class Collisions:
         self._pairs.compare(map(tuple, bodies.apart.tolist()))
         arm = [
             i
-            for i in np.flatnonzero(bodies.moves & ~bodies.hand).tolist()
+            for i in np.flatnonzero(~bodies.hand).tolist()
             if bodies.shapes.geometryObjects[i].parentJoint != bodies.tool_joint
         ]
         self._pairs.compare((i, k) for i in arm for k in inside)

@@ -26,8 +26,8 @@ def check_fixtures(fixtures: Sequence[Fixture]) -> None:
     for i, fixture in enumerate(fixtures):
         if fixture.name in names[:i]:
             raise FieldError(
-                f"the fixture '{fixture.name}' is there twice: give each its place and a name, such as "
-                f"Fixture('{fixture.name}', at=(0.45, -0.35), name='left_{fixture.name}')",
+                f"the fixture '{fixture.name}' is there twice: give each its place and its own name, such "
+                f"as at=(0.45, -0.35), name='left_{fixture.name}'",
                 "fixtures",
             )
         for place in fixture.places:

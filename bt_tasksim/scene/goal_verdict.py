@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from bt_tasksim.core.bundles import mapped
 from bt_tasksim.core.outcomes import Outcome, register_reason
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.units import METRES_PER_SECOND, RADIANS_PER_SECOND
 from bt_tasksim.scene.goal_functions import GoalFunction
 from bt_tasksim.scene.relations import FinalState, relation_named
@@ -93,13 +95,24 @@ def judge_function(goal: GoalFunction, final: FinalState) -> GoalVerdict:
     Raises:
         InputError: See `GoalFunction.ask`.
     """
-    answer = goal.ask(final)
+    answer = goal.ask(_for_reading(final))
     if answer is None:
         return GoalVerdict(goal.name, "end", None, FUNCTION_NOT_HERE(goal=goal.name))
     reached, words = answer
     reason = FUNCTION_TRUE if reached else FUNCTION_FALSE
     said = words or ("it is reached" if reached else "it is not reached")
     return GoalVerdict(goal.name, "end", reached, reason(goal=goal.name, words=said))
+
+
+def _for_reading(final: FinalState) -> FinalState:
+    """The same state, in arrays that cannot be written: no function changes what the next one is given."""
+
+    def still(values: Array) -> Array:
+        copied = np.array(values)
+        copied.setflags(write=False)
+        return copied
+
+    return replace(final, hidden=mapped(still, final.hidden))
 
 
 def _not_left_alone(name: str, final: FinalState) -> Outcome | None:

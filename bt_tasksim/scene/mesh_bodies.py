@@ -8,7 +8,7 @@ import numpy as np
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.scene.meshes import TriangleMesh, mass_properties
+from bt_tasksim.scene.meshes import TriangleMesh, volume_of
 
 _SAME_ANGLE = 1e-6
 """Radians between faces around an edge that lie upon each other."""
@@ -92,7 +92,7 @@ def solids_and_cavities(
     What faces inwards is a cavity where it lies within the bounding box of a body; else it was saved inside
     out.
     """
-    volumes = [mass_properties(body).volume for body in bodies]
+    volumes = [volume_of(body) for body in bodies]
     solids = [body for body, volume in zip(bodies, volumes, strict=True) if volume > 0]
     boxes = [(body.vertices.min(axis=0), body.vertices.max(axis=0)) for body in solids]
     cavities: list[TriangleMesh] = []

@@ -18,7 +18,7 @@ from bt_tasksim.scene.convex_parts import convex_parts
 from bt_tasksim.scene.geometry import ConvexPiece, Piece, Shape
 from bt_tasksim.scene.mesh_bodies import separate, solids_and_cavities, united
 from bt_tasksim.scene.mesh_surface import MeshSurface
-from bt_tasksim.scene.meshes import TriangleMesh, cube_sphere, mass_properties
+from bt_tasksim.scene.meshes import TriangleMesh, cube_sphere, mass_properties, volume_of
 
 SMALLEST = 0.005
 LARGEST = 1.0
@@ -173,7 +173,7 @@ def _bodies(mesh: Any) -> list[TriangleMesh]:
     if len(bodies) > MOST_BODIES:
         raise InputError(f"has {len(bodies)} separate bodies, more than {MOST_BODIES}: save fewer")
     smallest = _NO_VOLUME * float(np.prod(np.ptp(vertices, axis=0)))
-    bodies = [body for body in bodies if abs(mass_properties(body).volume) > smallest]
+    bodies = [body for body in bodies if abs(volume_of(body)) > smallest]
     if not bodies:
         raise InputError("is flat: it encloses no volume")
     return bodies

@@ -23,7 +23,7 @@ MOST = 12
 _ODD = tuple(2 * math.pi * turn for turn in (0.0731, 0.1618, 0.2929, 0.4142))
 """Angles in radians of no symmetry of a low order: what looks the same turned by all of them is round."""
 _POINTS = 600
-"""Vertices looked at."""
+"""Vertices looked at first. What looks the same by these is looked at by all: a spout may have few."""
 _SAMPLES, _ABOUT = 8192, 16
 """Samples of a surface, and how many of them about a point say which triangles may be the nearest."""
 
@@ -36,14 +36,18 @@ def symmetry_about_z(mesh: TriangleMesh) -> int:
     centre = mass_properties(mesh).pose[:3] * np.array([1.0, 1.0, 0.0])
     if float(np.linalg.norm(centre)) > ASIDE:
         return 1
-    points = mesh.vertices[:: -(-len(mesh.vertices) // _POINTS)] - centre
+    points = mesh.vertices - centre
+    few = points[:: -(-len(points) // _POINTS)]
     least, share, most = ALIKE
     alike = min(max(least, share * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))), most)
 
     to_surface = _distances(mesh)
 
+    def on_it(some: Array, angle: float) -> bool:
+        return float(np.max(to_surface(poses.rotate(poses.yaw(angle)[None], some) + centre))) <= alike
+
     def same(angle: float) -> bool:
-        return float(np.max(to_surface(poses.rotate(poses.yaw(angle)[None], points) + centre))) <= alike
+        return on_it(few, angle) and (len(few) == len(points) or on_it(points, angle))
 
     if all(same(angle) for angle in _ODD):
         return 0

@@ -186,11 +186,25 @@ def superellipsoid(half_size: Array, e1: float, e2: float, n: int = 16) -> Trian
     return TriangleMesh(grid.vertices * scale[:, None] * half_size, grid.faces)
 
 
+def volume_of(mesh: TriangleMesh) -> float:
+    """Volume in m^3 of the solid inside a closed mesh; negative where its faces look inwards."""
+    return float(np.sum(_determinants(mesh))) / 6
+
+
+def _determinants(mesh: TriangleMesh) -> Array:
+    """Six times the signed volumes ``(m,)`` of the tetrahedra between each triangle and the origin."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]].T for k in range(3))
+    found: Array = (a * (b[[1, 2, 0]] * c[[2, 0, 1]] - b[[2, 0, 1]] * c[[1, 2, 0]])).sum(axis=0)
+    return found
+
+
 def mass_properties(mesh: TriangleMesh) -> MassProperties:
-    """Volume, centre of mass and inertia of the solid inside a closed mesh, by signed tetrahedra."""
+    """Volume, centre of mass and inertia of the solid inside a closed mesh, by signed tetrahedra.
+
+    It has to enclose a volume, see `volume_of`.
+    """
     corners = [mesh.vertices[mesh.faces[:, k]] for k in range(3)]
-    a, b, c = (corner.T for corner in corners)
-    det = (a * (b[[1, 2, 0]] * c[[2, 0, 1]] - b[[2, 0, 1]] * c[[1, 2, 0]])).sum(axis=0)
+    det = _determinants(mesh)
     volume = float(np.sum(det)) / 6
     total = corners[0] + corners[1] + corners[2]
     centre = np.sum(det[:, None] * total, axis=0) / (24 * volume)

@@ -88,12 +88,13 @@ class Candidate:
     def clear_of(self, others: Sequence[ObjectActor], gap: float) -> bool:
         """It is clear of other objects.
 
-        Two whose circles are 1 cm apart are clear at once, and so they are at different heights; of all
-        others the outlines of their parts at the same height are to be ``gap`` metres apart.
+        Two whose circles are 1 cm apart, or ``gap`` where that is more, are clear at once, and so they are at
+        different heights; of all others the outlines of their parts at the same height are to be ``gap``
+        metres apart.
         """
         for other in others:
             apart = float(np.hypot(*(self.pose[:2] - np.array(other.pose[:2]))))
-            if apart > _radius(self.extent) + _radius(other.size) + 0.01:
+            if apart > _radius(self.extent) + _radius(other.size) + max(gap, 0.01):
                 continue
             if abs(self.pose[2] - other.pose[2]) > (self.extent[2] + other.size[2]) / 2:
                 continue

@@ -52,3 +52,16 @@ def test_a_gripper_of_two_fingers_is_not_asked():
     found, tool = firm("panda"), above(0.2)
     assert not found.asks and found.holds(tool) == SURELY
     assert found.centred(tool) is tool
+
+
+def test_a_grasp_is_riskier_beside_the_middle_on_what_is_thin_and_with_a_slanted_squeeze():
+    found, middle = firm(), above(0.04)
+    least = found.risk(middle, 0.045)
+    assert 0.0 <= least < 0.15
+    assert found.risk(above(0.04, x=0.03), 0.045) > least + 0.2, "fingers hold its end alone"
+    assert found.risk(middle, 0.01) > found.risk(middle, 0.045) == found.risk(middle, np.inf)
+    turned = poses.pose([0.0, 0.0, 0.04], poses.quat_multiply(poses.yaw(0.4), DOWN))
+    assert found.features(turned)[0] > found.features(middle)[0]
+    assert found.risk(turned, 0.045) > least
+    assert 0.0 < found.risk(above(0.2), 0.045) < 1.0, "where nothing is met it is as good as lost"
+    assert firm("panda").risk(middle, 0.045) == 0.0

@@ -18,6 +18,7 @@ from bt_tasksim.concept_nodes.carry import Carry
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.registry import register
 from bt_tasksim.execution.runner import Runner
+from bt_tasksim.scene.goal_functions import GoalFunction
 from bt_tasksim.scene.relations import relation_named
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation
 from bt_tasksim.scene.specs import ObjectSpec, SpotSpec
@@ -339,3 +340,37 @@ def test_two_find_room_on_one_tray_and_one_beside_another():
     goals = [Goal("box", "cup", relation="beside")]
     scene = Scene("panda", fixtures=["tray"], objects={"cup": "on tray", "box": "on table"})
     successes(reached(Runner(tidy(goals), scene), goals), range(7, 12), n=4)
+
+
+def test_a_function_is_no_goal_that_a_tree_can_be_made_of():
+    def tidied(final):
+        return True
+
+    for other in (GoalFunction.of(tidied), tidied):
+        with pytest.raises(InputError, match=r"'.*tidied.*' is a function, or no goal at all"):
+            tidy([Goal("a", on="table"), other])
+
+
+def test_goals_may_come_from_a_generator():
+    goals = [Goal("a", on="spot"), Goal("b", on="a")]
+    assert same_tree(tidy(goal for goal in goals), tidy(goals))
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize(
+    ("goal", "fixtures", "things"),
+    [
+        (Goal("can", inside="tray"), ["tray"], {"can": "cylinder on table"}),
+        (
+            Goal("can", inside="cup"),
+            [],
+            {"cup": "cup on table", "can": ObjectSpec(("cube",), on="table", size=((0.02,) * 3,) * 2)},
+        ),
+    ],
+)
+def test_what_is_taller_than_a_low_container_is_in_it_and_a_small_thing_in_a_cup(goal, fixtures, things):
+    """The condition that the tree asks in the end agrees with the success evaluator."""
+    scene = Scene(fixtures=fixtures, objects=things, goals=[goal])
+    with Runner(lambda: tidy([goal]), scene) as runner:
+        for result in successes(runner.run, range(5)):
+            assert result.status == Status.SUCCESS, "the tree knows that it is there"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from operator import truediv
 
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.layout import body_column
@@ -21,17 +20,10 @@ FAST = 1.0
 lands flat at 2.2 m/s sinks in by 3.3 mm in 16 steps for each, and by 1.1 mm in 32."""
 PARTING_FINELY = 0.1
 """As `PARTING`, in the shorter steps: PhysX leaves bodies the speed at which it parts them, and they jump."""
-SQUEEZED = 1500.0
-"""Newtons of the hand on an object for each kilogram of it, from which steps are shorter. What they do to it in
-a step grows with the square of its length: a cup of 20 g between jaws that press with 40 N each is found 3 mm
-within them at 100 Hz, and now and then jumps out of them; at 200 Hz it is held. Of eight tasks of the SO-100
-that failed with long steps, five succeed at 400 Hz."""
-SHORTEST = 4
-"""How many times shorter they are at most."""
 CLOSING = 2
 """How many times shorter they are while the hand closes fast, and `WATCHED` periods on: the fingers of the
 Ability hand, each a kilogram with its motor's inertia, meet on the stick of a ladle and sink in by 2.8 mm at
-100 Hz, and by 1.0 at 200."""
+100 Hz, and by 1.0 at 200. Not for as long as something is held: twice the steps would cost twice the time."""
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
 WATCHED = 4
@@ -70,8 +62,7 @@ class SapienWorld:
         self._substeps = configuration.physics_frequency // configuration.control_frequency
         self._time = 0.0
         self._falling = self._rolling = self._asleep = False
-        self._watch, self._letting_go, self._closing, self._held = WATCHED, 0, 0, 1
-        self._weights = [body.mass for body in world.objects]
+        self._watch, self._letting_go, self._closing = WATCHED, 0, 0
         self._reader = ContactReader(world, n_tips)
         self._touch = self._reader.nothing
         self._readings, self._row = readings, row
@@ -99,7 +90,7 @@ class SapienWorld:
             self._watch = WATCHED
         if opens and any(self._touch.hand_force):
             self._letting_go = WATCHED
-        elif fast:
+        elif fast and not opens:
             self._closing = WATCHED
 
     def advance(self) -> None:
@@ -113,29 +104,21 @@ class SapienWorld:
         elif fine:
             self._fine_steps(self._substeps)
         else:
-            self._usual_steps(self._substeps * self._shorter())
+            shorter, self._closing = CLOSING if self._closing else 1, max(self._closing - 1, 0)
+            self._usual_steps(shorter)
         self._time += self._dt * self._substeps
 
-    def _shorter(self) -> int:
-        """How many times shorter than usual steps are now."""
-        closing, self._closing = self._closing > 0, max(self._closing - 1, 0)
-        pressed = max(map(truediv, self._touch.hand_force, self._weights), default=0.0)
-        needed = min(math.ceil(math.sqrt(pressed / SQUEEZED)), SHORTEST)
-        # Steps that change their length while something is held would make the force on it tremble.
-        self._held = max(self._held, needed) if pressed else 1
-        return max(self._held, CLOSING if closing else 1)
-
-    def _usual_steps(self, n: int) -> None:
-        """A control period in ``n`` steps."""
+    def _usual_steps(self, shorter: int) -> None:
+        """A control period in steps so many times shorter than the scene's."""
         watched, self._watch = self._watch > 0, max(self._watch - 1, 0)
-        step = self._last_dt = self._dt * self._substeps / n
-        if n != self._substeps:
+        step = self._last_dt = self._dt / shorter
+        if shorter > 1:
             self.world.scene.set_timestep(step)
-        for k in range(n):
+        for k in range(self._substeps * shorter):
             if watched and k > 0:
                 self._reader.read_depth(self._time)
             self._step(step)
-        if n != self._substeps:
+        if shorter > 1:
             self.world.scene.set_timestep(self._dt)
 
     def _step(self, seconds: float) -> None:

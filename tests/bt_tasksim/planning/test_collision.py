@@ -93,3 +93,10 @@ def test_pieces_are_where_their_pose_puts_them(panda):
     for piece in pieces:
         assert not among(panda, piece, held=panda.held()).free(q)
     assert among(panda, Thing("one", poses.pose([0.45, 0.4, 0.4]), pieces=(corners,))).free(q)
+
+
+def test_what_is_held_counts_against_the_robots_base(panda):
+    q = panda.posture(0.45, 0.0, 0.4)
+    assert among(panda, held=panda.held()).free(q)
+    wide = panda.held((1.2, 0.2, 0.9))  # so large that it reaches into the base
+    assert any("panda_link0" in touch for touch in among(panda, held=wide).touches(q))

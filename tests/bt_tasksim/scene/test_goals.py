@@ -200,6 +200,17 @@ def test_errors_in_a_function_say_its_file_and_line(function, words):
         verdict([function], STACKED)
 
 
+def test_a_function_cannot_change_what_others_are_judged_by():
+    """Lifted out of the state by one function, a thing would be knocked over, or in place, for the others."""
+
+    def moves(final):
+        final.pose("red")[:3] += 1.0
+        return True
+
+    with pytest.raises(InputError, match=r"goal 'moves' raised ValueError.*read-only"):
+        verdict([moves, high], STACKED)
+
+
 def test_a_function_that_is_not_here_is_not_judged():
     configuration, world = drawn(Scene(objects=OBJECTS, goals=[high, Goal("red", on="blue")]))
     again = ActorConfiguration.from_json(configuration.to_json())

@@ -84,3 +84,12 @@ def test_holes_and_faces_that_look_both_ways_are_said():
     faces[0] = faces[0, ::-1]
     with pytest.raises(InputError, match="face different ways"):
         separate(vertices, faces)
+
+
+def test_a_mesh_that_encloses_nothing_is_flat(tmp_path):
+    """Two triangles, each there and back."""
+    path = tmp_path / "flat.obj"
+    corners = "v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .05\n"
+    path.write_text(corners + "f 1 2 3\nf 1 3 2\nf 1 2 4\nf 1 4 2\n")
+    with pytest.raises(InputError, match="is flat: it encloses no volume"):
+        mesh_extent(str(path))

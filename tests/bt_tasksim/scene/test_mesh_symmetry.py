@@ -66,3 +66,25 @@ def test_everyday_forms(form, order):
         vertices, faces = made(form, seed)
         middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
         assert symmetry_about_z(TriangleMesh(vertices - middle, faces)) == order
+
+
+def test_a_spout_of_few_corners_is_seen_on_a_fine_mesh():
+    """Of 9,000 corners, four make the spout: a sample of them may miss it."""
+    around, up = 300, 30
+    angle = 2 * np.pi * np.arange(around) / around
+    ring = 0.03 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    heights = np.linspace(-0.04, 0.04, up)
+    side = np.concatenate([np.column_stack([ring, np.full(around, h)]) for h in heights])
+    side[-around + 1 : -around + 5, :2] *= 1.3
+    vertices = np.concatenate([side, [[0, 0, -0.04], [0, 0, 0.04]]])
+    k = np.arange(around)
+    following = (k + 1) % around
+    faces = []
+    for level in range(up - 1):
+        low, high = level * around, (level + 1) * around
+        faces += [np.stack([low + k, low + following, high + following], axis=-1)]
+        faces += [np.stack([low + k, high + following, high + k], axis=-1)]
+    top = (up - 1) * around
+    faces += [np.stack([np.full(around, len(side)), following, k], axis=-1)]
+    faces += [np.stack([np.full(around, len(side) + 1), top + k, top + following], axis=-1)]
+    assert symmetry_about_z(TriangleMesh(vertices, np.concatenate(faces))) == 1

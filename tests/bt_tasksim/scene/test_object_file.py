@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from bt_tasksim.core.beside import beside
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.resources import asset
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -146,3 +147,18 @@ def test_scenes_refuse_what_cannot_be(tmp_path, entry, words):
 def test_an_object_needs_a_kind_or_a_file():
     with pytest.raises(InputError, match="needs 'kinds', or a 'file'"):
         ObjectSpec(on="table")
+
+
+def test_a_link_out_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "outside").mkdir()
+    (tmp_path / "outside" / "secret.obj").write_text("v 0 0 0\n")
+    folder = tmp_path / "own"
+    folder.mkdir()
+    (folder / "linked.obj").symlink_to(tmp_path / "outside" / "secret.obj")
+    (folder / "there").symlink_to(tmp_path / "outside")
+    for name in ("linked.obj", "there/secret.obj"):
+        with pytest.raises(InputError, match="a link that leads out of the folder"):
+            beside(folder, name, "a mesh")
+    (folder / "own.obj").write_text("")
+    (folder / "again.obj").symlink_to(folder / "own.obj")
+    assert beside(folder, "again.obj", "a mesh") == folder / "own.obj"

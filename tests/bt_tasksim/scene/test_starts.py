@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import FieldError, InputError
-from bt_tasksim.scene.outlines import distance, holds, rectangle, whole_outline
+from bt_tasksim.scene.outlines import distance, holds, overlapping, rectangle, whole_outline
 from bt_tasksim.scene.overlap import check_configuration
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import FixtureSpec, ObjectSpec
@@ -161,3 +161,11 @@ def test_what_is_too_large_for_a_cup_does_not_start_in_it():
     scene = Scene(objects={"cup": "on table", "b": ObjectSpec(("cube",), inside="cup", size=CUBE)})
     with pytest.raises(InputError, match="'b' finds no free spot in 'cup'"):
         scene.sample(0)
+
+
+def test_a_wide_gap_is_kept_too():
+    objects = {name: ObjectSpec(("cube",), on="table", area=(0.15, 0.3), gap=0.1) for name in ("a", "b")}
+    scene = Scene(objects=objects)
+    for seed in range(20):
+        a, b = (parts_of(actor) for actor in scene.sample(seed).objects)
+        assert not overlapping(a, b, 0.1 - 1e-6)

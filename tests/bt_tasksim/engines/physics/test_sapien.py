@@ -10,7 +10,7 @@ from bt_tasksim.concept.context import one_world
 from bt_tasksim.core.world import Command
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physics.sapien import SapienPhysics
-from bt_tasksim.engines.physics.sapien_stepping import FINE
+from bt_tasksim.engines.physics.sapien_stepping import CLOSING, FINE
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.trees.load import load_source
@@ -64,15 +64,30 @@ def steps_of(runner, closure):
 
 def test_steps_are_finer_where_the_hand_lets_go_of_something():
     runner = holding("box", 0.2)
+    for _ in range(10):
+        runner.pipeline.step(Command())
     usual = steps_of(runner, 1.0)
     letting_go = steps_of(runner, 0.0)
     assert usual.sum() == pytest.approx(0.05) and letting_go.sum() == pytest.approx(0.05)
     assert len(letting_go) == FINE * len(usual)
     for _ in range(40):
         runner.pipeline.step(Command())
-    assert len(steps_of(runner, 1.0)) == len(usual), "it has come to rest"
-    runner.pipeline.step(Command(hand=np.array([1.0])))
+    assert len(steps_of(runner, 0.0)) == len(usual), "it has come to rest"
+    for _ in range(20):
+        runner.pipeline.step(Command(hand=np.array([1.0])))
     assert len(steps_of(runner, 0.0)) == len(usual), "there is nothing in the hand"
+
+
+def test_steps_are_shorter_while_the_hand_closes_fast():
+    runner = holding("box", 0.2, robot="xarm7_ability")
+    for _ in range(10):
+        runner.pipeline.step(Command())
+    held = steps_of(runner, 1.0)
+    for _ in range(30):
+        runner.pipeline.step(Command(hand=np.array([0.0])))
+    closing = [steps_of(runner, closure) for closure in (0.3, 0.6)]
+    assert all(steps.sum() == pytest.approx(0.05) for steps in closing)
+    assert len(closing[-1]) == CLOSING * len(held), "the fingers are on their way"
 
 
 @pytest.mark.parametrize("height", [0.1, 0.25, 0.45])
