@@ -95,11 +95,11 @@ class Terminated(KeyboardInterrupt):
     """SIGTERM or SIGHUP, where it is to end things in order as Ctrl-C does."""
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: object, known: Iterable[str]) -> str:
     """Says which known names are nearest to an unknown one.
 
     Args:
-        name: The name that was not found.
+        name: The name that was not found; nothing is near to what is no text.
         known: The names that would have been right.
 
     Returns:
@@ -110,7 +110,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
     if not names:
         return "; none is known"
     folded = {candidate.casefold(): candidate for candidate in names}
-    close = difflib.get_close_matches(name[:LONGEST].casefold(), list(folded), n=3, cutoff=0.6)
+    wrong = name[:LONGEST].casefold() if isinstance(name, str) else ""
+    close = difflib.get_close_matches(wrong, list(folded), n=3, cutoff=0.6)
     if close:
         return f"; did you mean {' or '.join(repr(folded[match]) for match in close)}?"
     return f"; known: {', '.join(names)}"

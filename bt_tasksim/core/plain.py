@@ -38,10 +38,14 @@ def short(value: object) -> str:
         return "nothing"
     if isinstance(value, dict):
         return "a mapping" if value else "an empty mapping"
-    if isinstance(value, list) and (len(value) > 8 or any(isinstance(v, (dict, list)) for v in value)):
+    if isinstance(value, (list, tuple)) and (len(value) > 8 or any(map(_holds_more, value))):
         return f"a list of {len(value)}"
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**20:
         return "a whole number of more than 20 digits"
     if isinstance(value, str):
         return shown(repr(value[:80]))
     return shown(repr(value))
+
+
+def _holds_more(value: object) -> bool:
+    return isinstance(value, (dict, list, tuple))

@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_type_hints
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -28,9 +29,9 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from bt_tasksim.core.bounded_text import LARGEST
 from bt_tasksim.core.document import Document, read_document
-from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.errors import FieldError, InputError, nearest
 from bt_tasksim.core.names import name_fault
-from bt_tasksim.core.plain import Plain, Where, short, shown, where_text
+from bt_tasksim.core.plain import Plain, Where, printable, short, shown, where_text
 from bt_tasksim.core.renamed import former_names, with_present_names
 
 if TYPE_CHECKING:
@@ -247,6 +248,35 @@ def validate(model: type[Typed], document: Document) -> Typed:
         return model.model_validate(document.value)
     except ValidationError as error:
         raise _first(error, document) from None
+
+
+def checked(model: type[Typed], values: Mapping[str, object], owner: str) -> Typed:
+    """Values that a caller gives as a model's instance.
+
+    Args:
+        model: What they may be.
+        values: By name; arrays and NumPy's numbers are taken as plain ones.
+        owner: What they belong to, for the error, such as ``an object``.
+
+    Raises:
+        FieldError: They do not fit; says the first of what is wrong.
+    """
+    try:
+        return model.model_validate({name: plain(value) for name, value in values.items()})
+    except ValidationError as error:
+        where, sentence = _sentence(_chosen(error, None))
+        raise FieldError(printable(f"{owner}: {sentence}"), *where) from None
+
+
+def plain(value: Any) -> Any:
+    """A value with lists and numbers for what NumPy makes of them, and text for paths."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, list | tuple) and type(value) in (list, tuple):
+        return type(value)(plain(v) for v in value)
+    return value
 
 
 def fault(error: ValidationError, document: Document | None = None) -> str:

@@ -15,6 +15,15 @@ _ACROSS = 0.7
 """Cosine of the angle from which two closing axes differ."""
 _MOST_AXES = 3
 _FAR = 100.0
+_ALONG = math.cos(math.radians(10.0))
+"""Cosine of the least angle between the direction in which a hand comes and that in which it closes."""
+ALONG = "a grasp's 'approach' should lie across its 'closing', and they are parallel"
+
+
+def along(closing: Sequence[float], approach: Sequence[float]) -> bool:
+    """Whether a hand would come along the direction ``(3,)`` in which its fingers close."""
+    dot = sum(a * b for a, b in zip(closing, approach, strict=True))
+    return abs(dot) > _ALONG * math.hypot(*closing) * math.hypot(*approach)
 
 
 @dataclass(frozen=True)
@@ -29,8 +38,8 @@ class GivenGrip:
         firmness: From 0 to 1.
 
     Raises:
-        InputError: A number is not finite, a direction zero, the width not positive, or the firmness beyond
-            its bounds.
+        InputError: A number is none or not finite, a direction zero, both directions the same, the width not
+            positive, or the firmness beyond its bounds.
     """
 
     point: tuple[float, float, float]
@@ -40,13 +49,35 @@ class GivenGrip:
     firmness: float = 1.0
 
     def __post_init__(self) -> None:
+        for name in ("point", "closing", "approach"):
+            object.__setattr__(self, name, _vector(name, getattr(self, name)))
         numbers = (*self.point, *self.closing, *(self.approach or ()), self.width, self.firmness)
-        if not all(math.isfinite(v) and abs(v) <= _FAR for v in numbers):
+        if not all(_is_number(v) and math.isfinite(v) and abs(v) <= _FAR for v in numbers):
             raise InputError("a grasp's numbers should be finite, and in metres")
         if any(sum(v * v for v in way) < 1e-12 for way in (self.closing, self.approach) if way is not None):
             raise InputError("a grasp's 'closing' and 'approach' should be directions, and not zero")
         if not (self.width > 0.0 and 0.0 <= self.firmness <= 1.0):
             raise InputError("a grasp's width should be positive, and its firmness between 0 and 1")
+        if self.approach is not None and along(self.closing, self.approach):
+            raise InputError(ALONG)
+
+
+def _vector(name: str, said: object) -> tuple[float, ...] | None:
+    """Three numbers as a tuple; none where the approach is left open.
+
+    Raises:
+        InputError: They are not three numbers.
+    """
+    if said is None and name == "approach":
+        return None
+    listed = said.tolist() if isinstance(said, np.ndarray) else said
+    if not isinstance(listed, list | tuple) or len(listed) != 3 or not all(map(_is_number, listed)):
+        raise InputError(f"a grasp's '{name}' should be 3 numbers, found {said!r:.60}")
+    return tuple(float(v) for v in listed)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,7 +88,7 @@ def object_fields(entry: ObjectFile, file: Path, owner: str = "the object") -> d
     grasps = []
     for i, grasp in enumerate(entry.grasps):
         with within("grasps", i):
-            grasps.append(_grip(grasp, kinds[0], size, mesh))
+            grasps.append(given_grip(grasp, kinds[0], size, mesh))
     return {
         "kinds": kinds,
         "size": size,
@@ -121,7 +121,18 @@ def _mesh(owner: str, entry: ObjectFile, file: Path) -> tuple[str, SizeRange]:
     return mesh, size
 
 
-def _grip(entry: GraspEntry, kind: str, size: SizeRange | None, mesh: str | None) -> GivenGrip:
+def given_grip(entry: GraspEntry, kind: str, size: SizeRange | None, mesh: str | None) -> GivenGrip:
+    """Where an object may be held; its width is measured where none is given.
+
+    Args:
+        entry: What somebody says of it.
+        kind: The object's kind.
+        size: Lowest and highest full size; None for its kind's.
+        mesh: The path of its mesh, for the kind ``mesh``.
+
+    Raises:
+        FieldError: There is no single size to measure the width from, or fingers meet nothing there.
+    """
     width = entry.width
     if width is None:
         low, high = size or size_range(kind, mesh)

@@ -10,7 +10,7 @@ from typing import Protocol, cast
 
 from bt_tasksim.core.errors import FieldError, InputError, nearest, within
 from bt_tasksim.core.names import check_name
-from bt_tasksim.core.plain import shown
+from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.renamed import renamed_arguments, renamed_fields
 from bt_tasksim.core.resources import is_file
 from bt_tasksim.scene import sampling
@@ -142,13 +142,17 @@ class Scene:
         goals: Sequence[Goal | GoalFunction | Judge] = (),
     ) -> None:
         put = super().__setattr__
+        objects = {} if objects is None else objects
+        _check_kinds(
+            robot, name, objects, disturbed, {"fixtures": fixtures, "spots": spots, "stages": stages}
+        )
         put("robot", str(Path(robot).resolve()) if is_file(robot) else robot)  # found from every folder
         put("spots", spots)
         put("disturbed", disturbed)
         put("stages", stages)
         put("name", name)
         put("goals", _goals(goal, goals))
-        put("objects", objects or {})
+        put("objects", objects)
         self._check_stages()
         if not name.isprintable():
             raise FieldError(f"the name of a scene should be printable, found '{shown(name)}'", "name")
@@ -310,6 +314,44 @@ def _goals(one: object, several: Sequence[object]) -> tuple[Goal | GoalFunction,
             )
         found.append(goal if isinstance(goal, Goal | GoalFunction) else GoalFunction.of(goal))
     return _Goals(found)
+
+
+_LISTED = {
+    "fixtures": ((str, FixtureSpec), "names of fixtures, or of Fixture"),
+    "spots": ((SpotSpec,), "SpotSpec"),
+    "stages": ((CurriculumStage,), "CurriculumStage"),
+}
+"""What may stand in the lists of a scene."""
+
+
+def _check_kinds(
+    robot: object, name: object, objects: object, disturbed: object, lists: Mapping[str, object]
+) -> None:
+    """What a scene is made of is of the right types.
+
+    Raises:
+        FieldError: Something is not.
+    """
+    for field_name, said, none in (
+        ("robot", robot, False),
+        ("name", name, False),
+        ("disturbed", disturbed, True),
+    ):
+        if not isinstance(said, str) and not (none and said is None):
+            raise FieldError(f"'{field_name}' should be text, found {short(said)}", field_name)
+    if not isinstance(objects, Mapping):
+        raise FieldError(
+            f"'objects' should be a mapping of names to objects, found {short(objects)}", "objects"
+        )
+    for field_name, found in lists.items():
+        kinds, words = _LISTED[field_name]
+        if not isinstance(found, Sequence) or isinstance(found, str):
+            raise FieldError(f"'{field_name}' should be a list of {words}, found {short(found)}", field_name)
+        for i, entry in enumerate(found):
+            if not isinstance(entry, kinds):
+                raise FieldError(
+                    f"'{field_name}' should be a list of {words}, found {short(entry)} in it", field_name, i
+                )
 
 
 class _Goals(tuple[Goal | GoalFunction, ...]):

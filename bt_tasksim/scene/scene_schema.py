@@ -6,11 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag
 
 from bt_tasksim.core.registry import OWN, parts
 from bt_tasksim.core.typed_file import (
-    Coordinate,
     Extent2,
     Model,
     Name,
@@ -19,20 +18,10 @@ from bt_tasksim.core.typed_file import (
     Text,
     Vector2,
     known_values,
-    sized,
 )
 from bt_tasksim.scene.object_schema import ObjectFile
+from bt_tasksim.scene.spec_fields import Distance, Extents, Gap, Heading, Position
 from bt_tasksim.scene.specs import OLD_RELATION
-
-HalfSize = Annotated[Number, Field(ge=0.0, le=100.0)]
-Extents = Annotated[tuple[HalfSize, HalfSize], Field(strict=False), sized(2)]
-"""Half sizes along x and y, metres."""
-
-
-def _two_or_three(value: object) -> object:
-    if not isinstance(value, list | tuple) or len(value) not in (2, 3):
-        raise ValueError("should be 2 or 3 numbers")
-    return value
 
 
 def _relations() -> list[str]:
@@ -54,11 +43,11 @@ class ObjectEntry(ObjectFile):
     """Middle of the area in which it is drawn, in the place's frame, m; by default the place's origin."""
     area: Extents | None = None
     """Half sizes of that area, m; by default 0 with `at`, else what an arm reaches well."""
-    heading: Annotated[Number, Field(ge=-math.tau, le=math.tau)] = math.pi
+    heading: Heading = math.pi
     """Half width of the range of its heading, rad."""
-    distance: Annotated[Number, Field(ge=0.0, le=10.0)] = 0.10
+    distance: Distance = 0.10
     """Of `beside`: between the two outlines from above, at most, m."""
-    gap: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.005
+    gap: Gap = 0.005
     """To other objects at the same height, at least, m."""
     movable: Switch = False
     """It may be shifted and tilted in a run; else it counts as knocked over where no goal names it."""
@@ -86,7 +75,7 @@ class SpotEntry(Model):
     """Half sizes of that area, m."""
     extent: Extent2 = (0.12, 0.12)
     """Full size of the spot, m."""
-    heading: Annotated[Number, Field(ge=-math.tau, le=math.tau)] = 0.0
+    heading: Heading = 0.0
     """Half width of the range of its heading, rad."""
 
 
@@ -95,9 +84,9 @@ class FixturePlacement(Model):
 
     fixture: Text
     """A bundled fixture, or a fixture file in this file's folder or below."""
-    at: Annotated[tuple[Coordinate, ...], Field(strict=False), BeforeValidator(_two_or_three)] | None = None
+    at: Position | None = None
     """Where its origin is, x y or x y z, robot base frame, m; by default where its file says."""
-    yaw: Annotated[Number, Field(ge=-math.tau, le=math.tau)] | None = None
+    yaw: Heading | None = None
     """Its heading in the robot base frame, rad; by default that of its file."""
     name: Name | None = None
     """Its own name; its places are called by it, too: `<name>`, or `<name>_<place>`."""

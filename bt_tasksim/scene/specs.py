@@ -5,18 +5,26 @@ from __future__ import annotations
 import dataclasses
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bt_tasksim.core.errors import FieldError, InputError, nearest, within
+from bt_tasksim.core.errors import FieldError, nearest, within
 from bt_tasksim.core.names import check_name
+from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.registry import parts
 from bt_tasksim.core.renamed import renamed_fields
 from bt_tasksim.core.resources import is_file
+from bt_tasksim.core.typed_file import Model, checked, plain
 from bt_tasksim.scene.geometry import Colour
 from bt_tasksim.scene.grips import GivenGrip
-from bt_tasksim.scene.object_file import load_object, object_fields, object_file
+from bt_tasksim.scene.object_file import given_grip, load_object, object_fields, object_file
+from bt_tasksim.scene.object_schema import GraspEntry
 from bt_tasksim.scene.shapes import shape_kind
+from bt_tasksim.scene.spec_fields import FixtureFields, GoalFields, HandFields, ObjectFields, SpotFields
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 SPLITS = ("all", "even", "odd")
 """Parts of a range from which draws are made, see `ObjectSpec`."""
@@ -24,8 +32,6 @@ STARTS = ("on", "inside", "beside")
 """Words that say where an object starts, and in goals where it should be."""
 MOMENTS = ("end", "once")
 """When a goal has to be true, see `Goal`."""
-FARTHEST = 100.0
-"""Metres from the robot beyond which nothing stands."""
 OLD_RELATION = "stands"
 """What files of version 0.1 call the goal relation ``on``."""
 
@@ -45,10 +51,10 @@ class ObjectSpec:
             for the place's own default.
         centre: Centre ``(2,)`` of that rectangle in the place's frame, metres.
         yaw: Half width in radians of the range of its heading.
-        size: Low and high full sizes ``((3,), (3,))`` in metres; None for the kind's own range, or the size
-            of the mesh file.
-        mass: Low and high, kg.
-        friction: Low and high friction coefficient.
+        size: Full size ``(3,)``, or low and high ones ``((3,), (3,))``, in metres; None for the kind's own
+            range, or the size of the mesh file.
+        mass: In kg, or low and high.
+        friction: Friction coefficient, or low and high.
         exponents: Low and high shape exponents ``(e1, e2)`` of a superellipsoid; or ``((e1, e2), (e1, e2))``
             where the two have ranges of their own.
         mesh: Path of a mesh file, for kind ``mesh``.
@@ -63,7 +69,7 @@ class ObjectSpec:
         gap: Metres between it and what stands at the same height, at least.
         movable: It may be shifted and tilted in a run: then it does not count as knocked over.
         file: Path of an object file, or name of a bundled one, which says what is left at its default here.
-        colour: RGB colour (sRGB, 0 to 1); None for one of its kind's.
+        colour: RGB colour (sRGB, 0 to 1), or the name of one; None for one of its kind's.
         grasps: Where two fingers may hold it, in its own frame; empty for what its kind says.
         symmetry: Order of its symmetry about z, 0 for a body of revolution; None for its kind's.
         category: What people call things like it; empty for its kind.
@@ -96,27 +102,56 @@ class ObjectSpec:
     category: str = ""
 
     def __post_init__(self) -> None:
+        for item in dataclasses.fields(self):
+            object.__setattr__(self, item.name, plain(getattr(self, item.name)))
         if self.file is not None:
+            if not isinstance(self.file, str):
+                raise FieldError(f"an object: 'file' should be text, found {short(self.file)}", "file")
             self._complete(self.file)
         if isinstance(self.kinds, str):
             object.__setattr__(self, "kinds", (self.kinds,))
-        if not self.kinds:
+        if self.kinds is None or self.kinds in ((), []):
             raise FieldError("an object needs 'kinds', or a 'file' that says what it is", "kind")
+        fields = checked(
+            ObjectFields, {name: getattr(self, name) for name in ObjectFields.model_fields}, "an object"
+        )
+        for name in ObjectFields.model_fields:
+            object.__setattr__(self, name, getattr(fields, name))
         said = [word for word in STARTS if getattr(self, word)]
         if len(said) != 1:
             found = f"found {' and '.join(map(repr, said))}" if said else "and none is given"
             raise FieldError(f"an object starts 'on', 'inside' or 'beside' one thing: {found}", *said[1:2])
-        for name in ("distance", "gap"):
-            value = getattr(self, name)
-            if not 0.0 <= value < np.inf:
-                raise FieldError(f"'{name}' of an object should be at least 0, found {value:g}", name)
         if self.split not in SPLITS:
             raise FieldError(f"unknown split '{self.split}'{nearest(self.split, SPLITS)}", "split")
         if not 0.0 <= self.size_error < 1.0:
-            raise InputError(f"'size_error' should be at least 0 and below 1, found {self.size_error:g}")
+            raise FieldError(
+                f"'size_error' should be at least 0 and below 1, found {self.size_error:g}", "size_error"
+            )
         for kind in self.kinds:
             with within("kind"):
                 shape_kind(kind)
+        if (self.mesh is not None) != any(shape_kind(kind).from_file for kind in self.kinds):
+            raise FieldError(
+                "an object's 'mesh' belongs to a kind that comes from a file, such as 'mesh': "
+                + (
+                    f"its kind is '{self.kinds[0]}'"
+                    if self.mesh is not None
+                    else "the path of a file is missing"
+                ),
+                "mesh",
+            )
+        object.__setattr__(
+            self, "grasps", tuple(map(self._measured, range(len(fields.grasps)), fields.grasps))
+        )
+
+    def _measured(self, i: int, grasp: GivenGrip | GraspEntry) -> GivenGrip:
+        """A grasp whose width is known."""
+        with within("grasps", i):
+            return (
+                grasp
+                if isinstance(grasp, GivenGrip)
+                else given_grip(grasp, self.kinds[0], self.size, self.mesh)
+            )
 
     @property
     def start(self) -> tuple[str, str]:
@@ -155,18 +190,9 @@ class FixtureSpec:
     name: str = ""
 
     def __post_init__(self) -> None:
+        _keep(self, FixtureFields, "a fixture")
         if self.name:
             check_name(self.name, "the name of a fixture")
-        if self.at is not None:
-            object.__setattr__(self, "at", tuple(float(v) for v in self.at))
-            if len(self.at) not in (2, 3) or not all(abs(v) <= FARTHEST for v in self.at):
-                raise FieldError(
-                    f"'at' of a fixture should be x and y, or x, y and z, in metres, found {self.at}", "at"
-                )
-        if self.yaw is not None and not abs(self.yaw) <= 2 * np.pi:
-            raise FieldError(
-                f"'yaw' of a fixture should be radians within a full turn, found {self.yaw:g}", "yaw"
-            )
 
 
 @dataclass(frozen=True)
@@ -180,6 +206,9 @@ class SpotSpec:
         area: Half sizes ``(2,)`` of that rectangle, metres.
         extent: Full size ``(2,)`` of the spot, metres.
         yaw: Half width in radians of the range of its heading.
+
+    Raises:
+        FieldError: A field is no good.
     """
 
     name: str
@@ -191,6 +220,7 @@ class SpotSpec:
 
     def __post_init__(self) -> None:
         check_name(self.name, "the name of a spot")
+        _keep(self, SpotFields, f"spot '{self.name}'")
 
 
 @dataclass(frozen=True)
@@ -202,12 +232,22 @@ class HandStart:
         height: Lowest and highest height above the object's centre, metres.
         aside: Half width of the square about the object's centre, metres.
         turn: Half width of the range of its turn from its neutral orientation, pointing down, radians.
+
+    Raises:
+        FieldError: A field is no good.
     """
 
     over: str
     height: tuple[float, float] = (0.20, 0.30)
     aside: float = 0.04
     turn: float = 0.4
+
+    def __post_init__(self) -> None:
+        _keep(self, HandFields, "the start of a hand")
+        if self.height[0] > self.height[1]:
+            raise FieldError(
+                f"the start of a hand: 'height' should be the lower one first, found {self.height}", "height"
+            )
 
 
 @dataclass(frozen=True, init=False)
@@ -261,7 +301,18 @@ class Goal:
         inside: str = "",
         beside: str = "",
     ) -> None:
-        named = {word: name for word, name in zip(STARTS, (on, inside, beside), strict=True) if name}
+        lengths = {
+            "position_tolerance": position_tolerance,
+            "angle_tolerance": angle_tolerance,
+            "height": height,
+            "distance": distance,
+        }
+        words = {"place": place, "on": on, "inside": inside, "beside": beside}
+        words = {name: "" if word is None else word for name, word in words.items()}
+        told = {"object": object, "relation": relation, "when": when}
+        fields = checked(GoalFields, {**told, **words, **lengths}, "a goal")
+        object, place = fields.object, fields.place
+        named = {word: name for word in STARTS if (name := getattr(fields, word))}
         if len(named) + bool(place) > 1:
             said = [f"{word}='{name}'" for word, name in named.items()]
             said = [f"'{place}'", *said] if place else said
@@ -289,21 +340,23 @@ class Goal:
         if when not in MOMENTS:
             raise FieldError(f"'when' of a goal is 'end' or 'once', found '{when}'", "when")
         given = {"object": object, "place": place, "relation": relation, "when": when}
-        lengths = {
-            "position_tolerance": position_tolerance,
-            "angle_tolerance": angle_tolerance,
-            "height": height,
-            "distance": distance,
-        }
-        for name, value in lengths.items():
-            if not 0.0 < value < np.inf:
-                raise FieldError(f"'{name}' of a goal should be positive, found {value:g}", name)
-        for name, kept in {**given, **lengths}.items():
+        for name, kept in {**given, **{name: getattr(fields, name) for name in lengths}}.items():
             super().__setattr__(name, kept)
 
     def __str__(self) -> str:
         """In words: ``cup on lower_board``."""
         return " ".join(word for word in (self.object, self.relation, self.place) if word)
+
+
+def _keep(spec: DataclassInstance, model: type[Model], owner: str) -> None:
+    """Check a spec's fields, and keep them as the model has them.
+
+    Raises:
+        FieldError: One is no good.
+    """
+    fields = checked(model, {name: getattr(spec, name) for name in model.model_fields}, owner)
+    for name in model.model_fields:
+        object.__setattr__(spec, name, getattr(fields, name))
 
 
 def object_spec(name: str, spec: ObjectSpec | str) -> ObjectSpec:
@@ -318,11 +371,11 @@ def object_spec(name: str, spec: ObjectSpec | str) -> ObjectSpec:
     """
     if isinstance(spec, ObjectSpec):
         return spec
-    found = split_start(spec)
+    found = split_start(spec) if isinstance(spec, str) else None
     if found is None:
         raise FieldError(
-            f"object '{name}': '{spec}' should read '<kind> on <place>' or 'on <place>', and 'inside' or "
-            f"'beside' likewise"
+            f"object '{name}': {shown(repr(spec))} should read '<kind> on <place>' or 'on <place>', and "
+            f"'inside' or 'beside' likewise, or be an ObjectSpec"
         )
     kind, word, reference = found
     on, inside, beside = (reference if word == each else "" for each in STARTS)

@@ -58,9 +58,12 @@ def test_furniture_that_cannot_be(fixtures, words):
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"at": (1.0,)}, "x and y, or x, y and z"),
-        ({"at": (0.0, float("nan"))}, "x and y, or x, y and z"),
-        ({"yaw": 70.0}, "within a full turn"),
+        ({"at": (1.0,)}, "'at' should be 2 or 3 numbers"),
+        ({"at": 5}, "'at' should be 2 or 3 numbers"),
+        ({"at": (0.0, float("nan"))}, "finite"),
+        ({"yaw": 70.0}, "'yaw' should be at most"),
+        ({"yaw": "a"}, "'yaw' should be a number"),
+        ({"name": 5}, "'name' should be text"),
         ({"name": "a/b"}, "the name of a fixture"),
     ],
 )

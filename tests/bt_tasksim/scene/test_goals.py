@@ -54,7 +54,12 @@ def test_ways_to_write_a_goal(goal, fields):
         (lambda: Goal("cup", inside="bin", relation="beside"), "write on='bin', relation='beside'"),
         (lambda: Goal("cup", on="cup"), "refers to 'cup' itself"),
         (lambda: Goal("cup", on="table", when="always"), "'end' or 'once', found 'always'"),
-        (lambda: Goal("cup", on="table", distance=math.nan), "'distance' of a goal should be positive"),
+        (lambda: Goal("cup", on="table", distance=math.nan), "'distance' should be .* finite"),
+        (lambda: Goal("cup", on="table", height=-1), "'height' should be positive"),
+        (lambda: Goal("cup", on="table", position_tolerance=None), "'position_tolerance' should be a number"),
+        (lambda: Goal(None, on="table"), "'object' should be text"),
+        (lambda: Goal("cup", on=5), "'on' should be text"),
+        (lambda: Goal("cup", "table", relation=None), "'relation' should be text"),
         (
             lambda: Scene(objects=OBJECTS, goals=[Goal("red", on="yellow")]),
             "names 'yellow', which is not in it",
