@@ -58,6 +58,10 @@ class Collisions:
         """What touches with the arm's joints at ``arm (n_arm,)``."""
         return self._pairs.touches(self._at(arm))
 
+    def keys(self, arm: Array) -> list[Touch]:
+        """The same by keys of things, see `Thing.key`."""
+        return self._pairs.keys(self._at(arm))
+
     def tool_rotation(self) -> Array:
         """The tool's rotation ``(3, 3)`` for the joints that were asked about last."""
         joint = self._pairs.placement(self._bodies.tool_joint)

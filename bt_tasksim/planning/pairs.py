@@ -43,14 +43,16 @@ class Pairs:
 
     def __init__(self, model: pin.Model, shapes: Any, names: Iterable[str], leave: Leave | None) -> None:
         self._model, self._shapes, self._names, self._leave = model, shapes, list(names), leave or Leave()
+        self._keys = list(self._names)
 
-    def add(self, name: str, joint: int, placement: Any, shapes: Iterable[Any]) -> range:
+    def add(self, name: str, joint: int, placement: Any, shapes: Iterable[Any], key: str = "") -> range:
         """Add shapes that move with a joint; their numbers."""
         first = self._shapes.ngeoms
         for shape in shapes:
             called = f"{name} {self._shapes.ngeoms}"
             self._shapes.addGeometryObject(pin.GeometryObject(called, joint, placement, shape))
             self._names.append(name)
+            self._keys.append(key or name)
         return range(first, self._shapes.ngeoms)
 
     def add_held(self, held: Held | None, joint: int, tool: Any) -> range:
@@ -77,7 +79,7 @@ class Pairs:
             shapes = shapes_of(thing)
             for shape in shapes:
                 shape.setSweptSphereRadius(thing.margin)
-            solids = self.add(thing.name, 0, se3(thing.pose), shapes)
+            solids = self.add(thing.name, 0, se3(thing.pose), shapes, thing.key)
             movers = [i for i in robot if not (thing.name in leave.hand and i in hand)]
             if thing.name not in leave.held:
                 movers += held
@@ -85,8 +87,9 @@ class Pairs:
 
     def compare(self, pairs: Iterable[tuple[int, int]]) -> None:
         """Compare pairs of shapes, by number, unless they may touch."""
+        names, keys, left = self._names, self._keys, set(self._leave.pairs)
         for i, k in pairs:
-            if (self._names[i], self._names[k]) not in self._leave.pairs:
+            if not left or not {(names[i], names[k]), (names[i], keys[k])} & left:
                 self._shapes.addCollisionPair(pin.CollisionPair(i, k))
 
     @cached_property
@@ -104,12 +107,18 @@ class Pairs:
         return not touched
 
     def touches(self, q: Array) -> list[Touch]:
-        """What touches for Pinocchio's ``q``, in the order in which it was added."""
+        """What touches for Pinocchio's ``q``, in the order in which it was added, by names for people."""
+        return list(dict.fromkeys((self._names[i], self._names[k]) for i, k in self._touching(q)))
+
+    def keys(self, q: Array) -> list[Touch]:
+        """The same by keys, which tell things of one name apart."""
+        return list(dict.fromkeys((self._keys[i], self._keys[k]) for i, k in self._touching(q)))
+
+    def _touching(self, q: Array) -> list[tuple[int, int]]:
         data, found, _ = self._work
         pin.computeCollisions(self._model, data, self._shapes, found, q, False)
         pairs = zip(self._shapes.collisionPairs, found.collisionResults, strict=True)
-        names = [(self._names[p.first], self._names[p.second]) for p, result in pairs if result.isCollision()]
-        return list(dict.fromkeys(names))
+        return [(p.first, p.second) for p, result in pairs if result.isCollision()]
 
     def first(self, q: Array) -> Touch | None:
         """The first of what touches for Pinocchio's ``q``; None where nothing does."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import coal
 import numpy as np
 
 from bt_tasksim.core.poses import Array
+from bt_tasksim.scene.chords import faces
 from bt_tasksim.scene.hulls import convex
 
 Touch = tuple[str, str]
@@ -18,6 +21,8 @@ Touch = tuple[str, str]
 SKIN, LEAST = 0.006, 0.4
 """Metres at a thing's surface that may be touched where it seems to be touched already, since estimates are
 wrong by some; and the share of a thin thing's width that may not."""
+_THINNEST = 1e-4
+"""Metres of the radius of the largest ball within a piece from which on it has an inside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +35,7 @@ class Thing:
         size: Full size ``(3,)`` of a box; None where ``pieces`` say what it is.
         pieces: Corners ``(n, 3)`` of convex pieces, in its own frame.
         margin: Metres of free space to keep around it.
+        key: What tells it from others of its name, see `told_apart`.
     """
 
     name: str
@@ -37,6 +43,12 @@ class Thing:
     size: tuple[float, float, float] | None = None
     pieces: Sequence[Array] = ()
     margin: float = 0.0
+    key: str = ""
+
+    @property
+    def known_as(self) -> str:
+        """What it is called among others."""
+        return self.key or self.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +74,7 @@ class Leave:
         hand: Names of things that the hand may touch.
         held: Names of things that what is held may touch.
         robot: Names of things that nothing is compared with.
-        pairs: Names of a link, or of what is held, and of what it may touch.
+        pairs: Names of a link, or of what is held, and of what it may touch, by its name or its key.
     """
 
     hand: Collection[str] = field(default_factory=frozenset)
@@ -72,19 +84,63 @@ class Leave:
 
 
 def inner(thing: Thing) -> list[Thing]:
-    """The inside of each piece of a thing, every side by `SKIN` farther in, or by as much as leaves some."""
+    """The inside of each piece of a thing that has one, see `shrunk`."""
     pieces = [box_corners(thing.size)] if thing.size is not None else thing.pieces
+    inside = [(k, shrunk(np.asarray(piece))) for k, piece in enumerate(pieces)]
     return [
-        Thing(f"the inside of {thing.name}, piece {k}", thing.pose, pieces=[_inner(np.asarray(piece))])
-        for k, piece in enumerate(pieces)
+        Thing(
+            f"the inside of {thing.name}, piece {k}",
+            thing.pose,
+            pieces=[corners],
+            key=f"the inside of {thing.known_as}, piece {k}",
+        )
+        for k, corners in inside
+        if corners is not None
     ]
 
 
-def _inner(piece: Array) -> Array:
-    low, high = piece.min(axis=0), piece.max(axis=0)
-    left = np.maximum(1.0 - 2.0 * SKIN / np.maximum(high - low, 1e-9), LEAST)
-    middle = (low + high) / 2
-    found: Array = middle + left * (piece - middle)
+def told_apart(things: Sequence[Thing]) -> list[Thing]:
+    """The things, each of those that share a name, as the boards of a shelf do, with a key of its own."""
+    shared = Counter(thing.name for thing in things)
+    return [
+        replace(thing, key=f"{thing.name}, part {k}") if shared[thing.name] > 1 and not thing.key else thing
+        for k, thing in enumerate(things)
+    ]
+
+
+def shrunk(piece: Array) -> Array | None:
+    """Corners ``(m, 3)`` of the inside of a convex piece, None where it has none.
+
+    Every face is `SKIN` farther in, or by less where the piece is so thin that less than `LEAST` of the ball
+    that fits into it were left.
+
+    Args:
+        piece: Corners ``(n, 3)`` of the piece.
+    """
+    return _shrunk(np.ascontiguousarray(piece, float).tobytes())
+
+
+@lru_cache(maxsize=1024)
+def _shrunk(corners: bytes) -> Array | None:
+    from scipy.optimize import linprog
+    from scipy.spatial import HalfspaceIntersection, QhullError
+
+    try:
+        planes = np.array(faces(np.frombuffer(corners).reshape(-1, 3)))
+        # The middle and the radius of the largest ball within the piece.
+        ball = linprog(
+            [0.0, 0.0, 0.0, -1.0],
+            A_ub=np.c_[planes[:, :3], np.ones(len(planes))],
+            b_ub=-planes[:, 3],
+            bounds=[(None, None)] * 3 + [(0.0, None)],
+        )
+        if ball.x is None or ball.x[3] < _THINNEST:
+            return None
+        planes[:, 3] += min(SKIN, (1.0 - LEAST) * float(ball.x[3]))
+        found: Array = np.unique(HalfspaceIntersection(planes, ball.x[:3]).intersections.round(9), axis=0)
+    except QhullError:  # it is flat
+        return None
+    found.setflags(write=False)
     return found
 
 

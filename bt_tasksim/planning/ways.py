@@ -24,7 +24,7 @@ from bt_tasksim.planning.collision import Collisions
 from bt_tasksim.planning.lines import STEP, line
 from bt_tasksim.planning.route import Pace, Route, timed
 from bt_tasksim.planning.search import Search
-from bt_tasksim.planning.things import Held, Leave, Thing, Touch, inner
+from bt_tasksim.planning.things import Held, Leave, Thing, Touch, inner, told_apart
 from bt_tasksim.robot.description import RobotDescription
 
 _TURNING = 0.2
@@ -85,7 +85,7 @@ class WayFinder:
         self.arm = arm_of(robot)
         self.start = np.clip(joints, robot.arm_lower, robot.arm_upper)
         self._robot, self._held = robot, held
-        self._hand, self._things, self._leave = hand, things, leave or Leave()
+        self._hand, self._things, self._leave = hand, told_apart(things), leave or Leave()
 
     @property
     def goes_straight(self) -> bool:
@@ -107,14 +107,16 @@ class WayFinder:
         """What counts on the way: of what touches at the beginning less margin, or else nothing."""
         if self.collisions.free(self.start):
             return self.collisions
-        near = {name for touch in self.collisions.touches(self.start) for name in touch}
+        near = {key for touch in self.collisions.keys(self.start) for key in touch}
+
+        def less(share: float) -> list[Thing]:
+            return [_with(thing, share) if thing.known_as in near else thing for thing in self._things]
+
         for share in LESS:
-            found = self._among(
-                [_with(thing, share) if thing.name in near else thing for thing in self._things]
-            )
+            found = self._among(less(share))
             if found.free(self.start):
                 return found
-        return self._left([_with(thing, 0.0) if thing.name in near else thing for thing in self._things])
+        return self._left(less(0.0))
 
     @cached_property
     def _rooms(self) -> list[Collisions | _Leaving]:
@@ -133,10 +135,10 @@ class WayFinder:
         found = self._among(things)
         if found.free(self.start):
             return found
-        touches = found.touches(self.start)
-        names = {name for touch in touches for name in touch}
-        within = [*things, *(piece for thing in things if thing.name in names for piece in inner(thing))]
-        return self._among(within, [*touches, *self._among(within, touches).touches(self.start)])
+        touches = found.keys(self.start)
+        near = {key for touch in touches for key in touch}
+        within = [*things, *(piece for thing in things if thing.known_as in near for piece in inner(thing))]
+        return self._among(within, [*touches, *self._among(within, touches).keys(self.start)])
 
     def _among(self, things: Sequence[Thing], pairs: Collection[Touch] = ()) -> Collisions:
         leave = replace(self._leave, pairs={*self._leave.pairs, *pairs})

@@ -24,9 +24,9 @@ def chords(pieces: Sequence[Array], points: Array, directions: Array) -> Array:
     """
     enters, leaves = np.full(len(points), np.inf), np.full(len(points), -np.inf)
     for piece in pieces:
-        faces = _faces(np.ascontiguousarray(piece, float).tobytes())
-        beyond = points @ faces[:, :3].T + faces[:, 3]  # positive outside
-        slope = directions @ faces[:, :3].T
+        planes = faces(piece)
+        beyond = points @ planes[:, :3].T + planes[:, 3]  # positive outside
+        slope = directions @ planes[:, :3].T
         flat = np.abs(slope) < _LEVEL
         at = -beyond / np.where(flat, 1.0, slope)
         first = np.max(np.where(~flat & (slope < 0.0), at, -np.inf), axis=-1)
@@ -37,9 +37,16 @@ def chords(pieces: Sequence[Array], points: Array, directions: Array) -> Array:
     return np.where(leaves > enters, leaves - enters, 0.0)
 
 
+def faces(corners: Array) -> Array:
+    """The planes ``(f, 4)`` of the hull of ``corners (n, 3)``.
+
+    Outward unit normals, and minus their distance from zero.
+    """
+    return _faces(np.ascontiguousarray(corners, float).tobytes())
+
+
 @lru_cache(maxsize=_KEPT)
 def _faces(corners: bytes) -> Array:
-    """The planes ``(f, 4)`` of a convex hull: outward unit normals, and minus their distance from zero."""
     from scipy.spatial import ConvexHull
 
     found: Array = ConvexHull(np.frombuffer(corners).reshape(-1, 3)).equations

@@ -100,6 +100,19 @@ def test_nobody_goes_through_what_touches_at_the_beginning(panda):
     assert found.straight([panda.pose(*RIGHT), back]) is not None
 
 
+def test_what_touches_at_the_beginning_is_one_board_and_not_all_of_its_shelf(panda):
+    """A finger that seems to be deep in one board may leave that, and goes through no other one."""
+    tip = panda.arm.tool(panda.posture(*RIGHT))[:3]
+    own = panda.box(tip, (0.02, 0.2, 0.02), name="shelf")
+    other = panda.box((RIGHT[0], RIGHT[1], RIGHT[2] + 0.3), (0.3, 0.3, 0.02), name="shelf")
+    found = finder(panda, own, other)
+    assert not found.collisions.free(found.start) and found.on_the_way.free(found.start)
+    assert {name for _, name in found.collisions.touches(found.start)} == {"shelf"}
+    through = panda.posture(RIGHT[0], RIGHT[1], RIGHT[2] + 0.3)
+    assert not found.on_the_way.free(through)
+    assert finder(panda, own).on_the_way.free(through)
+
+
 def test_a_way_that_begins_close_to_something_keeps_the_usual_room_farther_on(panda):
     """A long wall beside the hand: it draws away, and does not go along that as closely as it began."""
     wall = panda.box((RIGHT[0] + 0.1, 0.0, 0.1), (0.02, 1.0, 0.35), 0.09, "wall")
