@@ -10,6 +10,8 @@ from bt_tasksim.core.units import METRES
 NOT_HELD = register_reason("not_held", "{object} is not held ({distance} from the tool)", distance=METRES)
 HOLDING = "holding"
 """Name of the goal that `Grasp` reaches, `Pick`, `Bring` and `Place` maintain, and `Release` ends."""
+REACH = 0.03
+"""Metres by which the estimate of something that is held may lie outside the grasp."""
 
 
 def tool_distance(seen: Seen, target: str) -> Array:
@@ -22,7 +24,7 @@ def tool_distance(seen: Seen, target: str) -> Array:
     return norm(xp.maximum(beside, xp.zeros_like(beside)))
 
 
-def holding(seen: Seen, target: str, reach: float = 0.03) -> Array:
+def holding(seen: Seen, target: str, reach: float = REACH) -> Array:
     """Boolean ``(N,)``: opposing fingertips touch something, and the object is where the tool is.
 
     Args:

@@ -15,14 +15,15 @@ from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, ObjectName, PlaceName, Seconds
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
-from bt_tasksim.concept_nodes.carry import straight_path
-from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING
+from bt_tasksim.concept_nodes.closer import TOUCHING
 from bt_tasksim.concept_nodes.holding import HOLDING
 from bt_tasksim.concept_nodes.inside_of import beyond_walls
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
+from bt_tasksim.concept_nodes.retreat import Retreat, clear_retreat, retreat_path
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import Form, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
@@ -30,8 +31,7 @@ from bt_tasksim.core.units import COUNT, METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.reference_motion import Path, posture, sample
 from bt_tasksim.planning.things import Leave
-from bt_tasksim.planning.ways import WayFinder
-from bt_tasksim.robot.kinematics.hand import SLIDE, SPARE, opened_about, standing_side, wide_at
+from bt_tasksim.robot.kinematics.hand import SPARE, opened_about, standing_side, wide_at
 
 OPENED = Form(
     "hand {opening} open, {contacts} fingertips in contact, {force} at the wrist{touch}",
@@ -60,8 +60,6 @@ OPEN = 0.15
 UP = np.array([0.0, 0.0, 1.0])
 SPARES = (0.006, 0.010, 0.014, 0.018, SPARE)
 """Metres by which a jaw that swings opens wider than what it lets go of, the last where there is room."""
-SHARES = (1.0, 0.75, 0.5, 0.25)
-"""Shares of the retreat that are tried where not all of it is clear."""
 
 
 class ReleaseMemory(NamedTuple):
@@ -80,20 +78,6 @@ class ReleaseMemory(NamedTuple):
     end: Array
     opened: Array
     start_pose: Array
-
-
-class _Back(NamedTuple):
-    """How a hand draws back.
-
-    Attributes:
-        away: Displacement ``(3,)`` in all, metres.
-        joints: Joints ``(n, n_arm)`` along the way; none where it stays.
-        aside: The same for what comes first: a finger that stands still goes away from what it touches.
-    """
-
-    away: Array
-    joints: Array
-    aside: Array
 
 
 @register("concept")
@@ -138,29 +122,19 @@ class Release(ConceptModel[ReleaseMemory]):
         worlds = views(seen)
         opened = [_opened(view, self.target) for view in worlds]
         found = [self._clear(view, hand) for view, hand in zip(worlds, opened, strict=True)]
-        goal = poses.shifted(seen.tool, constant(np.array([way.away for way in found]), seen.tool))
-        aside = [] if standing_side(seen.robot) is None else [way.aside for way in found]
-        path = straight_path(seen, goal, self.speed, [way.joints for way in found], aside)
+        path = retreat_path(seen, found, self.speed)
         before = -array_namespace(seen.tool).ones_like(path.duration)
         ends = constant(np.array([float(seen.robot.closure(hand)) for hand in opened]), seen.tool)
         return ReleaseMemory(path, seen.closure, ends, before, seen.object(self.target))
 
-    def _clear(self, view: WorldView, hand: Array) -> _Back:
+    def _clear(self, view: WorldView, hand: Array) -> Retreat:
         """Where the open hand draws back to, touching nothing; where nothing is clear it stays."""
-        for closer in (CLOSER, TOUCHING):
-            finder = view.finder(hand=hand, leave=Leave(hand={self.target}), closer=closer)
-            beside = _beside(finder, view)
-            begin = finder.start if beside is None else beside.joints[-1]
-            tool = view.tool if beside is None else poses.shifted(view.tool, beside.away)
-            for direction in (-poses.z_axis(view.tool[3:]), UP):
-                for share in SHARES:
-                    end = poses.shifted(tool, share * self.retreat * direction)
-                    joints = finder.straight([tool, end], start=begin, leans=finder.leanings[-1])
-                    if joints is not None:
-                        aside = begin[None][:0] if beside is None else beside.joints
-                        return _Back(end[:3] - view.tool[:3], np.concatenate([begin[None], joints]), aside)
-        nothing = finder.start[None][:0]
-        return _Back(np.zeros(3), nothing, nothing)
+        try:
+            ways = [-poses.z_axis(view.tool[3:]), UP]
+            return clear_retreat(view, hand, self.retreat, ways, {self.target})
+        except NoWayError:
+            nothing = np.zeros((0, len(view.arm)))
+            return Retreat(np.zeros(3), nothing, nothing)
 
     def command(self, action: Array, seen: Seen, memory: ReleaseMemory) -> Command:
         """Open, then draw back."""
@@ -243,18 +217,3 @@ def _opened(view: WorldView, target: str) -> Array:
         if not finder.collisions.free(finder.start):
             return found[k]
     return found[-1]
-
-
-def _beside(finder: WayFinder, view: WorldView) -> _Back | None:
-    """How a finger that stands still goes away from what it touches; None where none does, or has no room.
-
-    Opened by the other finger alone, a hand takes along what leans on this one when it draws back.
-    """
-    side = standing_side(view.robot)
-    if side is None:
-        return None
-    away = math.copysign(SLIDE, side) * poses.to_matrix(view.tool[3:])[:, 1]
-    joints = finder.straight([view.tool, poses.shifted(view.tool, away)])
-    if joints is None:
-        return None
-    return _Back(away, np.concatenate([finder.start[None], joints]), joints[:0])

@@ -11,7 +11,7 @@ from bt_tasksim.trees.backchain import asked_by, condition_leaf
 from bt_tasksim.trees.nodes.fallback import fallback
 from bt_tasksim.trees.nodes.retry import Retry, retry
 from bt_tasksim.trees.nodes.sequence import sequence
-from bt_tasksim.trees.stages import Stage, acting, asks_itself, cut, same
+from bt_tasksim.trees.stages import Stage, acting, asks_itself, cut, each_once, is_in_hand, same
 
 
 def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -> Behaviour:
@@ -20,8 +20,9 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
     The sequence is cut into stages, one for each time that something is held, by the goals that its concepts
     ``reaches`` and ``ends``. A stage is guarded by what it ``establishes``: where that holds it is skipped,
     and it is asked again after the stage, and at the end of all. Whatever fails begins another attempt. In
-    it the hand first opens and draws back, unless it is free, and waits until nothing moves; then the first
-    stage that is not done has its turn. Each attempt plans anew, from what is seen then.
+    it the hand first opens and draws back, unless it is free or all is done and what it holds is to be held,
+    and waits until nothing moves; then the first stage that is not done has its turn. Each attempt plans
+    anew, from what is seen then.
 
     A guard before each action, so that a tree goes on from whatever it finds, is the form of
     M. Colledanchise, D. Almeida and P. Ögren, "Towards blended reactive planning and acting using behavior
@@ -52,12 +53,17 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
         body.children.clear()
     limit = -1 if rounds < 0 else rounds + (attempts - 1) * len(stages)
     called = name or tree.name
-    work = sequence(called, hand_is_free(), *(_made(stage) for stage in row), *_checks(row))
+    free = hand_is_free(*_held_as_wanted(stages))
+    work = sequence(called, free, *(_made(stage) for stage in row), *_checks(row))
     return retry(limit, work, name=f"{called}, recovering")
 
 
-def hand_is_free() -> Behaviour:
-    """The hand is free; else it becomes so, whichever way the arm can go, and things come to rest."""
+def hand_is_free(*unless: Behaviour) -> Behaviour:
+    """The hand is free; else it becomes so, whichever way the arm can go, and things come to rest.
+
+    Args:
+        unless: Asked first: where it holds the hand keeps what it has.
+    """
     away = fallback(
         "open and withdraw",
         Withdraw(name="back"),
@@ -65,7 +71,7 @@ def hand_is_free() -> Behaviour:
         Withdraw(direction=(-1.0, 0.0, 0.0), name="towards the robot"),
     )
     free = sequence("begin anew", away, Settle(name="let things come to rest"))
-    return fallback("hand is free", HandEmpty(name="hand empty"), free)
+    return fallback("hand is free", *unless, HandEmpty(name="hand empty"), free)
 
 
 def _children(body: Behaviour) -> list[Behaviour]:
@@ -97,6 +103,18 @@ def _made(stage: Stage) -> Behaviour:
     guards = [condition_leaf(guard) for guard in stage.guards]
     guard = guards[0] if len(guards) == 1 else sequence(f"{actor} is so", *guards)
     return fallback(f"{actor} is done", guard, work)
+
+
+def _held_as_wanted(stages: list[Stage]) -> list[Behaviour]:
+    """What asks whether all is done, where at last something is to be in the hand: it is not dropped then.
+
+    Args:
+        stages: Those that are guarded, in order.
+    """
+    if not any(is_in_hand(guard) for guard in stages[-1].guards):
+        return []
+    asked = [condition_leaf(guard) for guard in each_once(g for stage in stages for g in stage.guards)]
+    return [asked[0] if len(asked) == 1 else sequence("all is so", *asked)]
 
 
 def _checks(row: list[Stage]) -> list[Behaviour]:

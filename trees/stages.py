@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
@@ -95,8 +95,8 @@ def lasting(leaves: Sequence[ConceptNode]) -> Wanted | None:
     for leaf in leaves:
         held = held_after(held, [leaf])
         about = [asked for asked in after(act_of(leaf)) if leaf.model.actor in asked.arguments.values()]
-        lasts = [asked for asked in about if held or not _in_hand(asked)]
-        if found is not None and _in_hand(found) and not held:
+        lasts = [asked for asked in about if held or not is_in_hand(asked)]
+        if found is not None and is_in_hand(found) and not held:
             found = None
         found = lasts[0] if lasts else found
     return found
@@ -120,10 +120,7 @@ def _stage(nodes: Sequence[Behaviour]) -> Stage:
         return Stage(tuple(nodes), (own,), own=True)
     leaves = [leaf for node in nodes for leaf in acting(node)]
     found = [lasting(leaves), *(asked_by(node) for node in nodes[_end(nodes) :])]
-    guards: list[Wanted] = []
-    for guard in found:
-        if guard is not None and not any(same(guard, other) for other in guards):
-            guards.append(guard)
+    guards = each_once(guard for guard in found if guard is not None)
     if not guards:
         last = leaves[-1]
         raise InputError(
@@ -138,6 +135,15 @@ def _end(nodes: Sequence[Behaviour]) -> int:
     return 1 + max(k for k, node in enumerate(nodes) if any(acting(node)))
 
 
+def each_once(asked: Iterable[Wanted]) -> list[Wanted]:
+    """Conditions in order, without those that ask what one before them does."""
+    found: list[Wanted] = []
+    for one in asked:
+        if not any(same(one, other) for other in found):
+            found.append(one)
+    return found
+
+
 def same(first: Wanted, second: Wanted) -> bool:
     """Two conditions ask the same, whether defaults are given or not."""
     kind = condition_named(first.condition)
@@ -146,5 +152,6 @@ def same(first: Wanted, second: Wanted) -> bool:
     )
 
 
-def _in_hand(asked: Wanted) -> bool:
+def is_in_hand(asked: Wanted) -> bool:
+    """A condition that can hold only while the object is in the hand."""
     return condition_named(asked.condition).in_hand

@@ -7,7 +7,7 @@ import pytest
 from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import ONE
-from bt_tasksim.concept_nodes import Release
+from bt_tasksim.concept_nodes import Release, retreat
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import TIMED_OUT
 from bt_tasksim.robot.kinematics.hand import SLIDE
@@ -75,7 +75,7 @@ def test_a_hand_that_still_touches_something_is_not_done(toy):
 
 def test_a_finger_that_stands_still_goes_aside_before_the_hand_draws_back(toy, monkeypatch):
     module = sys.modules[Release.__module__]
-    monkeypatch.setattr(module, "standing_side", lambda robot: -0.007)
+    monkeypatch.setattr(retreat, "standing_side", lambda robot: -0.007)
     monkeypatch.setattr(module, "_opened", lambda view, target: view.robot.hand_open)
     stage = start(toy, Release("cup", retreat=0.12, opening=0.4))
     first = stage.world.now.tool_pose.copy()

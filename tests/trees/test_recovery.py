@@ -170,6 +170,39 @@ def test_the_hand_is_freed_before_anything_else(toy):
     assert stage.tree.tip().model == Withdraw.value()
 
 
+LIFTED = Goal("cup", "table", relation="lifted")
+
+
+def lifted(stage):
+    """The cup hangs in the hand."""
+    stage.world.hold("cup")
+    stage.look()
+    return stage
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        lambda: tidy([LIFTED]),
+        lambda: sequence("take it", Grasp("cup"), Pick("cup", distance=0.1)),
+        lambda: sequence("look and take it", Upright("box"), Grasp("cup"), Pick("cup"), Upright("cup")),
+    ],
+)
+def test_what_is_to_be_held_and_is_held_is_not_dropped(toy, tree):
+    stage = lifted(toy(recovering(tree())))
+    assert stage.tick() == Status.SUCCESS and not stage.world.steps
+
+
+def test_what_is_held_is_let_go_while_something_else_is_to_be_done_first(toy):
+    tree = recovering(tidy([Goal("box", "goal"), LIFTED]))
+    stage = lifted(toy(tree))
+    stage.tick()
+    assert stage.tree.tip().model == Withdraw.value()
+    stage = toy(tree)
+    stage.world.stand("box", "goal")
+    assert lifted(stage).tick() == Status.SUCCESS and not stage.world.steps
+
+
 # ---- in physics ------------------------------------------------------------------------------------------
 
 KNOCKED = "pick_and_place_recovering"
