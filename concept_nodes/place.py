@@ -271,7 +271,8 @@ class Place(ConceptModel[PlaceMemory]):
 
     def _turned(self, view: WorldView) -> Array:
         """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first."""
-        if self.on is None or self.anywhere or self.distance is not None:
+        here = self.on in view.world.places or self.on in view.objects
+        if self.on is None or not here or self.anywhere or self.distance is not None:
             return np.zeros((0, 7))
         now = view.objects[self.target]
         options = nearest_first(standing_options(view, self.target, self.on), now[3:])[1 : 1 + OTHERS]

@@ -149,7 +149,9 @@ def test_a_gripper_of_two_fingers_rather_keeps_room():
 
 def test_what_would_hardly_be_held_is_no_firm_grasp(view):
     """Without a firm one it is taken where others may be, too."""
-    poor = SimpleNamespace(holds=lambda tool: HARDLY, centred=lambda tool: tool, asks=False)
+    poor = SimpleNamespace(
+        holds=lambda tool: HARDLY, centred=lambda tool: tool, risk=lambda tool, width: 0.0, asks=False
+    )
     tools = candidates(view, "box", DOWN, view.tool[3:])
     found = []
     for firmly in (False, True):
