@@ -225,27 +225,31 @@ class RobotDescription:
         return span / float(span @ span)
 
 
-def load_robot(name: str) -> RobotDescription:
+def load_robot(name: str, urdf: Path | None = None) -> RobotDescription:
     """A robot by name, or one from a data file by path.
 
     What is registered as a ``robot`` is the path of its data file, or a `RobotDescription`.
+
+    Args:
+        name: The name, or the path.
+        urdf: Its URDF, where the one that its file names is in a package that is not installed here.
 
     Raises:
         InputError: No such robot, its URDF is not to be found, or the file lacks or misstates something.
     """
     found = named_data("robot", name, RobotDescription)
-    return found if isinstance(found, RobotDescription) else _load(found, file_version(found))
+    return found if isinstance(found, RobotDescription) else _load(found, file_version(found), urdf)
 
 
 @lru_cache(maxsize=32)
-def _load(path: Path, version: tuple[int, ...]) -> RobotDescription:
+def _load(path: Path, version: tuple[int, ...], urdf: Path | None) -> RobotDescription:
     """The robot in this version of a file."""
     from bt_tasksim.core.typed_file import load_typed
     from bt_tasksim.robot.schema import RobotFile
 
     data, document = load_typed(RobotFile, path, "robot file")
     with located(document):
-        return _description(data, path)
+        return _description(data, path, urdf)
 
 
 def described(data: RobotFile, path: Path) -> RobotDescription:
@@ -261,12 +265,12 @@ def described(data: RobotFile, path: Path) -> RobotDescription:
     return _description(data, path)
 
 
-def _description(data: RobotFile, path: Path) -> RobotDescription:
+def _description(data: RobotFile, path: Path, urdf: Path | None = None) -> RobotDescription:
     arm, hand, tool = data.arm, data.hand, data.tool
     n_arm, n_hand = len(arm.joints), len(hand.joints)
     synergies = hand.synergies or {}
     with within("urdf"):
-        urdf = _urdf_path(data.urdf, path)
+        urdf = urdf or _urdf_path(data.urdf, path)
     robot = RobotDescription(
         name=data.name,
         urdf=urdf,

@@ -18,7 +18,6 @@ from typing import IO, Any
 
 from bt_tasksim.core import child
 from bt_tasksim.core.closing import Closing
-from bt_tasksim.core.document import read_document
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.interrupts import ending
 from bt_tasksim.hardware.ros.setting import load_setting
@@ -94,15 +93,14 @@ class Twin(Closing):
         self.bridge: subprocess.Popen[Any] | None = None
         self.node: subprocess.Popen[Any] | None = None
         self.camera: subprocess.Popen[Any] | None = None
-        robot_file = self._home / "robot.yaml"
-        robot_file.write_text(_with_urdf(robot, self._home))
         world = self._home / "configuration.json"
         world.write_text(configuration.to_json())
         self._command = [
             str(self._python / "bin" / "python"),
             "-m",
             "bt_tasksim.hardware.twin.node",
-            *("--robot", str(robot_file), "--ros", str(setting.source), "--configuration", str(world)),
+            *("--robot", str(robot.source), "--urdf", str(robot.urdf)),
+            *("--ros", str(setting.source), "--configuration", str(world)),
             *("--seed", str(seed), "--evaluation-port", str(self.evaluation_port)),
             *(("--gap", os.path.abspath(gap)) if gap else ()),
             *("--parent", str(os.getpid()), "--home", str(self._home)),
@@ -245,11 +243,3 @@ def free_port() -> int:
     """A port that nobody listens at."""
     with socket.create_server((LOOPBACK, 0)) as server:
         return int(server.getsockname()[1])
-
-
-def _with_urdf(robot: RobotDescription, home: Path) -> str:
-    """The robot's data file with its URDF by a link beside it: the twin has no simulator's package."""
-    (home / "urdf").symlink_to(robot.urdf.parent)
-    data = read_document(robot.source, "robot file").value
-    assert isinstance(data, dict)
-    return json.dumps({**data, "urdf": f"urdf/{robot.urdf.name}"})

@@ -1,9 +1,9 @@
 """The twin as a ROS 2 node: the topics of a robot's cell. Runs in the twin's own virtual environment.
 
-``python -m bt_tasksim.hardware.twin.node --robot FILE --ros FILE --configuration FILE`` prints one line with
-``ready PORT``, the port of the evaluation channel, and goes on until it is stopped. One thread runs physics
-in real time and takes messages between two steps (`loop`); steps that are late are caught up with, up to a
-tenth of a second.
+``python -m bt_tasksim.hardware.twin.node --robot FILE --urdf FILE --ros FILE --configuration FILE`` prints a
+line with ``ready PORT``, the port of the evaluation channel, and goes on until it is stopped. One thread runs
+physics in real time and takes messages between two steps (`loop`); steps that are late are caught up with, up
+to a tenth of a second.
 """
 
 from __future__ import annotations
@@ -274,6 +274,7 @@ def main() -> int:
     """Run the twin; returns the exit status."""
     parser = argparse.ArgumentParser(description="The twin of a robot's cell, as a ROS 2 node.")
     parser.add_argument("--robot", required=True, metavar="FILE")
+    parser.add_argument("--urdf", type=Path, metavar="FILE", help="of the robot, whose package is not here")
     parser.add_argument("--ros", required=True, metavar="FILE")
     parser.add_argument("--configuration", required=True, type=Path, metavar="FILE")
     parser.add_argument("--gap", default="", metavar="FILE")
@@ -284,7 +285,7 @@ def main() -> int:
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
-        robot = load_robot(options.robot)
+        robot = load_robot(options.robot, options.urdf)
         setting = load_setting(robot, options.ros)
         configuration = ActorConfiguration.from_json(options.configuration.read_text())
         gap = load_gap(options.gap)
