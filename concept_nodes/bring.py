@@ -32,7 +32,7 @@ from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, DROPPED, NARROWLY,
 from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, resting_place
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.spots import GAP, Spots, spots_beside, spots_on
-from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of
+from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of, tipped
 from bt_tasksim.concept_nodes.surface import top_frame, upright
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, views
 from bt_tasksim.core import poses
@@ -68,6 +68,8 @@ of the usual speed, the same closeness where it is put down, and metres above it
 SLANTED = (CARRIED, 1.0, BROUGHT, 0.0), (BROUGHT, SLOWER, TOUCHING, 0.0)
 """The same for an arm of few joints where nothing else serves: what has turned in its hand it sets down
 slanted."""
+TIPPING = ((BROUGHT, SLOWER, TOUCHING, DROPPED),)
+"""The same for other arms, which lean it on purpose, see `tipped`."""
 SPOT_ROOMS = (CARRIED, CARRIED), (CARRIED, BROUGHT), (BROUGHT, BROUGHT), (BROUGHT, TOUCHING)
 """The same two closenesses over and on free spots, for all of which one is tried before the next."""
 LOWER = (1.0, 0.4, 0.15)
@@ -359,19 +361,32 @@ def _found(
         NoWayError: There is no way.
     """
 
+    few = len(view.arm) < FULL
+    leaning = None if few else _leaning(view, target, goals)
+
     def find(room: tuple[float, float, float, float, float]) -> tuple[list[Array], Route | None]:
         closer, share, down, above, leans = room
         pace = Pace(share * speed)
         pace = pace._replace(acceleration=share**2 * pace.acceleration)
-        way = _Way(view, target, goals, pace, closer, down, above, leans)
+        ends = goals if leans <= LEANS or leaning is None else leaning
+        way = _Way(view, target, ends, pace, closer, down, above, leans)
         straight = way.straight(proposed)
         if straight is not None and proposed.via and share == 1.0:
             return straight, None
         rounded = None if straight is None else way.rounded(straight)
-        return [view.tool, goals.first], way.searched() if rounded is None else rounded
+        return [view.tool, ends.first], way.searched() if rounded is None else rounded
 
-    slanted = SLANTED if len(view.arm) < FULL else ()
+    slanted = SLANTED if few else TIPPING if leaning is not None else ()
     return with_room([*((*room, LEANS) for room in ROOMS), *((*room, SET_DOWN) for room in slanted)], find)
+
+
+def _leaning(view: WorldView, target: str, goals: _Goals) -> _Goals | None:
+    """The same goals with the object leaning in them; None where it may end in one pose alone."""
+    if goals.options is None:
+        return None
+    grip = poses.relative(view.objects[target], view.tool)
+    leaning = tipped(goals.options, grip)
+    return goals._replace(first=poses.multiply(leaning[0], grip), options=leaning)
 
 
 class _Way:

@@ -32,7 +32,7 @@ from bt_tasksim.concept_nodes.closer import DROPPED, PUT_DOWN, TOUCHING, with_ro
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
-from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of
+from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of, tipped
 from bt_tasksim.concept_nodes.surface import (
     NEAR,
     apart,
@@ -256,7 +256,7 @@ class Place(ConceptModel[PlaceMemory]):
         return standing_pose(frame, now, model)
 
     def _found(self, view: WorldView, goal: Array) -> tuple[Array, Route]:
-        """The tool pose ``(7,)`` to go to, and the way; turned by its symmetry where it cannot stay so.
+        """The tool pose ``(7,)`` to go to, and the way; turned by its symmetry, or tipped, where it cannot stay so.
 
         Raises:
             NoWayError: There is none; says what would touch what as it is held now.
@@ -270,13 +270,19 @@ class Place(ConceptModel[PlaceMemory]):
             raise
 
     def _turned(self, view: WorldView) -> Array:
-        """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first."""
+        """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first.
+
+        Those last in which it leans there; an arm of few joints leans it by itself.
+        """
         here = self.on in view.world.places or self.on in view.objects
         if self.on is None or not here or self.anywhere or self.distance is not None:
             return np.zeros((0, 7))
         now = view.objects[self.target]
-        options = nearest_first(standing_options(view, self.target, self.on), now[3:])[1 : 1 + OTHERS]
-        return poses.multiply(options, poses.relative(now, view.tool)[None]) + self.overshoot * self._along
+        grip = poses.relative(now, view.tool)
+        options = nearest_first(standing_options(view, self.target, self.on), now[3:])
+        leaning = tipped(options[:1], grip) if len(view.arm) >= FULL else options[:0]
+        tried = np.concatenate([options[1 : 1 + OTHERS], leaning])
+        return poses.multiply(tried, grip[None]) + self.overshoot * self._along
 
     def _down(self, view: WorldView, goal: Array) -> Route:
         """The way down to a tool pose ``(7,)``: straight where the arm can go straight, else as it can.

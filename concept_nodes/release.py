@@ -67,7 +67,8 @@ class ReleaseMemory(NamedTuple):
 
     Attributes:
         path: Tool path away from the object.
-        start: Closure ``(N,)`` at the begin.
+        start: Closure ``(N,)`` from which it is told to open.
+        held: Closure ``(N,)`` at the begin.
         end: Closure ``(N,)`` to which it opens.
         opened: Seconds ``(N,)`` since the hand was seen open; negative before.
         start_pose: Estimated pose ``(N, 7)`` of the object at the begin.
@@ -75,6 +76,7 @@ class ReleaseMemory(NamedTuple):
 
     path: Path
     start: Array
+    held: Array
     end: Array
     opened: Array
     start_pose: Array
@@ -125,7 +127,10 @@ class Release(ConceptModel[ReleaseMemory]):
         path = retreat_path(seen, found, self.speed)
         before = -array_namespace(seen.tool).ones_like(path.duration)
         ends = constant(np.array([float(seen.robot.closure(hand)) for hand in opened]), seen.tool)
-        return ReleaseMemory(path, seen.closure, ends, before, seen.object(self.target))
+        # A hand that presses is told to be farther shut than it can be, and lets go of that first: else fingers
+        # that lag differently push what they hold as they part.
+        start = array_namespace(before).where(seen.opposed(), -before, seen.closure)
+        return ReleaseMemory(path, start, seen.closure, ends, before, seen.object(self.target))
 
     def _clear(self, view: WorldView, hand: Array) -> Retreat:
         """Where the open hand draws back to, touching nothing; where nothing is clear it stays."""
@@ -147,7 +152,7 @@ class Release(ConceptModel[ReleaseMemory]):
     def advance(self, action: Array, seen: Seen, memory: ReleaseMemory) -> ReleaseMemory:
         """Notice when the hand is open."""
         xp = array_namespace(seen.tool)
-        slack = poses.clip(memory.start - memory.end, 0.0, 4.0 * OPEN) / 4.0
+        slack = poses.clip(memory.held - memory.end, 0.0, 4.0 * OPEN) / 4.0
         slack = xp.where(memory.end > 0.0, slack, xp.full_like(slack, OPEN))
         open_now = (seen.elapsed > self.opening) & (seen.closure < memory.end + slack)
         begun = xp.where(open_now, xp.zeros_like(memory.opened), memory.opened)

@@ -13,6 +13,9 @@ from bt_tasksim.core.world import ObjectModel
 
 HEADINGS = 12
 """Headings that are tried where any will do."""
+TIPPED = (0.07, 0.14)
+"""Radians by which something may lean that is put down where it cannot stand upright at once: what has turned in
+a hand of fingers that swing. It stands up when it is let go. Less than `place.LEANING`."""
 
 
 def standing_options(view: WorldView, target: str, reference: str, hover: float = 0.0) -> Array:
@@ -65,3 +68,19 @@ def nearest_first(options: Array, rotation: Array) -> Array:
     angles = poses.angle_between(options[:, 3:], rotation[None])
     found: Array = options[np.argsort(angles, kind="stable")]
     return found
+
+
+def tipped(options: Array, grip: Array) -> Array:
+    """The same poses ``(4 k, 7)`` of an object, leaning by `TIPPED`, the least first.
+
+    They lean about the tool's x axis: in the plane across it fingers swing, and turn what they close on.
+
+    Args:
+        options: Poses ``(k, 7)``.
+        grip: The tool's pose ``(7,)`` in the object.
+    """
+    axes = poses.to_matrix(poses.multiply(options, grip[None])[:, 3:])[:, :, 0]
+    leans = [angle for least in TIPPED for angle in (least, -least)]
+    turns = [np.concatenate([[np.cos(a / 2)], np.sin(a / 2) * axis]) for a in leans for axis in axes]
+    rotations = poses.quat_multiply(np.array(turns), np.tile(options[:, 3:], (len(leans), 1)))
+    return np.concatenate([np.tile(options[:, :3], (len(leans), 1)), rotations], axis=-1)

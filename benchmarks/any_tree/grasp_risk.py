@@ -45,7 +45,7 @@ TURNED = math.radians(10.0)
 FOLDS = 5
 WEAK = 0.025
 """Weight of the sum of squares that keeps the law's numbers small; lengths in decimetres."""
-NAMES = ("angle", "across", "narrow")
+NAMES = ("angle", "lever", "narrow")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -126,10 +126,10 @@ def _shuffled(rng: np.random.Generator, taken: dict[str, Any]) -> ExitStack:
 
     def other(self: Any, *arguments: Any) -> grasp_choice.Choice:
         choice = usual_other(self, *arguments)
-        angle, across = self._firm.features(choice.goal)
+        angle, lever = self._firm.features(choice.goal)
         grip = poses.relative(choice.goal, self._view.objects[self._target])
         width = widths[choice.goal.tobytes()]
-        taken.update(angle=angle, across=across, width=width, grip=grip.tolist())
+        taken.update(angle=angle, lever=lever, width=width, grip=grip.tolist())
         return choice
 
     stack = ExitStack()
@@ -150,7 +150,7 @@ def lines(found: Sequence[dict[str, Any]]) -> list[str]:
     if wrong.sum() < FOLDS or (~wrong).sum() < FOLDS:
         return [*out, "too few of either to fit a law"]
     features = np.array(
-        [[min(g["angle"], WIDEST), 10 * g["across"], 10 * max(0.0, NARROW - g["width"])] for g in found]
+        [[min(g["angle"], WIDEST), 10 * g["lever"], 10 * max(0.0, NARROW - g["width"])] for g in found]
     )
     law = fitted(features, wrong)
     said = np.zeros(len(wrong))
