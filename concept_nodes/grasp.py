@@ -21,7 +21,7 @@ from bt_tasksim.concept_nodes import grasp_features
 from bt_tasksim.concept_nodes.closer import with_room
 from bt_tasksim.concept_nodes.grasp_candidates import Candidates, candidates, narrowest_grip
 from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, rooms
-from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, CLOSE, EAGER, HASTE
+from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, CLOSE, EAGER, HASTE, SCALE
 from bt_tasksim.concept_nodes.grasp_firmness import SLANTED
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.concept_nodes.grasp_pose import (
@@ -32,7 +32,7 @@ from bt_tasksim.concept_nodes.grasp_pose import (
     resting_place,
 )
 from bt_tasksim.concept_nodes.holding import HOLDING, tool_distance
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import FIRM, FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, put_down, views
 from bt_tasksim.core import poses
@@ -117,7 +117,12 @@ AS_GIVEN = math.cos(math.radians(20.0))
 
 FEELING = 0.05
 """Speed in m/s at which a programmed grasp feels its way where it has little room: a finger that meets an
-edge at 0.18 m/s presses 78 N before it can be stopped."""
+edge at 0.18 m/s presses 78 N before it can be stopped. Near its base an arm comes slower, see `FIRM`."""
+YIELDS = 15.0
+"""Newtons against the approach from which on a hand gives way: a finger that stands on something as it comes, or
+a jaw that swings and presses what it closes on against its support."""
+YIELDING = 0.0005
+"""Metres by which it does so in a control period, at twice that force and beyond; it does not come back."""
 
 
 class _Asked(NamedTuple):
@@ -444,11 +449,22 @@ class Grasp(ConceptModel[GraspMemory]):
         the object it comes no faster than `FEELING`, and a finger that stands on something goes outwards.
         """
         xp = array_namespace(memory.middle)
-        still = xp.zeros_like(memory.middle)
+        still = self._yielding(seen, memory)
         usual = xp.concat([still, xp.full_like(still[..., :1], HASTE)], axis=-1)
         if not bool(xp.any(memory.tight)):
             return usual
         return xp.where(memory.tight[:, None], self._feeling(seen, memory), usual)
+
+    def _yielding(self, seen: Seen, memory: GraspMemory) -> Array:
+        """Offsets ``(N, 5)`` asked for by a hand that gives way where it touches something, see `YIELDS`."""
+        xp = array_namespace(memory.offset)
+        push = poses.clip(-seen.wrench[:, 2] / YIELDS - 1.0, 0.0, 1.0)
+        begun = seen.elapsed - memory.delay >= memory.begins
+        back = xp.where(begun & xp.any(seen.contacts, axis=-1), YIELDING * push, xp.zeros_like(push))
+        gone = memory.offset[:, ALONG] - back
+        wanted = gone / SCALE[ALONG] - memory.middle[:, ALONG]
+        asked = xp.where(gone < 0.0, -xp.sqrt(poses.clip(-wanted, 0.0, 1.0)), xp.zeros_like(gone))
+        return asked[:, None] * grasp_features.axis(ALONG, asked)
 
     def _feeling(self, seen: Seen, memory: GraspMemory) -> Array:
         """Actions ``(N, 6)`` of a hand that feels its way, see `programmed_motion`."""
@@ -457,10 +473,11 @@ class Grasp(ConceptModel[GraspMemory]):
         outwards = poses.clip(xp.sum(touching * constant(_sides(seen.robot), touching), axis=-1), -1.0, 1.0)
         now, period = seen.elapsed - memory.delay, seen.world.control_period
         ahead = sample(memory.path, now + period)[:, :3] - sample(memory.path, now)[:, :3]
-        share = poses.clip(FEELING * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), CAREFUL, 1.0)
+        feeling = FEELING * poses.clip(poses.norm(seen.tool[:, :2]) / FIRM, 0.0, 1.0)
+        share = poses.clip(feeling * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), CAREFUL, 1.0)
         pace = xp.where(xp.any(seen.contacts, axis=-1), xp.zeros_like(share), (share - CAREFUL) / EAGER)
         aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)
-        return xp.concat([aside, pace[:, None]], axis=-1)
+        return xp.concat([aside + self._yielding(seen, memory), pace[:, None]], axis=-1)
 
     def done(self, seen: Seen, memory: GraspMemory) -> Array:
         """Opposing contacts and a still hand, some ticks long, that presses as hard as it is to."""

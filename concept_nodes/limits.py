@@ -8,6 +8,9 @@ from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.poses import Array, norm
 from bt_tasksim.core.units import NEWTONS
 
+FIRM = 0.3
+"""Metres between the arm's base and its tool within which it goes slower still, in proportion: the same
+drives press harder there. The SO-100, 0.14 m from its base, meets a table at 24 mm/s with 71 N."""
 FORCE_LIMIT = 60.0
 """N at the wrist: well above what carrying and placing take, well below what breaks a cup or a finger."""
 WRIST_STRAINED = register_reason(

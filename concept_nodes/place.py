@@ -30,7 +30,7 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.closer import DROPPED, PUT_DOWN, TOUCHING, with_room
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
+from bt_tasksim.concept_nodes.limits import FIRM, FORCE_LIMIT, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
 from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of, tipped
 from bt_tasksim.concept_nodes.surface import (
@@ -96,9 +96,6 @@ OTHERS = 8
 SLOWLY, GENTLY = 0.02, 0.4
 """Metres above where the object should stand below which it goes slower, and the least share of the path's
 speed: what meets its support at 80 mm/s in the hand of a stiff arm strains the wrist with 60 to 80 N."""
-FIRM = 0.3
-"""Metres between the arm's base and its tool within which it goes slower still, in proportion: the same
-drives press harder there. The SO-100, 0.14 m from its base, meets a table at 24 mm/s with 71 N."""
 FELT = 2
 """Ticks in a row for which the support must be felt."""
 
