@@ -64,8 +64,10 @@ def tidy(goals: Sequence[Goal], *, parking: str | None = None, name: str = "tidy
     waiting = [] if parking is None else [leaf for goal in order for leaf in _parked(goal, parking)]
     checks = [_check(goal) for goal in order]
     rounds = len(order) * (1 if parking is None else 2)
-    work = any_order(f"{name} in any order", *stages, *waiting)
-    return retry_while_acting(rounds, sequence(name, work, *checks), name=f"{name}, round by round")
+    last = [stages.pop()] if _condition(order[-1]).in_hand else []  # nothing is taken while it is held
+    free = [*stages, *waiting]
+    work = free if len(free) == 1 else [any_order(f"{name} in any order", *free)]
+    return retry_while_acting(rounds, sequence(name, *work, *last, *checks), name=f"{name}, round by round")
 
 
 def in_order(goals: Sequence[Goal]) -> list[Goal]:
