@@ -162,7 +162,6 @@ def _checks(row: list[Stage]) -> list[Behaviour]:
     asked = [asked_by(stage.nodes[0]) for stage in row if not stage.guards]
     return [
         condition_leaf(guard)
-        for stage in row
-        for guard in stage.guards
+        for guard in each_once(guard for stage in row for guard in stage.guards)
         if not any(one is not None and same(one, guard) for one in asked)
     ]
