@@ -412,7 +412,11 @@ def test_in_a_batch_it_is_the_same():
     with BatchRunner(lambda: tidy(goals), scene, None, 2, 1) as batch:
         for seed, found in batch.run(range(2)):
             one = alone[seed]
-            assert (one.success, one.why, one.control_steps) == (found.success, found.why, found.control_steps)
+            assert (one.success, one.why, one.control_steps) == (
+                found.success,
+                found.why,
+                found.control_steps,
+            )
 
 
 @pytest.mark.physical

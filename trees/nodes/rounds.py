@@ -43,7 +43,7 @@ class Rounds(PassThrough, abc.ABC):
     def report_round(self) -> None:
         """Say that a round has ended."""
 
-    def ticked(self, began: bool, status: Status) -> None:  # noqa: B027  # most have nothing to notice
+    def ticked(self, began: bool, status: Status) -> None:  # most have nothing to notice
         """The child has ended its tick.
 
         Args:
