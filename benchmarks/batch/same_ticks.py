@@ -5,7 +5,8 @@ own, and is ticked with others in an order of its own; in some cases leaves let 
 on later. Compared are, for every tick of every world: the statuses of all nodes, which leaves were ticked in
 which order and whether they began, which were stopped, and why the tree failed. BehaviorTree.CPP shows the
 root's status, which leaves were ticked in which order, and which were halted; it is left out where a tree has
-a time-out (its clock is the wall's) or a node that it does not have, and refuses reactive nodes in which two children are RUNNING.
+a time-out (its clock is the wall's) or a node that it does not have, and refuses reactive nodes in which two
+children are RUNNING.
 """
 
 from __future__ import annotations

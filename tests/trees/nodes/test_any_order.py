@@ -1,4 +1,4 @@
-"""All children in an order that is found on the way: which has its turn when, when it ends, and what it says."""
+"""All children in an order found on the way: what has its turn when, how it ends, and what it says."""
 
 from __future__ import annotations
 
