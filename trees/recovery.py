@@ -39,8 +39,8 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
     trees", ICRA 2019.
 
     Args:
-        tree: A sequence, such as one from a demonstration, or what `tidy` gives. Its nodes stand in the new
-            tree afterwards, and no more in this one.
+        tree: A sequence, such as one from a demonstration, one in any order, or what `tidy` gives. Its nodes
+            stand in the new tree afterwards, and no more in this one.
         attempts: How often a stage may be tried; what one of them does not need another one may use.
         name: Name of the new tree; by default that of the old one.
 
@@ -89,14 +89,14 @@ def hand_is_free(*unless: Behaviour) -> Behaviour:
 
 
 def _children(body: Behaviour) -> list[Behaviour]:
-    """The nodes of a sequence; a stage that asks itself whether it is done is like a sequence of one.
+    """The nodes of a sequence; what stands in any order, and a stage that asks itself, are like one of one.
 
     Raises:
         InputError: It is no sequence with memory.
     """
     if type(body) is Sequence and body.memory and body.children:
         return list(body.children)
-    if asks_itself(body) is not None:
+    if isinstance(body, AnyOrder) or asks_itself(body) is not None:
         return [body]
     raise InputError(
         f"recovering takes a sequence, or what tidy gives, and '{body.name}' is a {type(body).__name__}: "

@@ -29,6 +29,7 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.trees import (
+    any_order,
     fallback,
     reactive_sequence,
     recovering,
@@ -161,6 +162,13 @@ def test_what_may_change_places_stands_in_any_order_and_the_rest_in_a_row():
     assert [len(tied.children), other.name] == [2, "c is done"]
     _, first, second, *_ = recovering(sequence("two", *task("a", "s1"), *task("b", "a"))).decorated.children
     assert [first.name, second.name] == ["a is done", "b is done"]
+
+
+def test_an_order_that_an_author_leaves_open_stays_open():
+    given = any_order("both", sequence("one", *task("a", "s1")), sequence("other", *task("b", "a")))
+    _, work, *_ = recovering(given).decorated.children
+    assert type(work) is AnyOrder and [node.name for node in work.children] == ["a is done", "b is done"]
+    assert not given.children
 
 
 def test_what_tidy_gives_is_taken_over_and_the_old_tree_is_left_without_it():

@@ -18,7 +18,9 @@ from bt_tasksim.trees.nodes.causes import Cause, summary
 from bt_tasksim.trees.nodes.retry import BatchRetry, Retry
 
 NOTHING_DONE = register_reason(
-    "nothing_done", "nothing could be done in attempt {attempt}, nor in another one{before}", attempt=COUNT
+    "nothing_done",
+    "nothing could be done in attempt {attempt}, so it was the last one{before}",
+    attempt=COUNT,
 )
 
 
@@ -78,7 +80,7 @@ class RetryWhileActingKind(NodeKind[RetryWhileActing]):
 
     category = "Decorator"
     behaviour = RetryWhileActing
-    symbol = "↺"
+    symbol = "↺ᴬ"
     label = "retry while it acts"
     own = True
     ports = (Port("num_attempts", doc="how often at most, -1 without end"),)
