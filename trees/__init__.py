@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from bt_tasksim.trees.check import check_tree
     from bt_tasksim.trees.equality import same_tree
     from bt_tasksim.trees.from_goals import tidy
+    from bt_tasksim.trees.nodes.any_order import any_order
     from bt_tasksim.trees.nodes.fallback import fallback
     from bt_tasksim.trees.nodes.force_failure import force_failure
     from bt_tasksim.trees.nodes.force_success import force_success
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from bt_tasksim.trees.nodes.reactive_sequence import reactive_sequence
     from bt_tasksim.trees.nodes.repeat import repeat
     from bt_tasksim.trees.nodes.retry import retry
+    from bt_tasksim.trees.nodes.retry_while_acting import retry_while_acting
     from bt_tasksim.trees.nodes.sequence import sequence
     from bt_tasksim.trees.nodes.subtree import subtree
     from bt_tasksim.trees.nodes.timeout import timeout
@@ -49,7 +51,9 @@ __all__ = [
     "reactive_sequence",
     "reactive_fallback",
     "parallel",
+    "any_order",
     "retry",
+    "retry_while_acting",
     "repeat",
     "timeout",
     "invert",

@@ -21,9 +21,9 @@ from bt_tasksim.trees.backchain import (
     goals_of,
     let_go,
 )
+from bt_tasksim.trees.nodes.any_order import any_order
 from bt_tasksim.trees.nodes.fallback import fallback
-from bt_tasksim.trees.nodes.inverter import invert
-from bt_tasksim.trees.nodes.retry import retry
+from bt_tasksim.trees.nodes.retry_while_acting import retry_while_acting
 from bt_tasksim.trees.nodes.sequence import sequence
 
 
@@ -34,10 +34,13 @@ def tidy(goals: Sequence[Goal], *, parking: str | None = None, name: str = "tidy
     is found backwards from the goal's condition (`bt_tasksim.trees.backchain`), and ends by asking it again.
     What others are to stand on has its turn before them, and what is to be held in the end comes last.
 
-    Where there are several goals, one whose spot is taken, or on whose object something stands, is passed
-    over, and there are as many rounds as goals: what is in the way of another goal may go to its own one
-    first. Where spots are taken crosswise, ``parking`` names a place anywhere on which objects may stand
-    meanwhile; there are twice as many rounds then.
+    Several goals are reached in an order that is found on the way (`bt_tasksim.trees.nodes.any_order`): one
+    whose spot is taken, on whose object something stands, or for which no grasp and no way is found, waits
+    until others have been reached, which may have been in its way, and what stands on an object waits for
+    that one. Where none of those that are left can begin, the tree fails, and says why of each. A goal that
+    fails on its way begins another round, and there are as many rounds as goals. Where spots are taken
+    crosswise, ``parking`` names a place anywhere on which objects may stand meanwhile; there are twice as
+    many rounds then.
 
     The tree is made of the nodes and leaves that authors use: show it, edit it, save it. Reactivity by
     conditions that are asked anew and chains by pre- and postconditions are those of M. Colledanchise,
@@ -53,14 +56,18 @@ def tidy(goals: Sequence[Goal], *, parking: str | None = None, name: str = "tidy
         InputError: There is no goal, goals contradict each other, or no concept brings one about.
     """
     order = in_order(goals)
-    stages = [_stage(goal, several=len(order) > 1) for goal in order]
+    of = {goal.object: goal for goal in order}
+    stages = [_stage(goal, of.get(goal.place)) for goal in order]
     if len(order) == 1:
         stages[0].name = name
         return stages[0]
     waiting = [] if parking is None else [leaf for goal in order for leaf in _parked(goal, parking)]
     checks = [_check(goal) for goal in order]
     rounds = len(order) * (1 if parking is None else 2)
-    return retry(rounds, sequence(name, *stages, *waiting, *checks), name=f"{name}, round by round")
+    last = [stages.pop()] if _condition(order[-1]).in_hand else []  # nothing is taken while it is held
+    free = [*stages, *waiting]
+    work = free if len(free) == 1 else [any_order(f"{name} in any order", *free)]
+    return retry_while_acting(rounds, sequence(name, *work, *last, *checks), name=f"{name}, round by round")
 
 
 def in_order(goals: Sequence[Goal]) -> list[Goal]:
@@ -155,32 +162,20 @@ def _check(goal: Goal) -> Behaviour:
     return condition_leaf(_asked(goal))
 
 
-def _stage(goal: Goal, several: bool) -> Behaviour:
-    """A fallback that reaches one goal."""
+def _stage(goal: Goal, below: Goal | None = None) -> Behaviour:
+    """A fallback that reaches one goal.
+
+    Args:
+        goal: The goal.
+        below: The goal of what the object is to stand on, which comes first.
+    """
     wanted, title = _asked(goal), f"{goal.object} {goal.relation} {goal.place}"
     chain = _chain(goal, wanted)
-    blocked = [_not_now(need) for need in chain.given] if several else []
-    needs = [] if several else [condition_leaf(need) for need in chain.given]
+    needs = [condition_leaf(need) for need in chain.given]
+    if below is not None:
+        needs.insert(0, _check(below))
     work = sequence(f"get {title}", *needs, *_acts(chain), condition_leaf(wanted))
-    return fallback(title, condition_leaf(wanted), *blocked, work)
-
-
-def _not_now(need: Wanted) -> Behaviour:
-    """Passes a goal over, where something has to hold first that concepts cannot bring about."""
-    return invert(condition_leaf(need), name=f"not now: {_words(need)}")
-
-
-def _words(need: Wanted) -> str:
-    """Why a goal has to wait."""
-    if "place" not in need.arguments:
-        return f"no {need.condition}"
-    if need.arguments.get("anywhere"):
-        return f"no room on {need.arguments['place']}"
-    return (
-        f"{need.arguments['place']} is taken"
-        if len(need.arguments) > 1
-        else f"{need.arguments['place']} is covered"
-    )
+    return fallback(title, condition_leaf(wanted), work)
 
 
 def _chain(goal: Goal, wanted: Wanted) -> ActChain:
@@ -218,13 +213,6 @@ def _parked(goal: Goal, parking: str) -> list[Behaviour]:
         return []
     there = Wanted("StandsOn", {"target": goal.object, "place": parking})
     chain = let_go(chain_to(there))
-    full = [_not_now(need) for need in chain.given]
-    return [
-        fallback(
-            f"{goal.object} need not wait",
-            condition_leaf(wanted),
-            *blocked,
-            *full,
-            sequence(f"{goal.object} waits on {parking}", *_acts(chain)),
-        )
-    ]
+    needs = [condition_leaf(need) for need in chain.given]
+    work = sequence(f"{goal.object} waits on {parking}", *needs, *_acts(chain))
+    return [fallback(f"{goal.object} need not wait", condition_leaf(wanted), *blocked, work)]

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 from py_trees.behaviour import Behaviour
 from py_trees.composites import Sequence
 
 from bt_tasksim.concept_nodes import HandEmpty, Settle, Withdraw
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.trees.backchain import asked_by, condition_leaf
+from bt_tasksim.trees.nodes.any_order import AnyOrder, any_order
 from bt_tasksim.trees.nodes.fallback import fallback
-from bt_tasksim.trees.nodes.retry import Retry, retry
+from bt_tasksim.trees.nodes.retry import Retry
+from bt_tasksim.trees.nodes.retry_while_acting import retry_while_acting
 from bt_tasksim.trees.nodes.sequence import sequence
 from bt_tasksim.trees.stages import Stage, acting, asks_itself, cut, each_once, is_in_hand, same
+from bt_tasksim.trees.steps import Step, in_steps
 
 
 def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -> Behaviour:
@@ -24,13 +29,18 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
     and waits until nothing moves; then the first stage that is not done has its turn. Each attempt plans
     anew, from what is seen then.
 
+    A stage that cannot begin, such as one for which no grasp is found, waits until others have acted, those
+    behind it that name nothing that it names, and any others of what `tidy` gives
+    (`bt_tasksim.trees.nodes.any_order`). An attempt in which nothing has acted is the last one: it would be
+    the same again.
+
     A guard before each action, so that a tree goes on from whatever it finds, is the form of
     M. Colledanchise, D. Almeida and P. Ögren, "Towards blended reactive planning and acting using behavior
     trees", ICRA 2019.
 
     Args:
-        tree: A sequence, such as one from a demonstration, or what `tidy` gives. Its nodes stand in the new
-            tree afterwards, and no more in this one.
+        tree: A sequence, such as one from a demonstration, one in any order, or what `tidy` gives. Its nodes
+            stand in the new tree afterwards, and no more in this one.
         attempts: How often a stage may be tried; what one of them does not need another one may use.
         name: Name of the new tree; by default that of the old one.
 
@@ -43,19 +53,23 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
         raise InputError(f"'{tree.name}' stands under '{tree.parent.name}': recover the root of a tree")
     rounds, body = (tree.attempts, tree.decorated) if isinstance(tree, Retry) else (1, tree)
     children = _children(body)
-    row = cut(children)
+    steps = _steps(children)
+    row = [stage for step in steps for block in step for stage in block]
     stages = [stage for stage in row if stage.guards]
     if not stages:
         raise InputError(f"'{tree.name}' holds nothing that takes an object, so there is nothing to recover")
-    for child in children:
-        child.parent = None
+    for node in (node for stage in row for node in stage.nodes):
+        if node.parent is not None and node is not body:
+            node.parent.children.remove(node)
+        node.parent = None
     if body not in children:
         body.children.clear()
     limit = -1 if rounds < 0 else rounds + (attempts - 1) * len(stages)
     called = name or tree.name
     free = hand_is_free(*_held_as_wanted(stages))
-    work = sequence(called, free, *(_made(stage) for stage in row), *_checks(row))
-    return retry(limit, work, name=f"{called}, recovering")
+    made = [node for step in steps for node in _joined(step, called)]
+    work = sequence(called, free, *made, *_checks(row))
+    return retry_while_acting(limit, work, name=f"{called}, recovering")
 
 
 def hand_is_free(*unless: Behaviour) -> Behaviour:
@@ -75,19 +89,43 @@ def hand_is_free(*unless: Behaviour) -> Behaviour:
 
 
 def _children(body: Behaviour) -> list[Behaviour]:
-    """The nodes of a sequence; a stage that asks itself whether it is done is like a sequence of one.
+    """The nodes of a sequence; what stands in any order, and a stage that asks itself, are like one of one.
 
     Raises:
         InputError: It is no sequence with memory.
     """
     if type(body) is Sequence and body.memory and body.children:
         return list(body.children)
-    if asks_itself(body) is not None:
+    if isinstance(body, AnyOrder) or asks_itself(body) is not None:
         return [body]
     raise InputError(
         f"recovering takes a sequence, or what tidy gives, and '{body.name}' is a {type(body).__name__}: "
         f"put it into a sequence"
     )
+
+
+def _steps(children: list[Behaviour]) -> list[Step]:
+    """The stages of a sequence, by what has to follow each other.
+
+    Raises:
+        InputError: Nothing tells whether a stage is done.
+    """
+    steps: list[Step] = []
+    for free, some in groupby(children, lambda child: isinstance(child, AnyOrder)):
+        if free:
+            steps += [[cut([below]) for below in child.children] for child in some]
+        else:
+            steps += in_steps(cut(list(some)))
+    return steps
+
+
+def _joined(step: Step, called: str) -> list[Behaviour]:
+    """The nodes that stand for a step in the new tree."""
+    made = [[_made(stage) for stage in block] for block in step]
+    if len(made) == 1:
+        return made[0]
+    blocks = [b[0] if len(b) == 1 else sequence(", then ".join(n.name for n in b), *b) for b in made]
+    return [any_order(f"{called} in any order", *blocks)]
 
 
 def _made(stage: Stage) -> Behaviour:
@@ -124,7 +162,6 @@ def _checks(row: list[Stage]) -> list[Behaviour]:
     asked = [asked_by(stage.nodes[0]) for stage in row if not stage.guards]
     return [
         condition_leaf(guard)
-        for stage in row
-        for guard in stage.guards
+        for guard in each_once(guard for stage in row for guard in stage.guards)
         if not any(one is not None and same(one, guard) for one in asked)
     ]

@@ -5,7 +5,8 @@ own, and is ticked with others in an order of its own; in some cases leaves let 
 on later. Compared are, for every tick of every world: the statuses of all nodes, which leaves were ticked in
 which order and whether they began, which were stopped, and why the tree failed. BehaviorTree.CPP shows the
 root's status, which leaves were ticked in which order, and which were halted; it is left out where a tree has
-a time-out (its clock is the wall's), and refuses reactive nodes in which two children are RUNNING.
+a time-out (its clock is the wall's) or a node that it does not have, and refuses reactive nodes in which two
+children are RUNNING.
 """
 
 from __future__ import annotations
@@ -45,8 +46,11 @@ SCRIPT = 24
 PERIOD = 0.05
 TREES = 10_000
 STATUS = {RUNNING: Status.RUNNING, SUCCESS: Status.SUCCESS, FAILURE: Status.FAILURE}
-COMPOSITES = ("sequence", "fallback", "reactive_sequence", "reactive_fallback")
-DECORATORS = ("invert", "force_success", "force_failure", "subtree", "train", "retry", "repeat", "timeout")
+COMPOSITES = ("sequence", "fallback", "reactive_sequence", "reactive_fallback", "any_order")
+ROUNDS = ("retry", "repeat", "retry_while_acting")
+DECORATORS = ("invert", "force_success", "force_failure", "subtree", "train", *ROUNDS, "timeout")
+OWN = ("timeout", "any_order", "retry_while_acting")
+"""Nodes that BehaviorTree.CPP does not have, or that ask a clock, which is the wall's there."""
 
 Trace = list[list[tuple[list[str], list[int], Outcome | None]]]
 """For each world and each of its ticks: what happened to leaves, all statuses, why the tree failed."""
@@ -69,9 +73,9 @@ class Case:
     seed: int
 
     @property
-    def has_timeout(self) -> bool:
-        """Whether it asks a clock."""
-        return "'timeout'" in repr(self.shape)
+    def is_own(self) -> bool:
+        """Whether BehaviorTree.CPP does not know a part of it, or asks another clock."""
+        return any(f"'{name}'" in repr(self.shape) for name in OWN)
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -93,7 +97,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         with warned_of():
             found_so = by_executor(case, standing=0.3, know=partial(known, seed))
         why = why or difference(case, ours, found_so)
-        if why is None and not case.has_timeout and cpp_is_there():
+        if why is None and not case.is_own and cpp_is_there():
             why, ticks = difference_to_cpp(case, ours)
             found["cpp_trees"] += 1
             found["cpp_ticks"] += ticks
@@ -153,7 +157,7 @@ def _shape(rng: np.random.Generator, depth: int, budget: list[int]) -> Any:
     if kind < 0.45:
         name = str(rng.choice(DECORATORS))
         child = _shape(rng, depth - 1, budget)
-        if name in ("retry", "repeat"):
+        if name in ROUNDS:
             return (name, int(rng.choice([-1, 1, 2, 3])), child)
         if name == "timeout":
             return (name, float(rng.integers(1, 8)) * PERIOD, child)
@@ -227,7 +231,7 @@ def build(shape: Any) -> Behaviour:
         if kind == "leaf":
             count[0] += 1
             return question(count[0] - 1)()
-        if kind in ("retry", "repeat", "timeout"):
+        if kind in (*ROUNDS, "timeout"):
             return getattr(trees, kind)(rest[0], node(rest[1]))
         if kind == "parallel":
             return trees.parallel("p", *map(node, rest[2]), success=rest[0], failure=rest[1])

@@ -244,6 +244,14 @@ class BatchTree:
         for below in self.arrays.where(self.xp.any(block != INVALID, axis=1)).tolist():
             self._end(node + below, rows, block[below])
 
+    def acting(self, node: int, rows: Array) -> Array:
+        """A leaf, at or below a node, is RUNNING; for nodes, see `trees.nodes.batch.Batch`."""
+        found = self.xp.zeros_like(rows, dtype=self.xp.bool)
+        for below in range(node, self._ends[node]):
+            if self._ends[below] == below + 1:
+                found = found | (self._status_of[below][rows] == RUNNING)
+        return found
+
     def _end(self, node: int, rows: Array, status: Array) -> None:
         most, listener = self._listeners.get(node, (INVALID, None))
         if listener is not None:

@@ -16,15 +16,18 @@ from bt_tasksim.concept.parameters import ObjectName, PlaceName, Seconds
 from bt_tasksim.concept_nodes import AtPose, Beside, Lifted, StandsOn, Wait, catalogue
 from bt_tasksim.concept_nodes.carry import Carry
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.outcomes import NO_WAY
 from bt_tasksim.core.registry import register
+from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.scene.goal_functions import GoalFunction
 from bt_tasksim.scene.relations import relation_named
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation
 from bt_tasksim.scene.specs import ObjectSpec, SpotSpec
-from bt_tasksim.trees import check_tree, same_tree, tidy, tree_from_xml, tree_to_xml
+from bt_tasksim.trees import check_tree, recovering, same_tree, tidy, tree_from_xml, tree_to_xml
 from bt_tasksim.trees.from_goals import in_order
 from bt_tasksim.trees.load import load_source
+from bt_tasksim.trees.nodes.any_order import AnyOrder
 from bt_tasksim.trees.walk import nodes_of
 
 
@@ -249,6 +252,22 @@ def test_nothing_waits_on_the_parking_place_that_is_not_kept_from_its_own():
     assert waits == ["a waits on table"]
 
 
+def test_what_stands_on_another_waits_for_that_ones_goal():
+    tree = tidy([Goal("red", "blue"), Goal("blue", "spot"), Goal("box", beside="blue")])
+    work = {stage.name: stage.children[1] for stage in tree.decorated.children[0].children}
+    for name in ("red on blue", "box beside blue"):
+        assert work[name].children[0].model == AtPose.value("blue", on="spot")
+    assert work["blue on spot"].children[0].model != AtPose.value("blue", on="spot")
+
+
+@pytest.mark.parametrize("parking", [None, "table"])
+def test_nothing_is_taken_any_more_once_something_is_to_be_held(parking):
+    tree = tidy([Goal("a", "table", relation="lifted"), Goal("b", "s"), Goal("c", "t")], parking=parking)
+    free, last, *checks = tree.decorated.children
+    assert type(free) is AnyOrder and len(free.children) == (2 if parking is None else 4)
+    assert last.name == "a lifted table" and len(checks) == 3
+
+
 def test_needs_that_go_round_in_a_circle_are_said(upside_down):
     asks_whether_it_is_upside_down()
 
@@ -330,6 +349,74 @@ def test_two_that_stand_on_each_others_spots_change_places():
     successes(reached(Runner(tidy(goals, parking="table"), scene), goals), range(7, 12))
     stuck = Runner(tidy(goals), scene).run(7)
     assert stuck.status == Status.FAILURE and np.isclose(stuck.sim_time, 0.05, atol=0.2)
+
+
+WALLS = {"n": (0.0, 0.047), "s": (0.0, -0.047), "e": (0.047, 0.0), "w": (-0.047, 0.0)}
+"""Where posts stand about a cube of 4 cm, 12 mm away, in the table's frame, metres."""
+FREE = {"cube": (0.0, 0.28), "n": (-0.1, -0.22), "s": (-0.02, -0.3), "e": (0.1, -0.22), "w": (-0.1, 0.2)}
+"""Spots that are clear of them."""
+
+
+def walled(*more):
+    """A cube amid four posts of 9 cm, between which no hand has room; and more cubes."""
+
+    def thing(size, x, y):
+        return ObjectSpec("box", on="table", centre=(x, y), area=(0.001, 0.001), yaw=0.0, size=(size, size))
+
+    objects = {"cube": thing((0.04, 0.04, 0.04), 0.0, 0.0)}
+    objects |= {name: thing((0.03, 0.03, 0.09), *at) for name, at in WALLS.items()}
+    objects |= {name: thing((0.04, 0.04, 0.04), 0.0, -0.2) for name in more}
+    spots = [SpotSpec(f"s_{name}", on="table", centre=at, area=(0.01, 0.01)) for name, at in FREE.items()]
+    return Scene("panda", objects=objects, spots=spots)
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize("how", [tidy, lambda goals: recovering(tidy(goals))], ids=["tidy", "recovering"])
+def test_what_is_in_the_way_of_a_grasp_goes_to_its_own_place_first(how):
+    goals = [Goal(name, f"s_{name}") for name in ("cube", *WALLS)]
+    assert in_order(goals)[0].object == "cube"
+    successes(reached(Runner(how(goals), walled()), goals), range(5))
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize("how", [tidy, lambda goals: recovering(tidy(goals))], ids=["tidy", "recovering"])
+def test_what_cannot_be_reached_is_said_when_all_else_is(how):
+    goals = [Goal("cube", "s_cube"), Goal("other", "s_s")]
+    tree = how(goals)
+
+    def failed_with_the_other_there(result):
+        cube, other = result.verdict.placements
+        return result.status == Status.FAILURE and other.reached and not cube.reached
+
+    scene = dataclasses.replace(walled("other"), goals=goals)
+    runner = Runner(tree, scene)
+    for result in successes(runner.run, range(5), n=2, wanted=failed_with_the_other_there):
+        assert "no grasp of cube serves" in result.why and result.reason == NO_WAY.name
+        assert tree.rounds == 2, "the second one has done nothing, and is the last"
+
+
+@pytest.mark.physical
+def test_nothing_is_put_on_what_is_not_where_it_should_be():
+    goals = [Goal("other", "cube"), Goal("cube", "s_cube")]
+    tree = tidy(goals)
+    result = Runner(tree, dataclasses.replace(walled("other"), goals=goals)).run(0)
+    assert result.status == Status.FAILURE and tree.rounds == 1 and result.sim_time < 0.1
+    assert "no grasp of cube serves" in result.why
+
+
+@pytest.mark.physical
+def test_in_a_batch_it_is_the_same():
+    goals = [Goal(name, f"s_{name}") for name in ("cube", "n", "s")]
+    scene = dataclasses.replace(walled(), goals=goals)
+    alone = {seed: Runner(tidy(goals), scene).run(seed) for seed in (0, 1)}
+    with BatchRunner(lambda: tidy(goals), scene, None, 2, 1) as batch:
+        for seed, found in batch.run(range(2)):
+            one = alone[seed]
+            assert (one.success, one.why, one.control_steps) == (
+                found.success,
+                found.why,
+                found.control_steps,
+            )
 
 
 @pytest.mark.physical

@@ -1,8 +1,12 @@
 """Around a sequence: which stages it has, when they are skipped, and that what is lost is taken again."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from draws import successes
+from hypothesis import given
+from hypothesis import strategies as st
 from py_trees.common import Status
 
 from bt_tasksim import Goal
@@ -25,6 +29,7 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.trees import (
+    any_order,
     fallback,
     reactive_sequence,
     recovering,
@@ -37,7 +42,9 @@ from bt_tasksim.trees import (
 )
 from bt_tasksim.trees.backchain import asked_by, condition_named
 from bt_tasksim.trees.load import load_source, scenarios
+from bt_tasksim.trees.nodes.any_order import AnyOrder
 from bt_tasksim.trees.stages import cut, lasting
+from bt_tasksim.trees.steps import are_tied, in_steps
 from bt_tasksim.trees.walk import nodes_of
 
 
@@ -99,12 +106,80 @@ def test_stages_may_be_nodes_of_their_own():
 def test_every_stage_is_guarded_and_all_are_asked_at_the_end():
     tree = recovering(sequence("two", *task("a", "s1"), *task("b", "s2")), attempts=3)
     assert tree.attempts == 5  # one, and two more for each stage
-    free, first, second, *checks = tree.decorated.children
+    free, both, *checks = tree.decorated.children
+    first, second = both.children
     assert free.children[0].model == HandEmpty.value()
     wanted = [AtPose.value("a", on="s1"), AtPose.value("b", on="s2")]
     assert [stage.children[0].model for stage in (first, second)] == wanted
     assert [stage.children[1].children[-1].model for stage in (first, second)] == wanted
     assert [check.model for check in checks] == wanted
+
+
+STAGES = {
+    "a": task("a", "s1"),
+    "b on a": task("b", "a"),
+    "c": task("c", "s3"),
+    "d on b": task("d", "b"),
+    "wait": [Wait(1.0)],
+    "held": task("e", "s5")[:2],
+}
+
+
+@pytest.mark.parametrize(
+    ("row", "steps"),
+    [
+        (["a", "c"], [[["a"], ["c"]]]),
+        (["a", "b on a"], [[["a", "b on a"]]]),
+        (["a", "b on a", "c"], [[["a", "b on a"], ["c"]]]),
+        (["a", "c", "b on a"], [[["a", "c", "b on a"]]]),
+        (["c", "a", "b on a", "d on b"], [[["c"], ["a", "b on a", "d on b"]]]),
+        (["d on b", "a", "c"], [[["d on b"], ["a"], ["c"]]]),
+        (["a", "wait", "c"], [[["a"]], [["wait"]], [["c"]]]),
+        (["a", "c", "held"], [[["a"], ["c"]], [["held"]]]),
+    ],
+)
+def test_stages_keep_their_order_where_one_names_what_the_other_moves(row, steps):
+    of = {id(leaf): name for name, leaves in STAGES.items() for leaf in leaves}
+    found = in_steps(cut([leaf for name in row for leaf in STAGES[name]]))
+    assert [[[of[id(s.nodes[0])] for s in block] for block in step] for step in found] == steps
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 9)), min_size=1, max_size=8))
+def test_steps_hold_all_stages_in_their_order(pairs):
+    row = cut([leaf for k, to in pairs for leaf in task(f"o{k}", f"o{to}")])
+    steps = in_steps(row)
+    assert [stage for step in steps for block in step for stage in block] == row
+    for step in steps:
+        for first, second in combinations(step, 2):
+            assert not any(are_tied(a, b) for a in first for b in second)
+
+
+def test_what_may_change_places_stands_in_any_order_and_the_rest_in_a_row():
+    row = sequence("three", *task("a", "s1"), *task("b", "a"), *task("c", "s3"))
+    _, work, *checks = recovering(row).decorated.children
+    assert type(work) is AnyOrder and len(checks) == 3
+    tied, other = work.children
+    assert [len(tied.children), other.name] == [2, "c is done"]
+    _, first, second, *_ = recovering(sequence("two", *task("a", "s1"), *task("b", "a"))).decorated.children
+    assert [first.name, second.name] == ["a is done", "b is done"]
+
+
+def test_an_order_that_an_author_leaves_open_stays_open():
+    given = any_order("both", sequence("one", *task("a", "s1")), sequence("other", *task("b", "a")))
+    _, work, *_ = recovering(given).decorated.children
+    assert type(work) is AnyOrder and [node.name for node in work.children] == ["a is done", "b is done"]
+    assert not given.children
+
+
+def test_what_tidy_gives_is_taken_over_and_the_old_tree_is_left_without_it():
+    goals = [Goal("b", "a"), Goal("a", "s1"), Goal("c", "table", relation="lifted")]
+    old = tidy(goals, parking="table")
+    names = [node.name for node in old.decorated.children[0].children]
+    body = old.decorated
+    _, work, held, *checks = recovering(old).decorated.children
+    assert [node.name for node in work.children] == names and held.name == "c is done"
+    assert {asked_by(check).arguments["target"] for check in checks} == {"a", "b", "c"}
+    assert not body.children and all(node.parent is work for node in work.children)
 
 
 def test_what_is_asked_already_is_not_asked_twice():

@@ -97,6 +97,9 @@ class Batch(Protocol):
     def stop_node(self, node: int, rows: Array) -> None:
         """Stop a node, as py_trees' ``stop(INVALID)``."""
 
+    def acting(self, node: int, rows: Array) -> Array:
+        """Booleans ``(k,)``: a leaf, at or below a node, is RUNNING (see `trees.nodes.acting`)."""
+
     @property
     def reasons(self) -> Reasons:
         """What nodes say."""

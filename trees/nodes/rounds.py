@@ -43,6 +43,18 @@ class Rounds(PassThrough, abc.ABC):
     def report_round(self) -> None:
         """Say that a round has ended."""
 
+    def ticked(self, began: bool, status: Status) -> None:  # most have nothing to notice
+        """The child has ended its tick.
+
+        Args:
+            began: It began in this tick.
+            status: Its status.
+        """
+
+    def is_enough(self) -> bool:
+        """After this round there is no other one, whatever the limit."""
+        return False
+
     def tick(self) -> Iterator[Behaviour]:
         """One tick, which may hold the end of one round and the beginning of the next."""
         if self.status != Status.RUNNING:
@@ -53,10 +65,11 @@ class Rounds(PassThrough, abc.ABC):
             began = child.status != Status.RUNNING
             yield from child.tick()
             status = child.status
+            self.ticked(began, status)
             if status == self.again_on:
                 self.rounds += 1
                 self.report_round()
-                if self.rounds == self.limit:
+                if self.rounds == self.limit or self.is_enough():
                     break
                 if not began:
                     continue
@@ -90,26 +103,40 @@ class BatchRounds(BatchNode):
         if len(begins):
             self.rounds[begins] = 0
             self.count_anew(begins)
-        self.began[rows] = self.place.child_status[0][rows] != RUNNING
+        began = self.place.child_status[0][rows] != RUNNING
+        self.began[rows] = began
+        self.round_begins(self.part(rows, began))
         self.tick_child(0, rows)
 
     def count_anew(self, rows: Array) -> None:  # a repeat remembers nothing
         """It begins in worlds."""
 
+    def round_begins(self, rows: Array) -> None:
+        """A round begins in worlds."""
+
     def round_ended(self, rows: Array) -> None:
         """A round has ended in worlds, and is counted."""
 
+    def ticked(self, rows: Array, status: Array) -> None:
+        """The child has ended its tick in worlds, with statuses ``(k,)``."""
+
+    def is_enough(self, rows: Array) -> Array:
+        """Booleans ``(k,)``: after this round there is no other one, whatever the limit."""
+        return self.xp.zeros_like(rows, dtype=self.xp.bool)
+
     def after(self, child: int, rows: Array, status: Array) -> None:
         """Back, or to the child anew."""
+        self.ticked(rows, status)
         (again, _), (over, said) = self.split(status == self.again_on, rows, status)
         self.end(over, said)
         if not len(again):
             return
         self.rounds[again] += 1
         self.round_ended(again)
-        (enough,), (again,) = self.split(self.rounds[again] == self.limit, again)
+        (enough,), (again,) = self.split((self.rounds[again] == self.limit) | self.is_enough(again), again)
         self.end(enough, self.again_on)
         (wait,), (again,) = self.split(self.began[again], again)
         self.end(wait, RUNNING)
         self.began[again] = True
+        self.round_begins(again)
         self.tick_child(0, again)

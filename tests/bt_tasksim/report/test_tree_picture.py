@@ -154,7 +154,7 @@ def test_deep_trees_are_drawn():
 
 def test_every_kind_of_node_has_a_symbol_and_a_word():
     symbols = [kind.symbol for kind in node_kinds().values()]
-    assert all(symbols) and len(set(symbols)) == len(symbols) == 12
+    assert all(symbols) and len(set(symbols)) == len(symbols) == 14
     assert all(kind.label for kind in node_kinds().values())
 
 
