@@ -18,6 +18,7 @@ from bt_tasksim.trees.backchain import (
     chain_to,
     concept_leaf,
     condition_leaf,
+    condition_named,
     goals_of,
     let_go,
 )
@@ -66,7 +67,8 @@ def tidy(goals: Sequence[Goal], *, parking: str | None = None, name: str = "tidy
 def in_order(goals: Sequence[Goal]) -> list[Goal]:
     """Goals in an order in which they can be reached: towers from below, and what is held at last.
 
-    What may stand anywhere on a place comes after what may not.
+    What may stand anywhere on a place comes after what may not. What others are to stand beside comes before
+    them, unless they all stand beside each other.
 
     Raises:
         InputError: There is none, or goals contradict each other.
@@ -78,19 +80,31 @@ def in_order(goals: Sequence[Goal]) -> list[Goal]:
     of = {goal.object: goal for goal in goals}
     out: list[Goal] = []
 
-    def put(goal: Goal, above: tuple[str, ...]) -> None:
-        if goal.object in above:
-            circle = " on ".join((*above[above.index(goal.object) :], goal.object))
-            raise InputError(f"the goals go round in a circle: {circle}; let one of them go to a place")
+    def put(goal: Goal, above: tuple[Goal, ...]) -> None:
+        if goal in above:
+            _check_circle(above[above.index(goal) :])
+            return
         if goal in out:
             return
         if goal.place in of:
-            put(of[goal.place], (*above, goal.object))
-        out.append(goal)
+            put(of[goal.place], (*above, goal))
+        if goal not in out:
+            out.append(goal)
 
-    for goal in sorted(goals, key=lambda goal: (_condition(goal).in_hand, goal.relation == "anywhere")):
+    for goal in sorted(goals, key=lambda goal: (_condition(goal).in_hand, _condition(goal).leaves_open)):
         put(goal, ())
     return out
+
+
+def _check_circle(goals: Sequence[Goal]) -> None:
+    """Goals of which each refers to the next one's object, and the last one to the first one's.
+
+    Raises:
+        InputError: One of them has to rest on what rests on it.
+    """
+    if any(_condition(goal).rests_on_place for goal in goals):
+        said = ", ".join(str(goal) for goal in goals)
+        raise InputError(f"the goals go round in a circle: {said}; let one of them go to a place")
 
 
 def _check_goals(goals: Sequence[Goal]) -> None:
@@ -111,7 +125,7 @@ def _check_goals(goals: Sequence[Goal]) -> None:
         seen.add(goal.object)
         if goal.place == goal.object:
             raise InputError(f"'{goal.object}' cannot be {goal.relation} itself: name another place")
-        if goal.relation == "on":
+        if _condition(goal).takes_middle:
             other = taken.setdefault((goal.relation, goal.place), goal.object)
             if other != goal.object:
                 raise InputError(
@@ -167,19 +181,8 @@ def _stage(goal: Goal, several: bool) -> Behaviour:
 
 def _not_now(need: Wanted) -> Behaviour:
     """Passes a goal over, where something has to hold first that concepts cannot bring about."""
-    return invert(condition_leaf(need), name=f"not now: {_words(need)}")
-
-
-def _words(need: Wanted) -> str:
-    """Why a goal has to wait."""
-    if "place" not in need.arguments:
-        return f"no {need.condition}"
-    if need.arguments.get("anywhere"):
-        return f"no room on {need.arguments['place']}"
-    return (
-        f"{need.arguments['place']} is taken"
-        if len(need.arguments) > 1
-        else f"{need.arguments['place']} is covered"
+    return invert(
+        condition_leaf(need), name=f"not now: {condition_named(need.condition).unmet(need.arguments)}"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -83,6 +84,13 @@ class Condition(LeafModel, _CalledCondition):
     """The goal relation that it asks about, as far as can be seen; None: no goal is about it."""
     in_hand: ClassVar[bool] = False
     """It can hold only as long as the hand holds something: letting go ends it."""
+    takes_middle: ClassVar[bool] = False
+    """A goal of its `relation` takes the one spot in the middle of its place: of two objects one has it."""
+    leaves_open: ClassVar[bool] = False
+    """A goal of its `relation` leaves open where on the place: its turn is after goals that do not."""
+    rests_on_place: ClassVar[bool] = True
+    """A goal of its `relation` puts its object on or in its place, which has to be where it should be before.
+    Otherwise the two only refer to each other, and may do so in a circle."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._bind(args, kwargs, f"condition {type(self).__name__}")
@@ -94,6 +102,11 @@ class Condition(LeafModel, _CalledCondition):
         By default the first parameter is the goal's object, and the second one its place.
         """
         return dict(zip(cls.parameters(), (goal.object, goal.place), strict=False))
+
+    @classmethod
+    def unmet(cls, arguments: Mapping[str, Any]) -> str:
+        """Why something has to wait where it does not hold, in a few words, for these arguments of it."""
+        return f"no {cls.__name__}"
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:

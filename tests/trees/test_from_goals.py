@@ -130,7 +130,7 @@ def test_what_is_held_in_the_end_comes_last():
         ([], "there is no goal to make a tree from"),
         (Goal("a", "spot"), "found one goal: write tidy"),
         ([Goal("a", "spot"), Goal("a", "table")], "two goals are about 'a'"),
-        ([Goal("a", "b"), Goal("b", "c"), Goal("c", "a")], "in a circle: a on b on c on a"),
+        ([Goal("a", "b"), Goal("b", "c"), Goal("c", "a")], "in a circle: a on b, b on c, c on a"),
         ([Goal("a", "spot"), Goal("b", "spot")], "'a' and 'b' cannot both stand on the middle of 'spot'"),
         ([Goal(n, "table", relation="lifted") for n in "ab"], "the hand can hold one object"),
         (
