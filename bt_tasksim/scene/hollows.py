@@ -47,6 +47,7 @@ def hollow(pieces: Sequence[Array], extent: Sequence[float]) -> Array:
     flat = np.stack(np.meshgrid(*(_middles(half[k], step[k]) for k in range(2)), indexing="ij"), axis=-1)
     flat, levels = flat.reshape(-1, 2), _middles(half[2], step[2])
     floor, open_ = _columns(planes, flat, levels)
+    floor = np.round(floor, 6)  # pieces that lie side by side differ in their last digits
     cell, level = np.nonzero(open_ & np.isfinite(floor))
     walled = np.zeros_like(open_)
     points = np.column_stack([flat[cell], levels[level]])
