@@ -69,6 +69,7 @@ class Shape:
         draw: Makes the mesh that is seen; physics alone never does.
         weigh: Computes `mass`; nobody asks for that of a shape which is only taken to be there.
         surface: Outer surface without hollows.
+        hollowed: Says where it is hollow, see `hollow`; by default that is computed from its pieces.
     """
 
     extent: Size
@@ -76,6 +77,7 @@ class Shape:
     draw: Callable[[], TriangleMesh]
     weigh: Callable[[], MassProperties]
     surface: OuterSurface
+    hollowed: Callable[[], Array] | None = None
 
     @cached_property
     def visual(self) -> TriangleMesh:
@@ -100,7 +102,7 @@ class Shape:
     @cached_property
     def hollow(self) -> Array:
         """Where something may lie within it: boxes ``(k, 6)``, see `bt_tasksim.scene.hollows`."""
-        return hollow(self.pieces, self.extent)
+        return hollow(self.pieces, self.extent) if self.hollowed is None else self.hollowed()
 
     @property
     def volume(self) -> float:

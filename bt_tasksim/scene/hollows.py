@@ -23,6 +23,8 @@ ESCAPES = 1
 """Of these directions so many may meet none: convex parts of a solid leave cracks between them."""
 TURNED = 0.1
 """Radians by which the first line is turned from the x axis, along which parts are often cut."""
+LAPPED = 1e-6
+"""Metres by which columns lap over their neighbours, so that nothing falls between them."""
 MOST = 192
 """Corners of a hull that are kept."""
 _STILL = 1e-9
@@ -41,11 +43,10 @@ def hollow(pieces: Sequence[Array], extent: Sequence[float]) -> Array:
         extent: Full size ``(3,)`` of its bounding box, whose middle is the frame's origin.
     """
     planes = [found for piece in pieces if (found := _planes(piece)) is not None]
-    half, step = np.array(extent, float) / 2, 2.0 * np.array(extent, float) / 2 / [CELLS, CELLS, LEVELS]
     if len(planes) < 2:  # what is convex has no hollow
         return np.zeros((0, 6))
-    flat = np.stack(np.meshgrid(*(_middles(half[k], step[k]) for k in range(2)), indexing="ij"), axis=-1)
-    flat, levels = flat.reshape(-1, 2), _middles(half[2], step[2])
+    cells, step = columns(extent), extent[2] / LEVELS
+    flat, levels = cells[:, :2], _middles(extent[2], LEVELS)
     floor, open_ = _columns(planes, flat, levels)
     floor = np.round(floor, 6)  # pieces that lie side by side differ in their last digits
     cell, level = np.nonzero(open_ & np.isfinite(floor))
@@ -58,8 +59,8 @@ def hollow(pieces: Sequence[Array], extent: Sequence[float]) -> Array:
             (above,) = np.nonzero(floor[k] == low)
             count = int(np.argmin([*walled[k, above], False]))  # from the floor up to the first gap
             if count:
-                rim = levels[above[count - 1]] + step[2] / 2
-                found.append([*flat[k], *(step[:2] / 2), low, rim])
+                rim = levels[above[count - 1]] + step / 2
+                found.append([*cells[k], low, rim])
     return np.array(found, float).reshape(-1, 6)
 
 
@@ -93,9 +94,17 @@ def _all_around(count: int) -> Array:
     return np.column_stack([level * np.cos(angle), level * np.sin(angle), height])
 
 
-def _middles(half: float, step: float) -> Array:
-    """Middles of steps from ``-half`` to ``half``."""
-    return np.arange(-half + step / 2, half, step)
+def columns(extent: Sequence[float]) -> Array:
+    """The columns at which a solid of this full size is looked at: middles and half sizes ``(cells, 4)``."""
+    x, y = np.meshgrid(*(_middles(size, CELLS) for size in extent[:2]), indexing="ij")
+    half = np.array(extent[:2], float) / CELLS / 2 + LAPPED
+    return np.concatenate([x.reshape(-1, 1), y.reshape(-1, 1), np.tile(half, (CELLS**2, 1))], axis=1)
+
+
+def _middles(size: float, count: int) -> Array:
+    """Middles ``(count,)`` of equal parts of a length about 0."""
+    found: Array = size * ((np.arange(count) + 0.5) / count - 0.5)
+    return found
 
 
 def _planes(corners: Array) -> Array | None:

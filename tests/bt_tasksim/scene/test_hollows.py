@@ -44,7 +44,7 @@ def test_points_in_a_cup(across, height, seed):
     size = (across, across, height)
     boxes, rng = shape("cup", ShapeSize(size)).hollow, np.random.default_rng(seed)
     points = rng.uniform(-0.6, 0.6, (200, 3)) * size
-    near = np.abs(points[:, None, :2] - boxes[:, :2]) <= boxes[:, 2:4] + 1e-9
+    near = np.abs(points[:, None, :2] - boxes[:, :2]) <= boxes[:, 2:4]
     level = (points[:, None, 2] >= boxes[:, 4]) & (points[:, None, 2] <= boxes[:, 5])
     found = (near.all(axis=-1) & level).any(axis=1)
     radius, floor = across / 2 - 0.004, -height / 2 + min(0.005, height / 4)
@@ -52,6 +52,13 @@ def test_points_in_a_cup(across, height, seed):
     well = (away < radius - cell) & (points[:, 2] > floor + 1e-6) & (points[:, 2] < height / 2)
     off = (away > radius + cell) | (points[:, 2] < floor - 1e-6) | (points[:, 2] > height / 2)
     assert found[well].all() and not found[off].any()
+
+
+def test_a_cup_says_at_once_what_its_pieces_say():
+    made = shape("cup", ShapeSize((0.07, 0.07, 0.1)))
+    found = hollow(made.pieces, made.extent)
+    assert np.allclose(np.unique(found[:, 4:], axis=0), [[-0.045, 0.05]], atol=1e-6)
+    assert {tuple(c) for c in made.hollow[:, :2].round(6)} == {tuple(c) for c in found[:, :2].round(6)}
 
 
 @given(solids(kinds=[kind for kind in sorted(KINDS) if kind not in ("mesh", "cup")]))
