@@ -48,7 +48,6 @@ def hollow(pieces: Sequence[Array], extent: Sequence[float]) -> Array:
     cells, step = columns(extent), extent[2] / LEVELS
     flat, levels = cells[:, :2], _middles(extent[2], LEVELS)
     floor, open_ = _columns(planes, flat, levels)
-    floor = np.round(floor, 6)  # pieces that lie side by side differ in their last digits
     cell, level = np.nonzero(open_ & np.isfinite(floor))
     walled = np.zeros_like(open_)
     points = np.column_stack([flat[cell], levels[level]])
@@ -134,7 +133,7 @@ def _columns(planes: Sequence[Array], flat: Array, levels: Array) -> tuple[Array
         met = low < high
         floor = np.where(met & (high <= levels), np.maximum(floor, high), floor)
         free &= ~(met & (low < levels) & (levels < high))
-    return floor, free
+    return np.round(floor, 6), free  # pieces side by side differ in their last digits
 
 
 def _walled(planes: Sequence[Array], points: Array) -> Array:
