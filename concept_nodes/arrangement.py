@@ -2,35 +2,43 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.functions import booleans
-from bt_tasksim.concept.parameters import Flag, Metres, ObjectName, PlaceName
+from bt_tasksim.concept.parameters import Flag, Metres, ObjectName, PlaceName, Radians
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
-from bt_tasksim.concept_nodes.hand_conditions import height_above, how_far_apart
-from bt_tasksim.concept_nodes.inside_of import beyond_walls
-from bt_tasksim.concept_nodes.surface import NEAR, apart, edges, straight_down
+from bt_tasksim.concept_nodes.hand_conditions import height_above
+from bt_tasksim.concept_nodes.spots import has_room
+from bt_tasksim.concept_nodes.surface import NEAR, edges
+from bt_tasksim.concept_nodes.view import views
+from bt_tasksim.concept_nodes.whereabouts import Estimates
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Statement
-from bt_tasksim.core.poses import Array, array_namespace, constant, host
+from bt_tasksim.core.poses import Array, array_namespace, constant, host, indices
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.units import METRES
+from bt_tasksim.core.units import METRES, RADIANS
+from bt_tasksim.scene.spatial_laws import beyond_walls, is_beside, is_on
 from bt_tasksim.scene.specs import Goal
 
 WITHIN = Form(
     "{object} is {aside} off the middle of {place}, {height} above its floor",
     {"aside": METRES, "height": METRES},
 )
-STANDS = Form("{object} is {aside} off and {height} above {place}", {"aside": METRES, "height": METRES})
+STANDS = Form(
+    "{object} is {aside} beyond the edges of {place}, {height} above it, tilted by {angle:.0f}{upon}",
+    {"aside": METRES, "height": METRES, "angle": RADIANS},
+)
+BESIDE = Form(
+    "{object} is {gap} from {other}, {height} higher, and one of them tilted by {angle:.0f}",
+    {"gap": METRES, "height": METRES, "angle": RADIANS},
+)
+UPON = ", on something else that is there"
 ROOM = Form("{place} {state}")
-FINE = 15
-"""Points along each side of a place at which room is looked for."""
 LEVEL = 0.02
 """Metres between what is on a surface and the surface, as far as estimates tell."""
 
@@ -38,6 +46,8 @@ LEVEL = 0.02
 @register("concept")
 class Inside(Condition):
     """Is the object in the container: below its rim, or standing on its floor?
+
+    In another object it is where that is hollow: above its floor, and with walls around.
 
     Args:
         target: The object.
@@ -51,7 +61,7 @@ class Inside(Condition):
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        return beyond_walls(seen, self.target, self.place) <= 0.0
+        return beyond_walls(Estimates(seen), self.target, self.place) <= 0.0
 
     def explain(self, seen: Seen) -> Statement:
         """Where it is."""
@@ -67,65 +77,82 @@ class Inside(Condition):
 
 @register("concept")
 class StandsOn(Condition):
-    """Does the object stand or lie on the place, wherever on it?
+    """Does the object stand upright on the place, wherever on it, and on nothing else that is there?
 
     Args:
         target: The object.
         place: The place, or another object.
+        tolerance: How far its lowest point may seem to be above or below the surface.
+        angle: How far it may be tilted.
     """
 
     target: ObjectName
     place: PlaceName
+    tolerance: Metres = Goal.position_tolerance
+    angle: Radians = Goal.angle_tolerance
 
     relation = "anywhere"
+    leaves_open = True
+
+    @classmethod
+    def from_goal(cls, goal: Goal) -> dict[str, Any]:
+        """See `Condition.from_goal`."""
+        return {"target": goal.object, "place": goal.place, **_tolerances(goal)}
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        local, height = self._local(seen)
-        centre, half = edges(seen, self.place)
-        xp = array_namespace(local)
-        return xp.all(abs(local[:, :2] - centre) <= half, axis=-1) & (abs(height) < LEVEL)
+        return is_on(Estimates(seen), self.target, self.place).holds(self.tolerance, self.angle)
 
     def explain(self, seen: Seen) -> Statement:
         """Where it is."""
-        local, height = self._local(seen)
-        return STANDS(object=self.target, aside=poses.norm(local[:, :2]), height=height, place=self.place)
-
-    def _local(self, seen: Seen) -> tuple[Array, Array]:
-        frame, _ = destination(seen, self.place)
-        local = poses.localise(frame, seen.object(self.target)[:, :3])
-        return local, height_above(seen, self.target, frame)
+        found = is_on(Estimates(seen), self.target, self.place)
+        upon = tuple(UPON if there else "" for there in host(found.elsewhere).tolist())
+        return STANDS(
+            object=self.target,
+            aside=found.aside,
+            height=found.height,
+            place=self.place,
+            angle=found.lean,
+            upon=upon,
+        )
 
 
 @register("concept")
 class Beside(Condition):
-    """Does the object stand next to another one, on the same level?
+    """Does the object stand upright next to another one, on the same level?
 
     Args:
         target: The object.
         other: The other one.
-        gap: How much room there may be between their bounding boxes.
+        gap: How much room there may be between their outlines from above.
+        tolerance: How far their lowest points may seem to differ in height.
+        angle: How far each may be tilted.
     """
 
     target: ObjectName
     other: ObjectName
     gap: Metres = NEAR
+    tolerance: Metres = Goal.position_tolerance
+    angle: Radians = Goal.angle_tolerance
 
     relation = "beside"
+    rests_on_place = False
 
     @classmethod
     def from_goal(cls, goal: Goal) -> dict[str, Any]:
         """See `Condition.from_goal`."""
-        return {"target": goal.object, "other": goal.place, "gap": goal.distance}
+        return {"target": goal.object, "other": goal.place, "gap": goal.distance, **_tolerances(goal)}
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        gap, height = apart(seen, self.target, self.other)
-        return (gap < self.gap) & (abs(height) < LEVEL)
+        found = is_beside(Estimates(seen), self.target, self.other)
+        return found.holds(self.gap, self.tolerance, self.angle)
 
     def explain(self, seen: Seen) -> Statement:
-        """How far apart they are."""
-        return how_far_apart(seen, self.target, self.other)
+        """How far apart they are, and how far tilted."""
+        found = is_beside(Estimates(seen), self.target, self.other)
+        angle = array_namespace(found.lean).maximum(found.lean, found.other_lean)
+        return BESIDE(object=self.target, gap=found.gap, other=self.other, height=found.height, angle=angle)
 
 
 @register("concept")
@@ -137,7 +164,8 @@ class Clear(Condition):
         target: What is to stand on the place's origin: other objects may be on the place then, as long as
             they leave room for it. None: nothing at all may be there.
         margin: Room that is left around the target.
-        anywhere: There has to be room for the target somewhere on the place, wherever that is.
+        anywhere: There has to be room for the target somewhere on the place: a free spot that `Bring` would
+            find.
     """
 
     place: PlaceName
@@ -147,54 +175,64 @@ class Clear(Condition):
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        free = booleans(seen.tool, True)[:, None]
+        if self.anywhere and self.target is not None:
+            return indices(np.array(self._rooms(seen, self.target)), seen.tool)
+        free = booleans(seen.tool, True)
         for there in self._occupied(seen).values():
             free = free & ~there
-        return array_namespace(free).any(free, axis=-1)
+        return free
 
     def explain(self, seen: Seen) -> Statement:
         """What is there."""
+        if self.anywhere and self.target is not None:
+            rooms = self._rooms(seen, self.target)
+            return ROOM(
+                place=self.place,
+                state=tuple("has room" if room else f"has no room for {self.target}" for room in rooms),
+            )
         found = {name: host(there) for name, there in self._occupied(seen).items()}
         free, states = host(self.holds(seen)), []
-        taken = "has no room beside" if self.anywhere else "is taken by"
         for world in range(seen.tool.shape[0]):
-            names = [name for name, there in found.items() if bool(there[world].any())]
-            states.append("is free" if free[world] else f"{taken} {', '.join(names)}")
+            names = [name for name, there in found.items() if bool(there[world])]
+            states.append("is free" if free[world] else f"is taken by {', '.join(names)}")
         return ROOM(place=self.place, state=tuple(states))
 
+    def _rooms(self, seen: Seen, target: str) -> list[bool]:
+        """Of each world, whether there is room for the target: a search, one world after the other."""
+        return [has_room(view, target, self.place, self.margin) for view in views(seen)]
+
     def _occupied(self, seen: Seen) -> dict[str, Array]:
-        """By object, booleans ``(N, k)``: it is in the way of the spots that are asked about."""
+        """By object, booleans ``(N,)``: it is in the way."""
         frame, _ = destination(seen, self.place)
         xp = array_namespace(frame)
-        up = poses.z_axis(frame[:, 3:])
-        middle, half = edges(seen, self.place)
+        spot, half = edges(seen, self.place)
         room: Array | float = LEVEL
-        spots = middle[:, None, :]
         if self.target is not None:
             model, now = seen.model(self.target), seen.object(self.target)
-            stands = straight_down(frame, now, model) if self.anywhere else standing_pose(frame, now, model)
-            own = _footprint(seen, self.target, stands, frame)
-            spots = poses.localise(frame, stands[:, :3])[:, None, :2]
-            if self.anywhere:
-                spots = middle[:, None, :] + poses.clip(half - own, 0.0, math.inf)[:, None, :] * _grid(middle)
-            half, room = own + self.margin, 2.0 * half_extent(stands, model, up)
+            stands = standing_pose(frame, now, model)
+            spot = poses.localise(frame, stands[:, :3])[:, :2]
+            half = _footprint(seen, self.target, stands, frame) + self.margin
+            room = 2.0 * half_extent(stands, model, poses.z_axis(frame[:, 3:]))
         found = {}
         for name, column in seen.world.columns.items():
             if name in (self.place, self.target):
                 continue
             pose = seen.object(name)
-            beside = abs(poses.localise(frame, pose[:, :3])[:, None, :2] - spots)
-            meets = xp.all(beside < (half + _footprint(seen, name, pose, frame))[:, None, :], axis=-1)
+            beside = abs(poses.localise(frame, pose[:, :3])[:, :2] - spot)
+            meets = xp.all(beside < half + _footprint(seen, name, pose, frame), axis=-1)
             height = height_above(seen, name, frame)
             there = seen.world.object_facts.present[:, column]
-            found[name] = (there & (height > -LEVEL) & (height < room))[:, None] & meets
+            found[name] = there & (height > -LEVEL) & (height < room) & meets
         return found
 
 
-def _grid(like: Array) -> Array:
-    """Points ``(1, k, 2)`` all over a square from -1 to 1."""
-    steps = np.linspace(-1.0, 1.0, FINE)
-    return constant(np.stack(np.meshgrid(steps, steps), axis=-1).reshape(1, -1, 2), like)
+def _tolerances(goal: Goal) -> dict[str, float]:
+    """Arguments of conditions for what a goal asks for other than usual."""
+    asked = {
+        "tolerance": (goal.position_tolerance, Goal.position_tolerance),
+        "angle": (goal.angle_tolerance, Goal.angle_tolerance),
+    }
+    return {name: value for name, (value, usual) in asked.items() if value != usual}
 
 
 def _footprint(seen: Seen, name: str, pose: Array, frame: Array) -> Array:

@@ -360,7 +360,6 @@ def _found(
     Raises:
         NoWayError: There is no way.
     """
-
     few = len(view.arm) < FULL
     leaning = None if few else _leaning(view, target, goals)
 

@@ -60,6 +60,7 @@ class AtPose(Condition):
     angle: Radians = 0.2
 
     relation = "on"
+    takes_middle = True
 
     @classmethod
     def from_goal(cls, goal: Goal) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def _nowhere(like: Array) -> PlaceFacts:
     up = none[:, None] + constant([0.0, 0.0, 1.0], like)
     pose = none[:, None] + constant([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], like)
     flags = xp.zeros((n,), dtype=xp.bool, device=like.device)
-    return PlaceFacts(flags, pose, up[:, :2], up[:, :2], none, up, up, none, flags, none)
+    return PlaceFacts(flags, pose, up[:, :2], up[:, :2], none, up, up, none, flags, none, flags)
 
 
 def grasp_pose(

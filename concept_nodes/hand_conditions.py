@@ -10,12 +10,13 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.bring import destination
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
 from bt_tasksim.concept_nodes.holding import holding, tool_distance
-from bt_tasksim.concept_nodes.surface import NEAR, apart, beyond_edges, edges
+from bt_tasksim.concept_nodes.surface import NEAR, apart, edges
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT, METRES, SHARE
+from bt_tasksim.scene.spatial_laws import beyond_edges
 from bt_tasksim.scene.specs import Goal
 
 HAND = Form(
@@ -163,13 +164,8 @@ class OverBeside(Condition):
 
     def explain(self, seen: Seen) -> Statement:
         """How far apart they are."""
-        return how_far_apart(seen, self.target, self.other)
-
-
-def how_far_apart(seen: Seen, target: str, other: str) -> Statement:
-    """How far an object is from another one, and how much higher."""
-    gap, height = apart(seen, target, other)
-    return APART(object=target, gap=gap, other=other, height=height)
+        gap, height = apart(seen, self.target, self.other)
+        return APART(object=self.target, gap=gap, other=self.other, height=height)
 
 
 def height_above(seen: Seen, target: str, frame: Array) -> Array:

@@ -36,7 +36,6 @@ from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, s
 from bt_tasksim.concept_nodes.surface import (
     NEAR,
     apart,
-    beyond_edges,
     edges,
     level_of,
     straight_down,
@@ -55,6 +54,7 @@ from bt_tasksim.planning.reference_motion import Path, plan, posture, sample, se
 from bt_tasksim.planning.route import Pace, Route, followed
 from bt_tasksim.planning.routes import SAMPLES, with_routes
 from bt_tasksim.planning.things import Leave
+from bt_tasksim.scene.spatial_laws import beyond_edges
 
 NOT_ABOVE = register_reason("not_above", "{object} is {aside} beyond the edge of {place}", aside=METRES)
 NOT_BESIDE = register_reason(

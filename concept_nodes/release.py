@@ -17,11 +17,11 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING
 from bt_tasksim.concept_nodes.holding import HOLDING
-from bt_tasksim.concept_nodes.inside_of import beyond_walls
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.retreat import Retreat, clear_retreat, retreat_path
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, views
+from bt_tasksim.concept_nodes.whereabouts import Estimates
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import Form, Statement, register_reason
@@ -32,6 +32,7 @@ from bt_tasksim.core.world import Command
 from bt_tasksim.planning.reference_motion import Path, posture, sample
 from bt_tasksim.planning.things import Leave
 from bt_tasksim.robot.kinematics.hand import SPARE, opened_about, standing_side, wide_at
+from bt_tasksim.scene.spatial_laws import beyond_walls
 
 OPENED = Form(
     "hand {opening} open, {contacts} fingertips in contact, {force} at the wrist{touch}",
@@ -178,7 +179,7 @@ class Release(ConceptModel[ReleaseMemory]):
         xp = array_namespace(seen.tool)
         if self.into is None or self.into not in seen.world.place_columns:
             return xp.zeros_like(seen.tool[:, 0])
-        far = beyond_walls(seen, self.target, self.into)
+        far = beyond_walls(Estimates(seen), self.target, self.into)
         far = xp.maximum(far, xp.zeros_like(far))
         return xp.where(xp.isfinite(far), far, xp.zeros_like(far))
 

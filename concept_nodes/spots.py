@@ -6,7 +6,7 @@ what stands at the same height. Whether an arm can put the object there is asked
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -120,12 +120,36 @@ def spots_on(view: WorldView, target: str, place: str) -> Spots:
     """
     surface = surface_of(view, place)
     search = _Search(view, target, surface.frame, (place,))
-    found = []
+    return search.spots(list(_free_on(surface, search)), [surface], f"anywhere on {place}")
+
+
+def has_room(view: WorldView, target: str, place: str, margin: float = 0.0) -> bool:
+    """There is a spot where an object may stand on a place or on another object, as of `spots_on`.
+
+    What was never seen finds no room, and nothing does on what was never seen.
+
+    Args:
+        view: The world.
+        target: The object.
+        place: The place, or the other object.
+        margin: Metres of room around the object, more than the least.
+    """
+    known = (view.objects.get(target), view.objects.get(place, np.zeros(7)))
+    if place not in view.world.places and place not in view.objects:
+        return False
+    if any(pose is None or not bool(np.isfinite(pose).all()) for pose in known):
+        return False
+    surface = surface_of(view, place)
+    search = _Search(view, target, surface.frame, (place,), LEAST + margin)
+    return any(len(found.points) for found in _free_on(surface, search))
+
+
+def _free_on(surface: FreeSurface, search: _Search) -> Iterator[_Found]:
+    """Free spots on a surface, one heading after the other."""
     for turn, outline in enumerate(search.outlines):
         points = _grid(surface, outline)
         away = np.linalg.norm(points - surface.frame[:2], axis=1)
-        found.append(search.rated(points, turn, away, 0))
-    return search.spots(found, [surface], f"anywhere on {place}")
+        yield search.rated(points, turn, away, 0)
 
 
 def spots_beside(view: WorldView, target: str, other: str, gap: float = GAP) -> Spots:
@@ -200,10 +224,13 @@ class _Search:
         target: The object.
         frame: Frame ``(7,)`` of the level.
         own: Places that may be stood on.
+        least: Metres of room around the object.
     """
 
-    def __init__(self, view: WorldView, target: str, frame: Array, own: Sequence[str]) -> None:
-        self._view, self._target, self._frame = view, target, frame
+    def __init__(
+        self, view: WorldView, target: str, frame: Array, own: Sequence[str], least: float = LEAST
+    ) -> None:
+        self._view, self._target, self._frame, self._least = view, target, frame, least
         model, now = view.model(target), view.objects[target]
         stands = upright(frame[None], now[None], np.array([model.cubic]))[0]
         along = float(np.subtract(*heading_of(np.stack([frame, np.concatenate([now[:3], stands])]))))
@@ -234,7 +261,7 @@ class _Search:
         outline = self.outlines[turn]
         gaps = Room(outline, [other for name, other in self._things if name != except_for]).gaps(points)
         near = Room(outline, [other for name, other in self._things if name == except_for]).gaps(points)
-        free = (gaps > LEAST) & (near > 0.0)
+        free = (gaps > self._least) & (near > 0.0)
         covers = Room(outline, self._reserved).gaps(points) < 0.0
         bearing = np.arctan2(points[:, 1], points[:, 0]) - self._bearing
         turned = np.abs(np.angle(np.exp(1j * (self._angles[turn] - bearing))))

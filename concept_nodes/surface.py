@@ -23,19 +23,6 @@ def edges(seen: Seen, name: str) -> tuple[Array, Array]:
     return array_namespace(half).zeros_like(half), half
 
 
-def beyond_edges(frame: Array, centre: Array, half: Array, now: Array) -> Array:
-    """Distance ``(N,)`` in metres by which objects are not above a rectangle; 0 where they are.
-
-    Args:
-        frame: Poses ``(N, 7)`` of the surfaces.
-        centre: Middles ``(N, 2)`` of the rectangles in these frames.
-        half: Their half sizes ``(N, 2)``.
-        now: Poses ``(N, 7)`` of the objects.
-    """
-    local = poses.localise(frame, now[:, :3])[:, :2]
-    return poses.norm(poses.clip(abs(local - centre) - half, 0.0, math.inf))
-
-
 def straight_down(
     frame: Array, now: Array, model: ObjectFacts, rectangle: tuple[Array, Array] | None = None
 ) -> Array:

@@ -56,8 +56,7 @@ def tidy(goals: Sequence[Goal], *, parking: str | None = None, name: str = "tidy
         InputError: There is no goal, goals contradict each other, or no concept brings one about.
     """
     order = in_order(goals)
-    of = {goal.object: goal for goal in order}
-    stages = [_stage(goal, of.get(goal.place)) for goal in order]
+    stages = [_stage(goal, _about(order[:k], goal.place)) for k, goal in enumerate(order)]
     if len(order) == 1:
         stages[0].name = name
         return stages[0]
@@ -73,7 +72,8 @@ def tidy(goals: Sequence[Goal], *, parking: str | None = None, name: str = "tidy
 def in_order(goals: Sequence[Goal]) -> list[Goal]:
     """Goals in an order in which they can be reached: towers from below, and what is held at last.
 
-    What may stand anywhere on a place comes after what may not.
+    What may stand anywhere on a place comes after what may not. What others are to stand beside comes before
+    them, unless they all stand beside each other.
 
     Raises:
         InputError: There is none, or goals contradict each other.
@@ -85,19 +85,31 @@ def in_order(goals: Sequence[Goal]) -> list[Goal]:
     of = {goal.object: goal for goal in goals}
     out: list[Goal] = []
 
-    def put(goal: Goal, above: tuple[str, ...]) -> None:
-        if goal.object in above:
-            circle = " on ".join((*above[above.index(goal.object) :], goal.object))
-            raise InputError(f"the goals go round in a circle: {circle}; let one of them go to a place")
+    def put(goal: Goal, above: tuple[Goal, ...]) -> None:
+        if goal in above:
+            _check_circle(above[above.index(goal) :])
+            return
         if goal in out:
             return
         if goal.place in of:
-            put(of[goal.place], (*above, goal.object))
-        out.append(goal)
+            put(of[goal.place], (*above, goal))
+        if goal not in out:
+            out.append(goal)
 
-    for goal in sorted(goals, key=lambda goal: (_condition(goal).in_hand, goal.relation == "anywhere")):
+    for goal in sorted(goals, key=lambda goal: (_condition(goal).in_hand, _condition(goal).leaves_open)):
         put(goal, ())
     return out
+
+
+def _check_circle(goals: Sequence[Goal]) -> None:
+    """Goals of which each refers to the next one's object, and the last one to the first one's.
+
+    Raises:
+        InputError: One of them has to rest on what rests on it.
+    """
+    if any(_condition(goal).rests_on_place for goal in goals):
+        said = ", ".join(str(goal) for goal in goals)
+        raise InputError(f"the goals go round in a circle: {said}; let one of them go to a place")
 
 
 def _check_goals(goals: Sequence[Goal]) -> None:
@@ -118,7 +130,7 @@ def _check_goals(goals: Sequence[Goal]) -> None:
         seen.add(goal.object)
         if goal.place == goal.object:
             raise InputError(f"'{goal.object}' cannot be {goal.relation} itself: name another place")
-        if goal.relation == "on":
+        if _condition(goal).takes_middle:
             other = taken.setdefault((goal.relation, goal.place), goal.object)
             if other != goal.object:
                 raise InputError(
@@ -162,12 +174,17 @@ def _check(goal: Goal) -> Behaviour:
     return condition_leaf(_asked(goal))
 
 
+def _about(goals: Sequence[Goal], name: str) -> Goal | None:
+    """The goal of an object, if it has one of these."""
+    return next((goal for goal in goals if goal.object == name), None)
+
+
 def _stage(goal: Goal, below: Goal | None = None) -> Behaviour:
     """A fallback that reaches one goal.
 
     Args:
         goal: The goal.
-        below: The goal of what the object is to stand on, which comes first.
+        below: The goal of what the object is to stand on or beside, where that comes first.
     """
     wanted, title = _asked(goal), f"{goal.object} {goal.relation} {goal.place}"
     chain = _chain(goal, wanted)

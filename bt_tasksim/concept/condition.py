@@ -83,6 +83,13 @@ class Condition(LeafModel, _CalledCondition):
     """The goal relation that it asks about, as far as can be seen; None: no goal is about it."""
     in_hand: ClassVar[bool] = False
     """It can hold only as long as the hand holds something: letting go ends it."""
+    takes_middle: ClassVar[bool] = False
+    """A goal of its `relation` takes the one spot in the middle of its place: of two objects one has it."""
+    leaves_open: ClassVar[bool] = False
+    """A goal of its `relation` leaves open where on the place: its turn is after goals that do not."""
+    rests_on_place: ClassVar[bool] = True
+    """A goal of its `relation` puts its object on or in its place, which has to be where it should be before.
+    Otherwise the two only refer to each other, and may do so in a circle."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._bind(args, kwargs, f"condition {type(self).__name__}")

@@ -78,6 +78,7 @@ class PlaceFacts(FactArrays):
         clearance: ``(...)`` metres.
         container: Boolean ``(...)``: it is one, such as a bin, and ``height`` is that of its walls.
         rank: ``(...)`` its number among the places of its own world, whichever column it has.
+        carries: Boolean ``(...)``: it is of some furniture, and no mark in the air.
     """
 
     present: Array
@@ -90,6 +91,7 @@ class PlaceFacts(FactArrays):
     clearance: Array
     container: Array
     rank: Array
+    carries: Array
 
     @property
     def rim(self) -> Array:

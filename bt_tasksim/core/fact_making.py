@@ -61,6 +61,7 @@ def place_facts(worlds: Sequence[WorldModel], names: Sequence[str]) -> PlaceFact
         clearance=each(lambda place: place.clearance, 0.0),
         container=each(lambda place: place.kind == "bin", False),
         rank=np.array(ranks, float).reshape(shape),
+        carries=each(lambda place: bool(place.fixture), False),
     )
 
 

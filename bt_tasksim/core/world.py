@@ -25,6 +25,14 @@ class KnownGeometry(Protocol):
         """Corners ``(n, 3)`` of convex pieces that together are the solid, object's frame, metres."""
 
     @property
+    def outer(self) -> Array:
+        """Corners ``(n, 3)`` of their convex hull, likewise."""
+
+    @property
+    def hollow(self) -> Array:
+        """Where something may lie within it ``(k, 6)``, see `bt_tasksim.scene.hollows.hollow`."""
+
+    @property
     def grips(self) -> Any:
         """Where two fingers may hold it: `bt_tasksim.scene.grips.Grips`."""
 

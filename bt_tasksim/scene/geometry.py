@@ -15,6 +15,7 @@ import numpy as np
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene import meshes
+from bt_tasksim.scene.hollows import hollow, outer_corners
 from bt_tasksim.scene.meshes import MassProperties, TriangleMesh
 from bt_tasksim.scene.surfaces import Ellipse, OuterSurface, Polygon, PrismSurface
 
@@ -68,6 +69,7 @@ class Shape:
         draw: Makes the mesh that is seen; physics alone never does.
         weigh: Computes `mass`; nobody asks for that of a shape which is only taken to be there.
         surface: Outer surface without hollows.
+        hollowed: Says where it is hollow, see `hollow`; by default that is computed from its pieces.
     """
 
     extent: Size
@@ -75,6 +77,7 @@ class Shape:
     draw: Callable[[], TriangleMesh]
     weigh: Callable[[], MassProperties]
     surface: OuterSurface
+    hollowed: Callable[[], Array] | None = None
 
     @cached_property
     def visual(self) -> TriangleMesh:
@@ -85,6 +88,21 @@ class Shape:
     def mass(self) -> MassProperties:
         """Volume, centre of mass and inertia for 1 kg."""
         return self.weigh()
+
+    @cached_property
+    def pieces(self) -> tuple[Array, ...]:
+        """Corners ``(n, 3)`` of each of its convex pieces, metres."""
+        return tuple(piece.corners() for piece in self.collision)
+
+    @cached_property
+    def outer(self) -> Array:
+        """Corners ``(n, 3)`` of the convex hull of all pieces, metres."""
+        return outer_corners(self.pieces)
+
+    @cached_property
+    def hollow(self) -> Array:
+        """Where something may lie within it: boxes ``(k, 6)``, see `bt_tasksim.scene.hollows`."""
+        return hollow(self.pieces, self.extent) if self.hollowed is None else self.hollowed()
 
     @property
     def volume(self) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 
 from bt_tasksim.core.files import file_version
 from bt_tasksim.core.poses import Array
@@ -135,7 +135,17 @@ class KnownSolid:
     @property
     def pieces(self) -> tuple[Array, ...]:
         """See `KnownGeometry.pieces`."""
-        return tuple(piece.corners() for piece in self.shape.collision)
+        return self.shape.pieces
+
+    @cached_property
+    def outer(self) -> Array:
+        """See `KnownGeometry.outer`."""
+        return self.shape.outer
+
+    @cached_property
+    def hollow(self) -> Array:
+        """See `KnownGeometry.hollow`."""
+        return self.shape.hollow
 
     @property
     def grips(self) -> Grips:

@@ -16,6 +16,7 @@ from bt_tasksim.core.world import ObjectModel, PlaceModel
 from bt_tasksim.scene.configuration import ObjectActor
 from bt_tasksim.scene.fixtures import Fixture
 from bt_tasksim.scene.geometry import Piece
+from bt_tasksim.scene.hollows import outer_corners
 from bt_tasksim.scene.outlines import (
     TOUCHING,
     Slab,
@@ -29,6 +30,7 @@ from bt_tasksim.scene.outlines import (
     whole_outline,
 )
 from bt_tasksim.scene.shape_kind import ShapeKind
+from bt_tasksim.scene.spatial_laws import Body, Hollow, beyond_hollow
 from bt_tasksim.scene.specs import ObjectSpec
 
 
@@ -102,6 +104,16 @@ class Candidate:
                 return False
         return True
 
+    def within(self, container: ObjectActor) -> bool:
+        """Its middle is in the hollow of another object."""
+        body = Body(
+            self.pose[None], outer_corners([p.corners() for p in self.pieces])[None], np.zeros(1, bool)
+        )
+        boxes = container.shape().hollow
+        return bool(len(boxes)) and bool(
+            beyond_hollow(body, Hollow(np.array(container.pose)[None], boxes[None]))[0] <= 0.0
+        )
+
     def stuck_in(self, fixtures: Sequence[Fixture]) -> Fixture | None:
         """The first fixture that it would stand in; None where it stands in none."""
         radius = _radius(self.extent)
@@ -171,8 +183,7 @@ class Start:
         if self.actor is None:
             return holds(room, outline, spec.gap)
         if self.word == "inside":
-            rim = max(part.high for part in parts_of(self.actor))
-            return holds(room, outline) and float(tried.pose[2]) < rim - TOUCHING
+            return holds(room, outline) and tried.within(self.actor)
         away = distance(outline, whole_outline(parts_of(self.actor)))
         return away <= spec.distance and holds(room, outline)
 
@@ -189,7 +200,7 @@ def start_of(
         drawn: The objects that were drawn before, by name.
 
     Raises:
-        InputError: There is no such place or object, or it is beside a place.
+        InputError: There is no such place or object, it is beside a place, or in what has no hollow.
     """
     word, reference = spec.start
     if reference not in drawn:
@@ -216,8 +227,20 @@ def top_of(actor: ObjectActor, places: Mapping[str, PlaceModel]) -> PlaceModel:
 
 
 def _floor_of(actor: ObjectActor, places: Mapping[str, PlaceModel]) -> PlaceModel:
-    """The room within an object as a place, its origin on the object's lowest point."""
-    return _place_at(actor, min(part.low for part in parts_of(actor)), places)
+    """The room within an object as a place at the height of its lowest point: all that its hollow covers.
+
+    Raises:
+        InputError: It has no hollow.
+    """
+    boxes = actor.shape().hollow
+    if not len(boxes):
+        raise InputError(
+            f"nothing can start in '{actor.name}': it has no hollow with a floor and walls all around"
+        )
+    low, high = np.min(boxes[:, :2] - boxes[:, 2:4], axis=0), np.max(boxes[:, :2] + boxes[:, 2:4], axis=0)
+    floor = _place_at(actor, min(part.low for part in parts_of(actor)), places)
+    (x, y), (width, depth) = ((low + high) / 2).tolist(), (high - low).tolist()
+    return replace(floor, extent=(width, depth), centre=(x, y))
 
 
 def _place_at(actor: ObjectActor, height: float, places: Mapping[str, PlaceModel]) -> PlaceModel:

@@ -133,9 +133,10 @@ def test_what_is_held_in_the_end_comes_last():
         ([], "there is no goal to make a tree from"),
         (Goal("a", "spot"), "found one goal: write tidy"),
         ([Goal("a", "spot"), Goal("a", "table")], "two goals are about 'a'"),
-        ([Goal("a", "b"), Goal("b", "c"), Goal("c", "a")], "in a circle: a on b on c on a"),
+        ([Goal("a", "b"), Goal("b", "c"), Goal("c", "a")], "in a circle: a on b, b on c, c on a"),
         ([Goal("a", "spot"), Goal("b", "spot")], "'a' and 'b' cannot both stand on the middle of 'spot'"),
         ([Goal(n, "table", relation="lifted") for n in "ab"], "the hand can hold one object"),
+        ([Goal("a", "b"), Goal("b", beside="a")], "in a circle: a on b, b beside a"),
         (
             [Goal("a", "table", relation="lifted"), Goal("b", "a")],
             "'b' cannot be on 'a', which is to be held in the end",
@@ -145,6 +146,26 @@ def test_what_is_held_in_the_end_comes_last():
 def test_goals_that_contradict_each_other_are_refused(goals, sentence):
     with pytest.raises(InputError, match=sentence):
         tidy(goals)
+
+
+def test_what_stands_beside_one_another_may_do_so_in_a_circle():
+    goals = [Goal("a", beside="b"), Goal("b", beside="a"), Goal("c", beside="a")]
+    order = in_order(goals)
+    assert sorted(map(str, order)) == sorted(map(str, goals))
+    assert order.index(goals[2]) > order.index(goals[0])
+    assert acts(tidy(goals)).count("Bring(target='a', beside='b')") == 1
+
+
+def test_a_relation_from_outside_says_itself_what_it_needs(upside_down):
+    """What leaves open where has its turn last, and of what takes the middle there is one on a place."""
+    kind = asks_whether_it_is_upside_down()
+    goals = [upside_down, Goal("box", "spot")]
+    assert in_order(goals) == goals
+    kind.leaves_open = True
+    assert in_order(goals) == goals[::-1]
+    kind.takes_middle = True
+    with pytest.raises(InputError, match="cannot both stand on the middle of 'table'"):
+        in_order([upside_down, Goal("box", "table", relation="upside_down")])
 
 
 @pytest.fixture
@@ -171,6 +192,8 @@ def asks_whether_it_is_upside_down():
 
         def holds(self, seen):
             raise NotImplementedError
+
+    return UpsideDown
 
 
 def test_a_relation_that_nothing_asks_about_is_refused(upside_down):

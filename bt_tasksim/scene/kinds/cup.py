@@ -8,11 +8,13 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.scene import meshes
-from bt_tasksim.scene.geometry import BoxPiece, Piece, Shape, ShapeSize, upright_piece
+from bt_tasksim.scene.geometry import BoxPiece, Piece, Shape, ShapeSize, Size, upright_piece
 from bt_tasksim.scene.grip_places import AROUND, elliptic_grips
 from bt_tasksim.scene.grips import Grips, firm_about
+from bt_tasksim.scene.hollows import columns
 from bt_tasksim.scene.shape_kind import ShapeKind
 from bt_tasksim.scene.surfaces import Ellipse, PrismSurface
 
@@ -64,6 +66,7 @@ class CupKind(ShapeKind):
             draw=lambda: visual,
             weigh=lambda: meshes.mass_properties(visual),
             surface=PrismSurface(Ellipse(radius, radius), h),
+            hollowed=lambda: _hollow(radius - WALL, (2 * radius, 2 * radius, height), base - h),
         )
 
     def grips(self, size: ShapeSize) -> Grips:
@@ -77,3 +80,19 @@ class CupKind(ShapeKind):
         by_the_rim = Grips.of(rim, way, [WALL] * AROUND, down, firm)
         around = elliptic_grips((across, across, height), HOLLOW_FIRM, lids=False)
         return Grips.joined([around, by_the_rim])
+
+
+def _hollow(radius: float, extent: Size, floor: float) -> Array:
+    """Where a cup is hollow, as `bt_tasksim.scene.hollows.hollow` finds it, at once.
+
+    Args:
+        radius: From its axis to its walls, metres.
+        extent: Full size ``(3,)``.
+        floor: Height of its floor.
+    """
+    cells = columns(extent)
+    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    away = np.max(cells[:, :2] @ np.array([np.cos(angle), np.sin(angle)]), axis=1)
+    height = np.broadcast_to([floor, extent[2] / 2], (len(cells), 2))
+    found: Array = np.concatenate([cells, height], axis=1)[away < radius]
+    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -14,7 +15,10 @@ from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, ObjectModel, PlaceModel, WorldModel
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.geometry import Shape
+from bt_tasksim.scene.hollows import NOTHING
 from bt_tasksim.scene.outlines import Slab, rectangle, slabs, whole_outline
+from bt_tasksim.scene.spatial_laws import Body, Hollow, Surface, Whereabouts, leaning
 from bt_tasksim.scene.specs import Goal
 
 TOUCHING = 1e-4
@@ -87,6 +91,11 @@ class FinalState:
         """Pose ``(7,)`` of the goal's object in the frame of the goal's place, or of an object's top."""
         return poses.multiply(poses.inverse(self.surface(goal.place)), self.pose(goal.object))
 
+    @property
+    def whereabouts(self) -> Whereabouts:
+        """Where everything truly is, as one world of `bt_tasksim.scene.spatial_laws`."""
+        return _Truth(self)
+
     def touched(self, name: str) -> bool:
         """The hand touches an object."""
         return float(self.hidden.hand_distance[self.world.object_index(name)]) <= TOUCHING
@@ -94,6 +103,48 @@ class FinalState:
     def supported(self, name: str) -> bool:
         """An object touches something besides the hand."""
         return bool(np.any(self.hidden.support[self.world.object_index(name)]))
+
+
+class _Truth(Whereabouts):
+    """Where everything truly is, in one world: arrays ``(1, ...)``."""
+
+    def __init__(self, final: FinalState) -> None:
+        self._final = final
+
+    @property
+    def bodies(self) -> Collection[str]:
+        """See `Whereabouts.bodies`."""
+        return self._final.world.index
+
+    @property
+    def surfaces(self) -> Collection[str]:
+        """See `Whereabouts.surfaces`."""
+        return self._final.world.places
+
+    def body(self, name: str) -> Body:
+        """See `Whereabouts.body`."""
+        cubic = np.array([self._final.model(name).cubic])
+        return Body(self._final.pose(name)[None], self._shape(name).outer[None], cubic)
+
+    def surface(self, name: str) -> Surface:
+        """See `Whereabouts.surface`."""
+        place = self._final.place(name)
+        half = np.array([place.extent], float) / 2
+        return Surface(
+            place.pose[None], np.array([place.centre], float), half, np.array([bool(place.fixture)])
+        )
+
+    def hollow(self, name: str) -> Hollow:
+        """See `Whereabouts.hollow`."""
+        if name in self.bodies:
+            boxes = self._shape(name).hollow
+            return Hollow(self._final.pose(name)[None], boxes[None] if len(boxes) else np.array([[NOTHING]]))
+        place, surface = self._final.place(name), self.surface(name)
+        height = np.array([[0.0, place.height]])
+        return Hollow(surface.frame, np.concatenate([surface.centre, surface.half, height], axis=1)[None])
+
+    def _shape(self, name: str) -> Shape:
+        return self._final.configuration.objects[self._final.world.object_index(name)].shape()
 
 
 @dataclass(frozen=True)
@@ -131,10 +182,7 @@ class GoalRelation(abc.ABC):
 
 def lean(rotation: Array, model: ObjectModel) -> float:
     """Angle in radians between upright and ``rotation (4,)``; any face of a cubic object may be down."""
-    if model.cubic:
-        up = poses.to_matrix(rotation)[2]
-        return float(np.arccos(np.clip(np.max(np.abs(up)), -1.0, 1.0)))
-    return float(poses.tilt(rotation))
+    return float(leaning(rotation[None], np.array([model.cubic]))[0])
 
 
 def turn(rotation: Array, model: ObjectModel) -> float:

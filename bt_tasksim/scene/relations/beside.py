@@ -8,12 +8,10 @@ from __future__ import annotations
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS
-from bt_tasksim.scene.outlines import distance
-from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, lean
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
+from bt_tasksim.scene.spatial_laws import IN_ONE_ANOTHER, is_beside
 from bt_tasksim.scene.specs import Goal
 
-IN_ONE_ANOTHER = 0.002
-"""Metres by which the outlines may overlap: one may lean on the other."""
 IS_BESIDE = register_reason("is_beside", "{object} stands {gap} beside {place}", gap=METRES)
 TOO_FAR = register_reason(
     "too_far_beside", "{object} stands {gap} from {place}, more than {limit}", gap=METRES, limit=METRES
@@ -34,14 +32,8 @@ class Beside(GoalRelation):
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""
         names = {"object": goal.object, "place": goal.place}
-        gap = distance(final.outline(goal.object), final.outline(goal.place))
-        height = final.lowest(goal.object) - final.lowest(goal.place)
-        angles = {
-            name: lean(final.pose(name)[3:], final.model(name))
-            for name in (goal.object, goal.place)
-            if final.is_object(name)
-        }
-        tilted = max(angles, key=lambda name: angles[name])
+        found = is_beside(final.whereabouts, goal.object, goal.place)
+        gap, height, lean, other_lean = (float(values[0]) for values in found)
         wrong = None
         if abs(height) > goal.position_tolerance:
             wrong = OTHER_LEVEL(**names, height=abs(height))
@@ -49,7 +41,8 @@ class Beside(GoalRelation):
             wrong = OVER_ONE_ANOTHER(**names, depth=-gap)
         elif gap > goal.distance:
             wrong = TOO_FAR(**names, gap=gap, limit=goal.distance)
-        elif angles[tilted] > goal.angle_tolerance:
-            wrong = NOT_UPRIGHT(object=tilted, angle=angles[tilted])
+        elif not bool(found.holds(goal.distance, goal.position_tolerance, goal.angle_tolerance)[0]):
+            tilted = goal.object if lean >= other_lean else goal.place
+            wrong = NOT_UPRIGHT(object=tilted, angle=max(lean, other_lean))
         shown = max(gap, 0.0)
-        return Placement(wrong is None, wrong or IS_BESIDE(**names, gap=shown), shown, angles[goal.object])
+        return Placement(wrong is None, wrong or IS_BESIDE(**names, gap=shown), shown, lean)

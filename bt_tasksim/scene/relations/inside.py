@@ -1,6 +1,8 @@
-"""Inside: the object is within a container, below its rim, whichever way up; or within another object.
+"""Inside: the object is within a container, below its rim, whichever way up; or in the hollow of an object.
 
-What is higher than a low container, such as a tray, stands on its floor.
+What is higher than a low container, such as a tray, stands on its floor. The hollow of an object is where it
+has a floor and walls all around, however it lies (`bt_tasksim.scene.hollows`): the opening of a handle is
+none.
 """
 
 from __future__ import annotations
@@ -12,14 +14,13 @@ from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
+from bt_tasksim.scene.spatial_laws import beyond_walls
 from bt_tasksim.scene.specs import Goal
 
 IS_INSIDE = register_reason("is_inside", "{object} is in {place}, {distance} off its middle", distance=METRES)
 NOT_INSIDE = register_reason(
     "not_inside", "{object} is not in {place}: {distance} off its middle", distance=METRES
 )
-SUNK = 0.01
-"""Metres by which the object's centre may seem to be below the container's floor, or it may stand off it."""
 
 
 @register("goal relation", "inside")
@@ -28,26 +29,9 @@ class Inside(GoalRelation):
 
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""
-        if final.is_object(goal.place):
-            reached, distance = _in_object(goal, final)
-        else:
-            reached, distance = _in_place(goal, final)
+        reached = bool(beyond_walls(final.whereabouts, goal.object, goal.place)[0] <= 0.0)
+        frame = final.pose(goal.place) if final.is_object(goal.place) else final.place(goal.place).pose
+        distance = float(np.linalg.norm(poses.localise(frame, final.pose(goal.object)[:3])[:2]))
         reason = IS_INSIDE if reached else NOT_INSIDE
         outcome = reason(object=goal.object, place=goal.place, distance=distance)
         return Placement(reached, outcome, distance, float(poses.tilt(final.pose(goal.object)[3:])))
-
-
-def _in_place(goal: Goal, final: FinalState) -> tuple[bool, float]:
-    place, local = final.place(goal.place), final.in_place(goal)[:3]
-    within = all(abs(float(local[i]) - place.centre[i]) <= place.extent[i] / 2 for i in range(2))
-    above = float(local[2])
-    stands = abs(final.lowest(goal.object) - float(place.pose[2])) <= SUNK
-    reached = within and (-SUNK < above < place.height or (above > 0.0 and stands))
-    return reached, float(np.linalg.norm(local[:2]))
-
-
-def _in_object(goal: Goal, final: FinalState) -> tuple[bool, float]:
-    """The object's middle is within the box about the other one, however that lies."""
-    local = poses.localise(final.pose(goal.place)[None], final.pose(goal.object)[None, :3])[0]
-    within = bool(np.all(np.abs(local) <= np.array(final.model(goal.place).extent) / 2))
-    return within, float(np.linalg.norm(local[:2]))

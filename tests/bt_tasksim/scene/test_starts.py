@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.any_tree.meshes import write
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import FieldError, InputError
 from bt_tasksim.scene.outlines import distance, holds, overlapping, rectangle, whole_outline
@@ -169,3 +170,21 @@ def test_a_wide_gap_is_kept_too():
     for seed in range(20):
         a, b = (parts_of(actor) for actor in scene.sample(seed).objects)
         assert not overlapping(a, b, 0.1 - 1e-6)
+
+
+def test_what_has_no_hollow_has_nothing_in_it():
+    scene = Scene(objects={"a": cube(0.0), "b": ObjectSpec(("cube",), inside="a", size=SMALL)})
+    with pytest.raises(InputError, match="nothing can start in 'a': it has no hollow"):
+        scene.sample(0)
+
+
+def test_what_starts_in_a_mug_is_never_beside_its_handle(tmp_path):
+    mug = str(write(tmp_path, 3)["mug"])
+    spec = ObjectSpec(("mesh",), on="table", mesh=mug, yaw=3.0)
+    scene = Scene(objects={"mug": spec, "pea": ObjectSpec(("cube",), inside="mug", size=((0.012,) * 3,) * 2)})
+    for seed in range(20):
+        world = drawn(scene, seed)
+        (x, y, z), at = world["mug"].size, np.array(world["mug"].pose)
+        local = poses.localise(at, np.array(world["pea"].pose[:3]))
+        assert np.hypot(local[0] + (x - y) / 2, local[1]) < y / 2 - 0.006
+        assert -z / 2 + 0.006 <= local[2] - 0.006 < -z / 2 + 0.02
