@@ -11,7 +11,7 @@ import numpy as np
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.checking.scene_reach import check_goals, check_objects
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.errors import InputError, NoDrawError
 from bt_tasksim.core.world import Command
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -64,15 +64,18 @@ def check_scene(scene: Scene, report: Report | None = None) -> Report:
 
 def _draw(scene: Scene, report: Report) -> list[ActorConfiguration]:
     """The worlds that can be drawn."""
-    worlds, failed = [], Counter[str]()
+    worlds: list[ActorConfiguration] = []
+    failed: dict[str, list[int]] = {}
     for seed in range(DRAWS):
         try:
             worlds.append(scene.sample(seed))
         except InputError as error:
-            failed[str(error)] += 1
-    for sentence, count in failed.items():
+            why = error.__cause__ if isinstance(error, NoDrawError) else error
+            failed.setdefault(str(why or error), []).append(seed)
+    for sentence, seeds in failed.items():
         level = WARNING if worlds else ERROR
-        report.add(level, scene.name, "draws", f"fails in {count} of {DRAWS} draws", sentence)
+        what = f"fails in {len(seeds)} of {DRAWS} draws, such as with seed {seeds[0]}"
+        report.add(level, scene.name, "draws", what, sentence)
     return worlds
 
 
