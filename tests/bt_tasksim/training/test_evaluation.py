@@ -361,6 +361,6 @@ def test_a_seed_that_has_no_world_is_counted_and_the_others_are_run(how, tmp_pat
 
 def test_where_no_seed_has_a_world_that_is_an_error_which_names_one(tmp_path):
     (tmp_path / "crowd.py").write_text(CROWD.format(side=0.05))
-    with pytest.raises(NoDrawError, match="with seed 5, object 'box .' finds no free spot") as error:
+    with pytest.raises(NoDrawError, match=r"with seed 5, object 'box .' finds no free spot") as error:
         evaluate(Job(str(tmp_path / "crowd.py"), batch=1), [5, 6])
     assert "\n" not in str(error.value)
