@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bt_tasksim.checking.report import ERROR, WARNING, Report
+from bt_tasksim.checking.scene_goals import check_together
 from bt_tasksim.checking.scene_reach import check_goals, check_objects
+from bt_tasksim.checking.scene_room import check_room
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError, NoDrawError
 from bt_tasksim.core.world import Command
@@ -51,8 +53,10 @@ def check_scene(scene: Scene, report: Report | None = None) -> Report:
     if worlds:
         _check_overlaps(scene, worlds[:COMPARED], report)
         _check_places(scene, worlds, report)
+        check_room(scene, worlds[:REACHED], report)
         check_objects(scene, worlds[:REACHED], report)
         check_goals(scene, worlds[:REACHED], report)
+        check_together(scene, worlds[:REACHED], report)
         _check_still(scene, worlds[:SETTLED], report)
     things = f"{len(scene.objects)} object{'' if len(scene.objects) == 1 else 's'}"
     report.checked.append(
