@@ -40,6 +40,12 @@ class GoalFunction:
     def __str__(self) -> str:
         return self.name
 
+    @property
+    def module(self) -> str:
+        """Name of the module that defines the function; empty where only its name is known."""
+        judge = self.__dict__["judge"]
+        return str(getattr(judge, "__module__", None) or type(judge).__module__) if judge is not None else ""
+
     def ask(self, final: Any) -> tuple[bool, str] | None:
         """What the function says: whether it is reached, and words or none; None where it is not here.
 

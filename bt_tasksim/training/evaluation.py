@@ -408,7 +408,7 @@ def in_short(result: Result) -> EpisodeOutcome:
 def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
     from bt_tasksim.training.subject import evaluation_subject, own_code
 
-    code = own_code(runner.tree, job.tree, job.plugins)
+    code = own_code(runner.tree, job.tree, job.plugins, runner.scene)
     return evaluation_subject(runner.tree, runner.scene, job.options, policies_of(runner), code, stream)
 
 
