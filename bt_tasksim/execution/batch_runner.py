@@ -35,7 +35,7 @@ from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.moments import Moments
 from bt_tasksim.scene.scene import WorldSource
-from bt_tasksim.scene.success import at_rest, evaluate_success
+from bt_tasksim.scene.success import Overlap, at_rest, evaluate_success
 
 IDLE, TICKING, SETTLING = range(3)
 
@@ -254,11 +254,11 @@ class BatchRunner(Closing):
             episode = self._episodes[row]
             assert episode is not None
             self._phase[row], self._episodes[row] = IDLE, None
-            yield episode.seed, self._result(episode, hidden, k)
+            yield episode.seed, self._result(episode, hidden, k, self.worlds.physics.deepest_pair(row))
 
-    def _result(self, episode: _Episode, hidden: Hidden, row: int) -> Result:
-        drawn, status = episode.configuration, episode.status
-        verdict = evaluate_success(drawn, episode.world, _state_of(episode, hidden, row), episode.moments)
+    def _result(self, episode: _Episode, hidden: Hidden, row: int, overlap: Overlap | None) -> Result:
+        drawn, status, state = episode.configuration, episode.status, _state_of(episode, hidden, row)
+        verdict = evaluate_success(drawn, episode.world, state, episode.moments, overlap)
         outcome = verdict.outcome if status == Status.SUCCESS else episode.outcome
         return Result(
             status=status,

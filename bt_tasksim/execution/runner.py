@@ -397,7 +397,7 @@ class Runner(Closing):
             record(Step(self.observation, Command(), self.tree.status, pipeline))
             hidden = pipeline.hidden()
             assert hidden is not None
-        return evaluate_success(configuration, world, hidden, self._moments)
+        return evaluate_success(configuration, world, hidden, self._moments, pipeline.physics.deepest_pair)
 
 
 def _holding(pipeline: EnginePipeline) -> str:

@@ -364,3 +364,12 @@ def test_where_no_seed_has_a_world_that_is_an_error_which_names_one(tmp_path):
     with pytest.raises(NoDrawError, match=r"with seed 5, object 'box .' finds no free spot") as error:
         evaluate(Job(str(tmp_path / "crowd.py"), batch=1), [5, 6])
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("batch", [1, 2])
+def test_bodies_that_overlapped_too_deeply_are_named(batch, monkeypatch):
+    monkeypatch.setattr("bt_tasksim.scene.success.DEEPEST", 0.0)  # whatever touches
+    (found,) = evaluate(Job("pick_and_throw", batch=batch), [30]).outcomes
+    bodies, when = found.outcome.names["bodies"], found.outcome.names["moment"]
+    assert found.reason == "penetration" and " and " in bodies and "two bodies" not in bodies
+    assert when.startswith(" at ") and found.why.startswith(f"{bodies} overlapped by ")
