@@ -67,7 +67,8 @@ def load_source(
     Args:
         tree: Name of a scenario, or path of a ``.py`` or ``.xml`` file.
         robot: Name or file of the robot; by default the scene's own.
-        scene: Name of a scenario whose scene is taken, or path of a scene file; by default the tree's own.
+        scene: Name of a scenario whose scene is taken, or path of a ``.yaml`` file, or of a ``.py`` file with
+            ``scene()``; by default the tree's own. The one that an XML tree names is no ``.py`` file.
         policies: Concepts and the policies that their leaves take, see `with_policies`.
         world: The world that the engines bring, which then is the scene.
 
@@ -221,7 +222,7 @@ def load_scene_of(file: str, robot: str | None = None) -> Scene:
     path = Path(file)
     if path.suffix != ".py":
         return _scene(file, robot)
-    return _made(_function(_module(path), "scene", path), robot, path)
+    return _made(_function(_module(path, "scene"), "scene", path), robot, path)
 
 
 def own_nodes(file: str, needed: bool = True) -> Leaves:
@@ -295,8 +296,14 @@ def _from_xml(path: Path, robot: str | None, scene: str | None, world: WorldSour
                 f"{', '.join(sorted(objects | places))}: name one with --scene"
             )
         named = fitting[0]
-    elif named.endswith((".yaml", ".yml")) and scene is None:
-        named = str(path.parent / named)
+    elif scene is None:
+        if named.endswith(".py"):  # a tree that was handed on opens no code
+            raise InputError(
+                f"'{path}' names the scene '{named}', and a tree's file runs no Python: if you trust it, "
+                f"give --scene {path.parent / named}"
+            )
+        if named.endswith((".yaml", ".yml")):
+            named = str(path.parent / named)
     return TreeSource(path.stem, lambda: load_tree(path), _scene(named, robot))
 
 
@@ -316,11 +323,14 @@ def _scene(name: str | None, robot: str | None) -> Scene:
 
         scene = load_scene(name)
         return scene if robot is None else scene.with_robot(robot)
+    if name.endswith(".py"):
+        return load_scene_of(name, robot)
     if Path(name).suffix:
-        own = "; a tree in a Python file brings the scene() of its own file" if name.endswith(".py") else ""
-        raise InputError(f"'{name}' is no scene: give a scenario's name or a .yaml file{own}")
+        raise InputError(
+            f"'{name}' is no scene: give a scenario's name, a .yaml file, or a .py file with scene()"
+        )
     if name not in scenarios():
-        raise InputError(f"no scene '{name}'{nearest(name, scenarios())} (or give a .yaml file)")
+        raise InputError(f"no scene '{name}'{nearest(name, scenarios())} (or give a .yaml or .py file)")
     module = importlib.import_module(f"bt_tasksim.trees.scenarios.{name}")
     made: Scene = module.scene() if robot is None else module.scene(robot)
     return made
@@ -343,10 +353,10 @@ def tree_module(tree: str) -> str:
     return f"_tree_{Path(tree).stem}"
 
 
-def _module(path: Path) -> Any:
+def _module(path: Path, what: str = "tree") -> Any:
     if not path.is_file():
-        raise InputError(f"there is no tree file '{path}'")
-    spec = importlib.util.spec_from_file_location(tree_module(str(path)), path)
+        raise InputError(f"there is no {what} file '{path}'")
+    spec = importlib.util.spec_from_file_location(f"_{what}_{path.stem}", path)
     assert spec is not None and spec.loader is not None
     folder = str(path.resolve().parent)
     if folder not in sys.path:  # as for a script: it may import what stands beside it
@@ -375,5 +385,6 @@ def _called(function: Callable[..., Any], path: Path, *arguments: Any) -> Any:
 def _function(module: Any, name: str, path: Path) -> Any:
     function = getattr(module, name, None)
     if not callable(function):
-        raise InputError(f"'{path}' has no function {name}(): define one that returns the tree's root")
+        returned = "a Scene" if name == "scene" else "the tree's root"
+        raise InputError(f"'{path}' has no function {name}(): define one that returns {returned}")
     return function

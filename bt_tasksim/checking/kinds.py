@@ -14,12 +14,16 @@ ROBOT = {"urdf", "arm", "hand", "tool", "tips", "base_link"}
 """Fields of which a robot's file has one at least, and no other file."""
 SCENE = {"objects", "goal", "goals", "spots", "fixtures", "disturbed"}
 """Likewise of a scene's."""
+OBJECT = {"mesh", "kind", "scale", "size", "mass", "grasps", "class"}
+"""Likewise of an object's."""
 FIXTURE = {"boxes", "places"}
 """Likewise of furniture's."""
 
 
 def check_file(file: str, tree: str | None = None, robot: str | None = None) -> Report:
-    """Check what a file holds, see `concept_file.check`, `check_robot`, `check_scene` and `check_mesh`.
+    """Check what a file holds.
+
+    See `concept_file.check`, `check_robot`, `check_scene`, `check_object_file` and `check_mesh`.
 
     Args:
         file: The file, or the name of a robot.
@@ -53,9 +57,14 @@ def check_file(file: str, tree: str | None = None, robot: str | None = None) -> 
         return _scene(file, robot)
     if keys & FIXTURE:
         raise InputError(f"'{file}' is furniture: name it in the 'fixtures' of a scene, and check that")
+    if keys & OBJECT:
+        from bt_tasksim.checking.object_check import check_object_file
+
+        return check_object_file(file, **({} if robot is None else {"robot": robot}))
     raise InputError(
-        f"'{file}' is neither a robot's file (urdf, arm, hand ...) nor a scene's (objects, goal ...): "
-        "give one of these, a mesh, or a Python file with a concept or a scene()"
+        f"'{file}' is neither a robot's file (urdf, arm, hand ...) nor a scene's (objects, goal ...) nor an "
+        "object's (mesh, kind, grasps ...): give one of these, a mesh, or a Python file with a concept or a "
+        "scene()"
     )
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import keyword
 from pathlib import Path
 
-from bt_tasksim.checking.new_files import NAME, check_new, write_new
+from bt_tasksim.checking.new_files import NAME, check_free, check_new, write_new
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.resources import asset
 from bt_tasksim.policy.policy import concept_name
@@ -47,7 +46,7 @@ def write_concept(name: str, folder: str | Path = ".", like: str | None = None) 
     if like is not None and like not in examples():
         raise InputError(f"there is no example '{like}' to begin with{nearest(like, examples())}")
     check_new(folder, dict.fromkeys(paths.values()))
-    _check_free(name)
+    check_free(name)
     texts = {template: _filled(template, like or PLAIN, name, class_name) for template in paths}
     write_new(folder, {path: texts[template] for template, path in paths.items()})
     concept, tree, _ = paths.values()
@@ -70,16 +69,6 @@ def _check_name(name: str, class_name: str) -> None:
     known = {concept_name(c): n for n, c in catalogue().items() if issubclass(c, ConceptModel)}
     if class_name.lower() in known:
         raise InputError(f"there is a concept {known[class_name.lower()]} already: choose another name")
-
-
-def _check_free(name: str) -> None:
-    """No module of this name can be imported that the new files would meet instead of each other."""
-    try:
-        found = importlib.util.find_spec(name)
-    except (ImportError, ValueError):
-        found = None
-    if found is not None:
-        raise InputError(f"a Python module '{name}' is installed already: choose another name")
 
 
 def _filled(template: str, kind: str, name: str, class_name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -64,6 +65,20 @@ def check_new(folder: Path, files: Mapping[Path, object]) -> None:
     for path in files:
         if path.exists() or path.is_symlink():
             raise InputError(f"'{path}' is there already: remove it, or choose another name or --out")
+
+
+def check_free(name: str) -> None:
+    """Refuse a file's name by which another module is imported: it would be met instead of that one.
+
+    Raises:
+        InputError: There is such a module, Python's own and ours among them.
+    """
+    try:
+        found = importlib.util.find_spec(name)
+    except (ImportError, ValueError):
+        found = None
+    if found is not None:
+        raise InputError(f"a Python module '{name}' is installed already: choose another name")
 
 
 def filled(template: tuple[str, ...], values: Mapping[str, str]) -> str:

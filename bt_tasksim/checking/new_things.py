@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 from pathlib import Path
 
-from bt_tasksim.checking.new_files import check_word, filled, named, write_new
+from bt_tasksim.checking.new_files import check_free, check_new, check_word, filled, named, write_new
 from bt_tasksim.core.errors import InputError
 
 
@@ -20,13 +20,16 @@ def write_tree(name: str, folder: str | Path = ".") -> str:
         What was written, and what to do next.
 
     Raises:
-        InputError: The name is no good, or the file is there already; then nothing is written.
+        InputError: The name is no good or that of an installed module, or the file is there already; then
+            nothing is written.
         MachineError: The disk is full or not writable; then nothing is written.
     """
     check_word(name, "a tree", "clear_the_table")
     if keyword.iskeyword(name):
         raise InputError(f"'{name}' is a word of Python: choose another name")
     path = Path(folder) / f"{name}.py"
+    check_new(Path(folder), {path: None})
+    check_free(name)
     write_new(Path(folder), {path: filled(("new_tree", "tree.py.txt"), named(name))})
     return f"wrote {path}\nnext: bt-tasksim run {path} --video; bt-tasksim evaluate {path} --episodes 20"
 

@@ -32,7 +32,9 @@ BETWEEN = 2
 """Moving joints between two links up to which they are neighbours."""
 
 
-class _Part(NamedTuple):
+class LinkPart(NamedTuple):
+    """A convex part of a link, as coal has it, at ``pose (7,)`` in the link's frame."""
+
     link: str
     form: Any
     pose: Array
@@ -48,7 +50,7 @@ def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Rep
     """
     robot = kinematics.robot
     try:
-        parts = [part for shape in load_collisions(robot.urdf) if (part := _part(shape)) is not None]
+        parts = [part for shape in load_collisions(robot.urdf) if (part := link_part(shape)) is not None]
     except InputError as error:
         report.add(WARNING, robot.name, "urdf", f"links were not compared: {error}", "put the files there")
         return
@@ -83,7 +85,7 @@ def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Rep
         report.add(WARNING, robot.name, "arm", what, remedy)
 
 
-def _part(shape: LinkVisual) -> _Part | None:
+def link_part(shape: LinkVisual) -> LinkPart | None:
     """A shape as coal has it."""
     import coal
 
@@ -103,10 +105,10 @@ def _part(shape: LinkVisual) -> _Part | None:
             for vertex in mesh_hull(shape.mesh, (x, y, z)):
                 points.append(np.asarray(vertex, float))
             form = coal.Convex.convexHull(points, False, "")
-    return _Part(shape.link, form, np.array(shape.pose))
+    return LinkPart(shape.link, form, np.array(shape.pose))
 
 
-def _pairs(kinematics: PinocchioKinematics, parts: list[_Part]) -> list[tuple[int, int]]:
+def _pairs(kinematics: PinocchioKinematics, parts: list[LinkPart]) -> list[tuple[int, int]]:
     """Numbers of parts of links that are no neighbours; the hand's fingers may touch one another."""
     links = {item.link: item for item in load_links(kinematics.robot.urdf)}
     hand = {item.link for item in links.values() if item.joint in kinematics.robot.hand_joints}
@@ -129,7 +131,7 @@ def _pairs(kinematics: PinocchioKinematics, parts: list[_Part]) -> list[tuple[in
 
 
 def _overlaps(
-    kinematics: PinocchioKinematics, arm: Array, parts: list[_Part], pairs: list[tuple[int, int]]
+    kinematics: PinocchioKinematics, arm: Array, parts: list[LinkPart], pairs: list[tuple[int, int]]
 ) -> dict[tuple[str, str], float]:
     """Metres by which links overlap in a posture, by their names, where it is more than `DEEP`."""
     import coal

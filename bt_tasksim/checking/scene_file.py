@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bt_tasksim.checking.report import ERROR, WARNING, Report
+from bt_tasksim.checking.scene_goals import check_together
 from bt_tasksim.checking.scene_reach import check_goals, check_objects
+from bt_tasksim.checking.scene_room import check_room
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.errors import InputError, NoDrawError
 from bt_tasksim.core.world import Command
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -51,8 +53,10 @@ def check_scene(scene: Scene, report: Report | None = None) -> Report:
     if worlds:
         _check_overlaps(scene, worlds[:COMPARED], report)
         _check_places(scene, worlds, report)
+        check_room(scene, worlds[:REACHED], report)
         check_objects(scene, worlds[:REACHED], report)
         check_goals(scene, worlds[:REACHED], report)
+        check_together(scene, worlds[:REACHED], report)
         _check_still(scene, worlds[:SETTLED], report)
     things = f"{len(scene.objects)} object{'' if len(scene.objects) == 1 else 's'}"
     report.checked.append(
@@ -64,15 +68,18 @@ def check_scene(scene: Scene, report: Report | None = None) -> Report:
 
 def _draw(scene: Scene, report: Report) -> list[ActorConfiguration]:
     """The worlds that can be drawn."""
-    worlds, failed = [], Counter[str]()
+    worlds: list[ActorConfiguration] = []
+    failed: dict[str, list[int]] = {}
     for seed in range(DRAWS):
         try:
             worlds.append(scene.sample(seed))
         except InputError as error:
-            failed[str(error)] += 1
-    for sentence, count in failed.items():
+            why = error.__cause__ if isinstance(error, NoDrawError) else error
+            failed.setdefault(str(why or error), []).append(seed)
+    for sentence, seeds in failed.items():
         level = WARNING if worlds else ERROR
-        report.add(level, scene.name, "draws", f"fails in {count} of {DRAWS} draws", sentence)
+        what = f"fails in {len(seeds)} of {DRAWS} draws, such as with seed {seeds[0]}"
+        report.add(level, scene.name, "draws", what, sentence)
     return worlds
 
 

@@ -42,15 +42,12 @@ def check_objects(scene: Scene, worlds: Sequence[ActorConfiguration], report: Re
     for name in scene.object_names:
         wide, far, held = [], 0, 0
         for world in worlds:
-            actor, place = _actor(world, name), _place(world, _actor(world, name).on)
-            grips = grips_of(actor)
-            fitting = grips.widths < robot.opening - ROOM
-            if not fitting.any():
+            grips = grips_of(_actor(world, name))
+            if not (grips.widths < robot.opening - ROOM).any():
                 wide.append(float(grips.widths.min()) if len(grips) else math.inf)
                 continue
             held += 1
-            asked = tool_poses(robot, actor.model(), np.array(actor.pose), grips, place.access)
-            far += not _any_reached(robot, asked)
+            far += not is_reached(robot, world, name)
         if wide:
             what = (
                 f"is {1000 * min(wide):.0f} mm wide where it is narrowest, in {len(wide)} of {len(worlds)} "
@@ -63,6 +60,15 @@ def check_objects(scene: Scene, worlds: Sequence[ActorConfiguration], report: Re
             what = f"is out of reach on '{place.name}' in {far} of {held} draws, from {_said(place.access)}"
             level = ERROR if far == held else WARNING
             report.add(level, scene.name, name, what, "move it nearer, or give its place another 'access'")
+
+
+def is_reached(robot: RobotDescription, world: ActorConfiguration, name: str) -> bool:
+    """The arm brings the hand to where an object is held, as hands come to its place."""
+    actor = _actor(world, name)
+    access = _place(world, actor.on).access
+    return _any_reached(
+        robot, tool_poses(robot, actor.model(), np.array(actor.pose), grips_of(actor), access)
+    )
 
 
 def check_goals(scene: Scene, worlds: Sequence[ActorConfiguration], report: Report) -> None:
@@ -99,7 +105,7 @@ def check_goals(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repo
 
 def goals_of(world: ActorConfiguration) -> Sequence[Goal]:
     """The goals of a world."""
-    return () if world.goal is None else (world.goal,)
+    return world.goals
 
 
 def grips_of(actor: ObjectActor) -> Grips:

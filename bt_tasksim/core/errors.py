@@ -36,6 +36,10 @@ class FieldError(InputError):
         self.where = where
 
 
+class NoDrawError(InputError):
+    """A world that cannot be drawn with one seed: others may do, so an evaluation counts it and goes on."""
+
+
 @contextmanager
 def within(*where: str | int) -> Iterator[None]:
     """Errors raised in here are about this field (`FieldError`)."""

@@ -30,6 +30,7 @@ from bt_tasksim.core.errors import (
     InputError,
     LeafError,
     MachineError,
+    NoDrawError,
     NoWayError,
     UnreachableError,
 )
@@ -381,6 +382,8 @@ OUT_OF_REACH = register_reason("out_of_reach", "out of reach: {what}", distance=
 NO_WAY = register_reason("no_way", "{what}")
 LEAF_RAISED = register_reason("leaf_raised", "{text}")
 MACHINE_FAILED = register_reason("machine_failed", "{text}")
+NO_DRAW = register_reason("no_draw", "{text}")
+"""No world can be drawn with the episode's seed, so there was no episode; the sentence says why."""
 
 
 def outcome_of_error(error: BtTasksimError) -> Outcome:
@@ -393,4 +396,4 @@ def outcome_of_error(error: BtTasksimError) -> Outcome:
     return reason(text=error)
 
 
-_ERRORS = ((LeafError, LEAF_RAISED), (MachineError, MACHINE_FAILED))
+_ERRORS = ((LeafError, LEAF_RAISED), (MachineError, MACHINE_FAILED), (NoDrawError, NO_DRAW))

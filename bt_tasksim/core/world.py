@@ -13,8 +13,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+import numpy as np
+
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.poses import Array
+
+
+def read_only(values: Array) -> Array:
+    """The same numbers, which cannot be written to by this name."""
+    if not isinstance(values, np.ndarray):
+        return values
+    seen = values.view()
+    seen.setflags(write=False)
+    return seen
 
 
 class KnownGeometry(Protocol):
@@ -99,6 +110,10 @@ class PlaceModel:
     fixture: str
     clearance: float
 
+    def __post_init__(self) -> None:
+        for name in ("pose", "access", "exit"):  # everybody who looks at a world has the same ones
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
 
 @dataclass(frozen=True)
 class WorldModel:
@@ -162,6 +177,9 @@ class Obstacle:
     pose: Array
     size: tuple[float, float, float]
     fixture: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", read_only(self.pose))
 
 
 @dataclass(frozen=True, slots=True)

@@ -289,6 +289,14 @@ class PhysicsEngine(Engine):
         """What only a simulator knows; None, the default, where nobody knows the truth."""
         return None
 
+    @property
+    def deepest_pair(self) -> tuple[str, str, float, float] | None:
+        """Names of the bodies that overlapped most, metres, and seconds since the episode began.
+
+        None before any overlap, and, the default, where the engine does not say it.
+        """
+        return None
+
     def hold(self, why: str) -> None:
         """The run is over, or has to be: a robot stands still until `reset`; by default nothing to do."""
 
@@ -397,6 +405,11 @@ class PhysicsWrapper(PhysicsEngine):
     def hidden(self) -> Hidden | None:
         """See `PhysicsEngine.hidden`."""
         return self.inner.hidden()
+
+    @property
+    def deepest_pair(self) -> tuple[str, str, float, float] | None:
+        """See `PhysicsEngine.deepest_pair`."""
+        return self.inner.deepest_pair
 
     def hold(self, why: str) -> None:
         """See `PhysicsEngine.hold`."""

@@ -54,5 +54,9 @@ class PhysicsBatch(ABC):
     def hidden(self, rows: Array) -> Hidden:
         """What only a simulator knows ``(k, ...)`` of worlds that were reset; the caller's own arrays."""
 
+    def deepest_pair(self, row: int) -> tuple[str, str, float, float] | None:
+        """See `bt_tasksim.engines.base.PhysicsEngine.deepest_pair`, of one world."""
+        return None
+
     def close(self) -> None:  # noqa: B027  # a default, and not a method that was forgotten
         """Let go of worlds and threads; by default nothing. May be called more than once."""

@@ -18,7 +18,7 @@ from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.concept.world_context import WorldContext
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING
 from bt_tasksim.core.closing import Closing
-from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.errors import BtTasksimError, InputError, NoDrawError
 from bt_tasksim.core.outcomes import FAILED, TIME_OVER, Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.transfer import Index
@@ -35,7 +35,7 @@ from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.moments import Moments
 from bt_tasksim.scene.scene import WorldSource
-from bt_tasksim.scene.success import at_rest, evaluate_success
+from bt_tasksim.scene.success import Overlap, at_rest, evaluate_success
 
 IDLE, TICKING, SETTLING = range(3)
 
@@ -254,11 +254,11 @@ class BatchRunner(Closing):
             episode = self._episodes[row]
             assert episode is not None
             self._phase[row], self._episodes[row] = IDLE, None
-            yield episode.seed, self._result(episode, hidden, k)
+            yield episode.seed, self._result(episode, hidden, k, self.worlds.physics.deepest_pair(row))
 
-    def _result(self, episode: _Episode, hidden: Hidden, row: int) -> Result:
-        drawn, status = episode.configuration, episode.status
-        verdict = evaluate_success(drawn, episode.world, _state_of(episode, hidden, row), episode.moments)
+    def _result(self, episode: _Episode, hidden: Hidden, row: int, overlap: Overlap | None) -> Result:
+        drawn, status, state = episode.configuration, episode.status, _state_of(episode, hidden, row)
+        verdict = evaluate_success(drawn, episode.world, state, episode.moments, overlap)
         outcome = verdict.outcome if status == Status.SUCCESS else episode.outcome
         return Result(
             status=status,
@@ -290,10 +290,13 @@ class BatchRunner(Closing):
         """Begin the next seeds in worlds ``rows``; those that have begun are added to ``begun``."""
         free = rows.tolist()
         while free:
-            drawn = [(row, seed) for row, seed in zip(free, waiting)]  # noqa: B905  # seeds may be fewer
-            if not drawn:
+            wanted = [(row, seed) for row, seed in zip(free, waiting)]  # noqa: B905  # seeds may be fewer
+            if not wanted:
                 return
-            worlds = [self.scene.sample(seed, stream) for _, seed in drawn]
+            drawn, worlds, without = self._drawn(wanted, stream)
+            yield from without
+            if not drawn:
+                continue
             self._episodes_of(drawn, worlds)
             taken = np.array([row for row, _ in drawn])
             self.worlds.reset(taken, worlds)
@@ -304,7 +307,23 @@ class BatchRunner(Closing):
                     yield seed, failed[row]
                 else:
                     begun.append(row)
-            free = [row for row, _ in drawn if row in failed]
+            there = {row for row, _ in drawn}
+            free = [row for row, _ in wanted if row in failed or row not in there]
+
+    def _drawn(
+        self, wanted: Sequence[tuple[int, int]], stream: str
+    ) -> tuple[list[tuple[int, int]], list[ActorConfiguration], list[tuple[int, BtTasksimError]]]:
+        """Rows and seeds that have a world, these worlds, and the seeds that have none."""
+        drawn: list[tuple[int, int]] = []
+        worlds: list[ActorConfiguration] = []
+        without: list[tuple[int, BtTasksimError]] = []
+        for row, seed in wanted:
+            try:
+                worlds.append(self.scene.sample(seed, stream))
+                drawn.append((row, seed))
+            except NoDrawError as error:
+                without.append((seed, error))
+        return drawn, worlds, without
 
     def _episodes_of(self, drawn: Sequence[tuple[int, int]], worlds: Sequence[ActorConfiguration]) -> None:
         tips = [tip.name for tip in self.robot.tips]
@@ -344,6 +363,8 @@ class BatchRunner(Closing):
                     if self.batch.unknown:
                         runner.plant(self._build)
                     yield seed, runner.run(seed, stream)
+                except NoDrawError as found:
+                    yield seed, found
                 except InputError:
                     raise
                 except BtTasksimError as found:

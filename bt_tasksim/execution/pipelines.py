@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import TypeVar
 
 from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.plain import short
 from bt_tasksim.core.registry import parts
 from bt_tasksim.engines.base import (
     ROLES,
@@ -31,6 +33,8 @@ from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.scene import WorldSource
 
 _E = TypeVar("_E", bound=Engine)
+_TAKEN: dict[type, tuple[type, ...]] = {float: (int, float), str: (str, Path)}
+"""What options may be given as."""
 LAWS = ("auto", "numpy", "torch")
 """Libraries that a batch of worlds may compute its laws with; ``auto`` goes by the device."""
 
@@ -73,6 +77,11 @@ class EngineOptions:
     laws: str = "auto"
 
     def __post_init__(self) -> None:
+        for item in fields(self):
+            kind, found = type(item.default), getattr(self, item.name)
+            if not isinstance(found, _TAKEN.get(kind, (kind,))):
+                expected = {str: "text", bool: "True or False"}.get(kind, "a number")
+                raise InputError(f"the option '{item.name}' should be {expected}, found {short(found)}")
         for role in ROLES:
             engine_class(role, self.name_of(role))
         engine_class("physics", self.engines).check_device(self.device)

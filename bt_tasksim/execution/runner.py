@@ -28,11 +28,13 @@ from bt_tasksim.core.outcomes import (
     outcome_of_error,
     register_reason,
 )
+from bt_tasksim.core.plain import short
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.units import SECONDS
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
 from bt_tasksim.execution.blackboard import WorldBlackboard
+from bt_tasksim.execution.given import checked_longest, checked_root, checked_scene, checked_tree
 from bt_tasksim.execution.leaf_errors import clear, end_all, no_status, set_up, ticking
 from bt_tasksim.execution.paths import PathKeeper
 from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
@@ -95,9 +97,11 @@ class Runner(Closing):
         pipeline: EnginePipeline | None = None,
         longest: float = LONGEST,
     ) -> None:
+        if options is not None and not isinstance(options, EngineOptions):
+            raise InputError(f"options are EngineOptions, found {short(options)}")
         self.options = options or EngineOptions()
-        if scene is None:
-            scene = self.options.own_world()
+        tree, longest = checked_tree(tree), checked_longest(longest)
+        scene = self.options.own_world() if scene is None else checked_scene(scene)
         if scene is None:
             raise InputError(f"'{self.options.engines}' brings no world of its own: name a scene")
         self.robot = load_robot(scene.robot)
@@ -127,7 +131,7 @@ class Runner(Closing):
             self.tree = tree
             return
         with self.blackboard:
-            self.tree = tree()
+            self.tree = checked_root(tree())
             check_tree(self.tree)
             set_up(self.tree, context=self.context)
         self._planted = self.blackboard
@@ -397,7 +401,7 @@ class Runner(Closing):
             record(Step(self.observation, Command(), self.tree.status, pipeline))
             hidden = pipeline.hidden()
             assert hidden is not None
-        return evaluate_success(configuration, world, hidden, self._moments)
+        return evaluate_success(configuration, world, hidden, self._moments, pipeline.physics.deepest_pair)
 
 
 def _holding(pipeline: EnginePipeline) -> str:

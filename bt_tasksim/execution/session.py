@@ -26,6 +26,7 @@ from bt_tasksim.core.interrupts import terminable
 from bt_tasksim.core.markup import html_pairs
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Command, Hidden, Observation
+from bt_tasksim.execution.given import checked_policies, checked_root, checked_tree
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import BROKEN_OFF, LONGEST, Runner, Step
@@ -71,8 +72,12 @@ class Session(Closing):
         **engines: Any,
     ) -> None:
         options = engine_options(options, engines, ("seed", "policy", "options", "longest"))
-        made = with_policies(lambda: tree if isinstance(tree, Behaviour) else tree(), (policy or {}).items())
-        self._makes = None if isinstance(tree, Behaviour) else made
+        given = checked_tree(tree)
+        made = with_policies(
+            lambda: given if isinstance(given, Behaviour) else checked_root(given()),
+            checked_policies(policy).items(),
+        )
+        self._makes, self._closed = None if isinstance(given, Behaviour) else made, False
         self.runner = Runner(made() if self._makes is None else made, scene, options, longest=longest)
         self.seed, self._fresh, self._signals = seed, True, ExitStack()
         self._periods: Generator[None, None, Result] | None = None
@@ -92,8 +97,9 @@ class Session(Closing):
             The first observation.
 
         Raises:
-            InputError: The seed is none, or the scene cannot be drawn.
+            InputError: The seed is none, the scene cannot be drawn, or the session is closed.
         """
+        self._check_open()
         self._end()
         self.seed = self.seed if seed is None else seed
         if self._makes is not None and not self._fresh:
@@ -135,7 +141,11 @@ class Session(Closing):
         return True
 
     def close(self) -> None:
-        """End the run where it goes on (a real robot holds), and close the engines."""
+        """End the run where it goes on (a real robot holds), and close the engines.
+
+        What was seen last and the result stay; nothing can be begun anew.
+        """
+        self._closed = True
         try:
             self._end()
         finally:
@@ -143,6 +153,7 @@ class Session(Closing):
             self.runner.close()
 
     def __enter__(self) -> Self:
+        self._check_open()
         if self.runner.pipeline.real:
             self._signals.enter_context(terminable())
         return self
@@ -215,8 +226,9 @@ class Session(Closing):
             camera: Name of the camera, see `bt_tasksim.engines.cameras`.
 
         Raises:
-            InputError: There is no such camera, or this session draws nothing.
+            InputError: There is no such camera, or this session draws nothing, or is closed.
         """
+        self._check_open()
         if self.runner.pipeline.rendering is None:
             raise InputError("this session draws nothing: make it with Session(..., rendering=True)")
         return self.runner.pipeline.render(camera).colour
@@ -236,6 +248,10 @@ class Session(Closing):
         )
 
     # ---- inside ------------------------------------------------------------------------------------------
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise InputError("this session is closed: make a new one")
 
     def _state(self) -> str:
         if self._result is not None:

@@ -11,6 +11,8 @@ T. Yoshikawa, "Task-priority based redundancy control of robot manipulators", In
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pinocchio as pin
 
@@ -55,6 +57,15 @@ _WITHIN = 0.02
 corrects where it goes, is to have joints left for that."""
 
 
+class _Scratch(threading.local):
+    """What each thread has of its own; a copy begins anew."""
+
+    data: pin.Data | None = None
+
+    def __reduce__(self) -> tuple[type[_Scratch], tuple[()]]:
+        return _Scratch, ()
+
+
 class Arm:
     """The arm of a robot.
 
@@ -68,7 +79,7 @@ class Arm:
     def __init__(self, robot: RobotDescription) -> None:
         self.robot = robot
         self._model = arm_model(robot, bodies_of(robot).model)
-        self._data = self._model.createData()
+        self._scratch = _Scratch()  # the arm of a robot is made once for all threads
         self._frame = self._model.getFrameId("tool")
         self._rows = np.flatnonzero(robot.task_mask > 0.0)
         weights = robot.task_mask * ([1.0] * 3 + [_LENGTH] * 3)
@@ -81,10 +92,19 @@ class Arm:
         self.seeds: Array = robot.rest + _AWAY * (spread - robot.rest)
         """Postures ``(k, n_arm)`` to begin at beside others, about the middle of the joints' ranges."""
 
+    @property
+    def _data(self) -> pin.Data:
+        """What Pinocchio writes into, of this thread."""
+        found = self._scratch.data
+        if found is None:
+            found = self._scratch.data = self._model.createData()
+        return found
+
     def tool(self, joints: Array) -> Array:
         """The tool pose ``(7,)`` of joints ``(n_arm,)``."""
-        pin.framesForwardKinematics(self._model, self._data, joints)
-        return pose_of(self._data.oMf[self._frame])
+        data = self._data
+        pin.framesForwardKinematics(self._model, data, joints)
+        return pose_of(data.oMf[self._frame])
 
     def tools(self, joints: Array) -> Array:
         """Tool poses ``(n, 7)`` of joints ``(n, n_arm)``."""
@@ -109,10 +129,10 @@ class Arm:
         if follow:
             pull = self._posture * (robot.rest - q)
             pull *= _PULL_LIMIT / max(float(np.abs(pull).max()), _PULL_LIMIT)
-        before: list[float] = []
+        data, before = self._data, list[float]()
         for k in range(_ITERATIONS + 1):
-            pin.computeJointJacobians(self._model, self._data, q)
-            here = pin.updateFramePlacement(self._model, self._data, self._frame)
+            pin.computeJointJacobians(self._model, data, q)
+            here = pin.updateFramePlacement(self._model, data, self._frame)
             error = pin.log6(here.actInv(target)).vector[self._rows]
             if pull is None and float(np.abs(error).max()) <= _TOLERANCE:
                 return q
@@ -120,17 +140,17 @@ class Arm:
             if k == _ITERATIONS or (k >= _PATIENCE and left > _PROGRESS * before[k - _PATIENCE]):
                 break
             before.append(left)
-            jacobian = pin.getFrameJacobian(self._model, self._data, self._frame, pin.LOCAL)[self._rows]
+            jacobian = pin.getFrameJacobian(self._model, data, self._frame, pin.LOCAL)[self._rows]
             q = self._moved(q, error, jacobian, pull)
             pull = None
         return None
 
     def _nearest(self, q: Array, target: pin.SE3, leans: float) -> Array | None:
         """Joints that bring the tool to the place, turned from what is asked by no more than ``leans``."""
-        before: list[float] = []
+        data, before = self._data, list[float]()
         for k in range(_ITERATIONS + 1):
-            pin.computeJointJacobians(self._model, self._data, q)
-            here = pin.updateFramePlacement(self._model, self._data, self._frame)
+            pin.computeJointJacobians(self._model, data, q)
+            here = pin.updateFramePlacement(self._model, data, self._frame)
             off = here.rotation.T @ (target.translation - here.translation)
             turn = pin.log3(here.rotation.T @ target.rotation)
             left = float(np.abs(off).max())
@@ -138,7 +158,7 @@ class Arm:
             if k == _ITERATIONS or lost:
                 return None
             before.append(left)
-            jacobian = pin.getFrameJacobian(self._model, self._data, self._frame, pin.LOCAL)
+            jacobian = pin.getFrameJacobian(self._model, data, self._frame, pin.LOCAL)
             after = self._stepped(q, off, turn, jacobian)
             if left <= _TOLERANCE and float(np.abs(after - q).max()) <= _TURNED:
                 return q if float(np.linalg.norm(turn)) <= leans else None

@@ -8,7 +8,9 @@ anew with each search, and it ends after a number of questions, never by the clo
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,10 @@ QUESTIONS = 4000
 _CUTS = 60
 _NEAR = 1.0
 """Radians beyond start, goal and rest that a first search keeps to: so the arm does not swing about."""
+
+
+_LOCK = threading.RLock()
+"""Held by who uses OMPL's random numbers, of which a process has one source."""
 
 
 class Search:
@@ -73,10 +79,12 @@ class Search:
         return bool(self._free(q))
 
     def _connected(self, start: Array, goals: Array, near: bool) -> list[Array] | None:
-        from ompl import base, geometric, util
+        with _ompl(self._seed):
+            return self._by_ompl(start, goals, near)
 
-        util.setLogLevel(util.LOG_NONE)
-        util.RNG.setSeed(self._seed)
+    def _by_ompl(self, start: Array, goals: Array, near: bool) -> list[Array] | None:
+        from ompl import base, geometric
+
         n = len(start)
         ends = np.concatenate([start[None], goals, self._rest[None]])
         low, high = self._lower, self._upper
@@ -128,6 +136,27 @@ class Search:
             if self.clear(a, b) and self._ask(a) and self._ask(b):
                 way = [*way[: i + 1], a, b, *way[j + 1 :]]
         return _without_repeats(way)
+
+
+@contextmanager
+def _ompl(seed: int) -> Iterator[None]:
+    """OMPL, silent and with random numbers of this seed, in one thread at a time.
+
+    Its seed and its level of messages are those of the process. Both are given back: the numbers of whoever
+    uses OMPL besides go on from a seed drawn from theirs.
+    """
+    from ompl import util
+
+    with _LOCK:
+        level = util.getLogLevel()
+        util.setLogLevel(util.LOG_NONE)
+        theirs = util.RNG().getLocalSeed()
+        util.RNG.setSeed(seed)
+        try:
+            yield
+        finally:
+            util.RNG.setSeed(theirs)
+            util.setLogLevel(level)
 
 
 def _on(way: list[Array], along: Array, k: int, s: float) -> Array:

@@ -17,9 +17,11 @@ The state is of a drawn world, which has these goals, and so is not known here.
 """
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, eq=False)
 class GoalFunction:
     """A function that says whether a run has done what it should; as data it is no more than its name.
+
+    Two are equal that have one name and one function; where only the name of one is known, names count.
 
     Args:
         name: Its name.
@@ -37,8 +39,23 @@ class GoalFunction:
         """The goal that a function is."""
         return cls(str(getattr(judge, "__name__", type(judge).__name__)), judge)
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, GoalFunction):
+            return NotImplemented
+        one, two = self.__dict__["judge"], other.__dict__["judge"]
+        return self.name == other.name and (one is None or two is None or one == two)
+
+    def __hash__(self) -> int:
+        return hash((GoalFunction, self.name))
+
     def __str__(self) -> str:
         return self.name
+
+    @property
+    def module(self) -> str:
+        """Name of the module that defines the function; empty where only its name is known."""
+        judge = self.__dict__["judge"]
+        return str(getattr(judge, "__module__", None) or type(judge).__module__) if judge is not None else ""
 
     def ask(self, final: Any) -> tuple[bool, str] | None:
         """What the function says: whether it is reached, and words or none; None where it is not here.

@@ -16,6 +16,7 @@ from bt_tasksim.core.files import file_version
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.convex_parts import convex_parts
 from bt_tasksim.scene.geometry import ConvexPiece, Piece, Shape
+from bt_tasksim.scene.glb_header import check_glb
 from bt_tasksim.scene.mesh_bodies import separate, solids_and_cavities, united
 from bt_tasksim.scene.mesh_surface import MeshSurface
 from bt_tasksim.scene.meshes import TriangleMesh, cube_sphere, mass_properties, volume_of
@@ -27,6 +28,8 @@ LARGEST = 1.0
 FORMATS = ("obj", "stl", "ply", "off", "glb")
 """Forms of mesh files, each in one file."""
 MOST_BYTES = 64 << 20
+MOST_TRIANGLES = 500_000
+"""Triangles of a mesh: grips and symmetries are looked for on all of them."""
 MOST_BODIES = 256
 """Separate bodies of a mesh: physics looks at each one's contacts."""
 FARTHEST = 1e6
@@ -139,16 +142,26 @@ def _read(path: str, version: tuple[int, ...]) -> tuple[TriangleMesh, tuple[Tria
         )
     if os.stat(path).st_size > MOST_BYTES:
         raise InputError(f"mesh '{path}' is larger than {MOST_BYTES >> 20} MiB: save it with fewer triangles")
+    # From memory: a mesh file may name other files, of materials and pictures, which are not opened.
+    content = Path(path).read_bytes()
     try:
-        # From memory: a mesh file may name other files, of materials and pictures, which are not opened.
-        content = io.BytesIO(Path(path).read_bytes())
+        if form == "glb":
+            check_glb(content, MOST_TRIANGLES)
+    except InputError as error:
+        raise InputError(f"mesh '{path}' {error}") from None
+    try:
         with np.errstate(all="ignore"):  # numbers without bounds, which are looked at below
-            loaded = trimesh.load(content, file_type=form, force="mesh", skip_materials=True)
+            loaded = trimesh.load(io.BytesIO(content), file_type=form, force="mesh", skip_materials=True)
             loaded.merge_vertices()
     except Exception as error:  # readers of a dozen formats raise whatever they please
         raise InputError(f"mesh '{path}' cannot be read: {type(error).__name__}: {error}") from error
     if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) < 4:
         raise InputError(f"mesh '{path}' has no solid in it: fewer than four triangles")
+    if len(loaded.faces) > MOST_TRIANGLES:
+        raise InputError(
+            f"mesh '{path}' has {len(loaded.faces)} triangles, more than {MOST_TRIANGLES}: save it "
+            f"with fewer, such as with Blender's modifier Decimate"
+        )
     if not np.all(np.isfinite(loaded.vertices)):
         raise InputError(f"mesh '{path}' has coordinates that are not finite numbers")
     if np.abs(loaded.vertices).max() > FARTHEST:

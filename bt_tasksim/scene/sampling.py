@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.errors import InputError, NoDrawError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.scene.configuration import Disturbance, ObjectActor
@@ -61,7 +61,8 @@ def draw_object(
         fixtures: The furniture.
 
     Raises:
-        InputError: None of 200 draws of its place was free, or a cube was asked for with unequal sides.
+        NoDrawError: None of 200 draws of its place was free.
+        InputError: A cube was asked for with unequal sides.
     """
     kind = spec.kinds[int(rng.integers(len(spec.kinds)))]
     entry = shape_kind(kind)
@@ -99,11 +100,11 @@ def draw_object(
     else:
         if stuck is not None:
             depth = deepest(found.parts, fixture_slabs(stuck))
-            raise InputError(
+            raise NoDrawError(
                 f"object '{name}' and fixture '{stuck.name}' overlap by {1000 * depth:.1f} mm at the start, "
                 f"{start} in the last of {TRIES} draws: draw it from another area"
             )
-        raise InputError(
+        raise NoDrawError(
             f"object '{name}' finds no free spot {start} beside the others: "
             f"widen its area, or take fewer or smaller objects"
         )

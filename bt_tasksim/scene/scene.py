@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, cast
 
-from bt_tasksim.core.errors import FieldError, InputError, nearest, within
+from bt_tasksim.core.errors import FieldError, InputError, NoDrawError, nearest, within
 from bt_tasksim.core.names import check_name
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.renamed import renamed_arguments, renamed_fields
@@ -234,16 +234,21 @@ class Scene:
             stage: Number of the stage to draw it for; None: the scene itself.
 
         Raises:
-            InputError: The objects do not fit on their places, or there is no such stage.
+            NoDrawError: With this seed the objects do not fit on their places.
+            InputError: No seed has such a world, or there is no such stage.
         """
         check_seed(seed)
         if stage is not None and not 0 <= stage < len(self.stages):
             raise InputError(f"scene '{self.name}' has {len(self.stages)} stages, and none number {stage}")
         taught = None if stage is None else self.stages[stage]
+        scene = self
         if taught is not None and taught.scenes:
             k = int(generator(seed, stream, "variant").integers(len(taught.scenes)))
-            return taught.scenes[k].with_robot(self.robot)._draw(seed, stream, taught)
-        return self._draw(seed, stream, taught)
+            scene = taught.scenes[k].with_robot(self.robot)
+        try:
+            return scene._draw(seed, stream, taught)
+        except NoDrawError as error:
+            raise NoDrawError(f"with seed {int(seed)}, {error}") from error
 
     def _draw(self, seed: int, stream: str, taught: CurriculumStage | None) -> ActorConfiguration:
         rng = generator(seed, stream, "scene")

@@ -67,7 +67,10 @@ def shape(kind: str, size: ShapeSize) -> Shape:
     Raises:
         InputError: Unknown kind, a size that it cannot have, or a bad mesh.
     """
-    return _shape(shape_kind(kind), size, () if size.mesh is None else file_version(size.mesh))
+    found = shape_kind(kind)
+    if found.from_file:
+        size = ShapeSize(size.size, mesh=size.mesh)  # exponents are drawn, and mean nothing to a file's form
+    return _shape(found, size, () if size.mesh is None else file_version(size.mesh))
 
 
 @lru_cache(maxsize=4096)

@@ -36,6 +36,7 @@ from bt_tasksim.scene.relations import FinalState, relation_named
 __all__ = [
     "AT_REST",
     "DEEPEST",
+    "GOALS_MISSED",
     "GOALS_REACHED",
     "HAND_NOT_CLEAR",
     "KNOCKED",
@@ -45,9 +46,11 @@ __all__ = [
     "NO_GOAL",
     "PENETRATION",
     "GoalVerdict",
+    "Overlap",
     "Verdict",
     "at_rest",
     "evaluate_success",
+    "penetration",
 ]
 
 DEEPEST = 0.002
@@ -63,7 +66,13 @@ NEVER = register_reason("never", "at no moment of the run, and in the end")
 KNOCKED_OVER = register_reason(
     "knocked_over", "{object} was shifted by {shift} and tilted by {tilt:.0f}", shift=METRES, tilt=RADIANS
 )
-PENETRATION = register_reason("penetration", "two bodies overlapped by {depth:.1f}", depth=METRES)
+PENETRATION = register_reason("penetration", "{bodies} overlapped by {depth:.1f}{moment}", depth=METRES)
+GOALS_MISSED = register_reason("goals_missed", "{missed} of {count} goals are not reached ({goals})")
+"""Where it is more than one; the first one's reason stands behind it."""
+NAMED = 5
+"""Goals that are named; of more it is said how many."""
+Overlap = tuple[str, str, float, float]
+"""Names of two bodies, metres, and the seconds at which they overlapped so."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +129,11 @@ class Verdict:
 
 
 def evaluate_success(
-    configuration: ActorConfiguration, world: WorldModel, hidden: Hidden, moments: Moments | None = None
+    configuration: ActorConfiguration,
+    world: WorldModel,
+    hidden: Hidden,
+    moments: Moments | None = None,
+    overlap: Overlap | None = None,
 ) -> Verdict:
     """Judge the state at the end of a run.
 
@@ -130,6 +143,7 @@ def evaluate_success(
         hidden: The physics state at the end.
         moments: What was seen of goals that have to be true once; None where nobody looked: then they are
             judged at the end alone.
+        overlap: The two bodies that overlapped most; None where the engine does not say it.
 
     Raises:
         InputError: A goal that is a function raised an exception, or answered nonsense.
@@ -139,7 +153,7 @@ def evaluate_success(
     placements = (*_goals(final, moments), *(judge_function(f, final) for f in configuration.functions))
     if not placements:
         return Verdict(True, NO_GOAL(), math.nan, math.nan, depth)
-    wrong = next(_wrong(placements, final), None)
+    wrong = next(_wrong(placements, final, overlap), None)
     return Verdict(
         wrong is None,
         wrong or _reached(placements),
@@ -170,14 +184,35 @@ def _reached(placements: Sequence[GoalVerdict]) -> Outcome:
     return GOALS_REACHED(count=len(placements), said=said)
 
 
-def _wrong(placements: Sequence[GoalVerdict], final: FinalState) -> Iterator[Outcome]:
+def _wrong(
+    placements: Sequence[GoalVerdict], final: FinalState, overlap: Overlap | None
+) -> Iterator[Outcome]:
     """What is wrong, the first thing first."""
-    yield from (placement.outcome for placement in placements if placement.reached is False)
+    missed = [placement for placement in placements if placement.reached is False]
+    if len(missed) == 1:
+        yield missed[0].outcome
+    elif missed:
+        more = [f"and {len(missed) - NAMED} more"] if len(missed) > NAMED else []
+        named = ", ".join([*(placement.goal for placement in missed[:NAMED]), *more])
+        yield GOALS_MISSED(missed[0].outcome, missed=len(missed), count=len(placements), goals=named)
     goals = final.configuration.goals
     if any(not relation_named(goal.relation).in_hand for goal in goals):
         yield from _knocked_over({goal.object for goal in goals}, final)
     if float(final.hidden.penetration) > DEEPEST:
-        yield PENETRATION(depth=final.hidden.penetration)
+        yield penetration(final.hidden.penetration, overlap)
+
+
+def penetration(depth: Array | float, overlap: Overlap | None = None) -> Outcome:
+    """That bodies overlapped too deeply, by name where it is known which.
+
+    Args:
+        depth: Metres.
+        overlap: The two that overlapped most, and when.
+    """
+    if overlap is None:
+        return PENETRATION(bodies="two bodies", depth=depth, moment="")
+    one, two, _, time = overlap
+    return PENETRATION(bodies=f"{one} and {two}", depth=depth, moment=f" at {time:.2f} s")
 
 
 def _knocked_over(meant: set[str], final: FinalState) -> Iterator[Outcome]:

@@ -21,7 +21,14 @@ from bt_tasksim.concept.plugins import load_all
 from bt_tasksim.core.closing import Closing
 from bt_tasksim.core.cluster import Cluster
 from bt_tasksim.core.cluster_process import LOCAL
-from bt_tasksim.core.errors import BtTasksimError, InputError, LostEngine, MachineError, Terminated
+from bt_tasksim.core.errors import (
+    BtTasksimError,
+    InputError,
+    LostEngine,
+    MachineError,
+    NoDrawError,
+    Terminated,
+)
 from bt_tasksim.core.fleet import Fleet, Here
 from bt_tasksim.core.identity import differing, identity
 from bt_tasksim.core.interrupts import ending, terminable
@@ -163,6 +170,8 @@ def evaluate(
         EvaluationTerminated: By SIGTERM or SIGHUP; likewise.
         InputError: The tree, scene, robot or engines are no good, or there are no seeds, or what is kept is
             of something else, or the cluster is of another version.
+        NoDrawError: No world can be drawn with any of the seeds; where some have one, the others count as
+            episodes without success.
         LostEngine: An engine in another process has gone away.
         MachineError: A robot has failed, a worker process ended, or the cluster does not answer.
     """
@@ -227,6 +236,8 @@ def evaluate(
                         share = max(SHARE, SHARES * batch)
                         for _, outcome in fleet.spread(partial(play, stream=stream), todo, share):
                             ended(outcome)
+            if len(evaluation().undrawn) == len(found):
+                raise NoDrawError(next(iter(found.values())).outcome.sentence)
             if keep is not None:
                 keep.end(evaluation())
         except KeyboardInterrupt as stop:
@@ -334,7 +345,7 @@ class Player(Closing):
             self._batch = BatchRunner(self._build, scene, job.options, worlds, job.threads)
         index_of = {seed: index for index, seed in enumerate(seeds)}
         for seed, found in self._batch.run(seeds, stream):
-            if isinstance(found, InputError):
+            if isinstance(found, InputError) and not isinstance(found, NoDrawError):
                 raise found
             outcome = unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else in_short(found)
             yield index_of[seed], outcome
@@ -348,6 +359,8 @@ def play(player: Player, seeds: Sequence[int], stream: str) -> Iterator[tuple[in
 def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOutcome:
     """One episode; an error in it is a failure with the error as its reason.
 
+    So is a world that cannot be drawn with this seed.
+
     Raises:
         InputError: Tree or scene are no good.
         LostEngine: An engine in another process has gone away.
@@ -356,6 +369,8 @@ def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOut
     started = time.perf_counter()
     try:
         return in_short(runner.run(seed, stream))
+    except NoDrawError as error:
+        return unfinished(seed, error, time.perf_counter() - started)
     except InputError:
         raise
     except BtTasksimError as error:
@@ -393,7 +408,7 @@ def in_short(result: Result) -> EpisodeOutcome:
 def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
     from bt_tasksim.training.subject import evaluation_subject, own_code
 
-    code = own_code(runner.tree, job.tree, job.plugins)
+    code = own_code(runner.tree, job.tree, job.plugins, runner.scene)
     return evaluation_subject(runner.tree, runner.scene, job.options, policies_of(runner), code, stream)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bt_tasksim.core.markup import html_pairs
-from bt_tasksim.core.outcomes import Outcome, outcome_from_data, recorded_outcome
+from bt_tasksim.core.outcomes import NO_DRAW, Outcome, outcome_from_data, recorded_outcome
 
 CONFIDENCE = 0.95
 
@@ -120,6 +120,11 @@ class Evaluation:
         return sum(o.success for o in self.outcomes)
 
     @property
+    def undrawn(self) -> list[int]:
+        """Seeds with which no world could be drawn; they count as episodes without success."""
+        return [o.seed for o in self.outcomes if o.reason == NO_DRAW.name]
+
+    @property
     def judged(self) -> bool:
         """Every episode was judged by the physics state; else successes are the tree's own word."""
         return all(outcome.judged for outcome in self.outcomes)
@@ -156,6 +161,7 @@ class Evaluation:
             "failures": dict(failures.most_common()),
             "failed_leaves": dict(Counter(o.leaf for o in self.outcomes if o.leaf).most_common()),
             "failed_seeds": [o.seed for o in self.outcomes if not o.success],
+            "undrawn_seeds": self.undrawn,
             "seconds": round(self.seconds, 3),
             "control_steps": sum(o.control_steps for o in self.outcomes),
             "subject": dict(self.subject),
@@ -178,6 +184,11 @@ class Evaluation:
         ]
         if not self.judged:
             lines.append("  (the scene has no goal: success is the tree's own word, nothing was judged)")
+        if undrawn := self.undrawn:
+            lines.append(
+                f"  ({len(undrawn)} of {n} seeds could not be drawn and count as not successful: "
+                f"{listed(undrawn)})"
+            )
         return [*lines, *(f"  {line}" for line in self.failure_lines())]
 
     def __str__(self) -> str:
@@ -191,6 +202,12 @@ class Evaluation:
         """A small table, for notebooks."""
         head, *rest = self.lines()
         return html_pairs({"": head} | {str(number): line.strip() for number, line in enumerate(rest, 1)})
+
+
+def listed(seeds: Sequence[int], most: int = 10) -> str:
+    """Seeds as people read them, the first of many."""
+    more = f" and {len(seeds) - most} more" if len(seeds) > most else ""
+    return f"seed{'' if len(seeds) == 1 else 's'} {', '.join(map(str, seeds[:most]))}{more}"
 
 
 def outcomes_hash(episodes: Sequence[Any]) -> str:

@@ -20,7 +20,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.core.world import Hidden
 from bt_tasksim.execution.batch import BatchTree
-from bt_tasksim.scene.success import DEEPEST, PENETRATION
+from bt_tasksim.scene.success import DEEPEST, penetration
 from bt_tasksim.trees.nodes.train import Train, concepts_in, follower_of
 from bt_tasksim.trees.walk import nodes_of
 
@@ -146,7 +146,7 @@ class Judgement:
             return SignalOutcome(False, status, missed, cost=cost)
         depth = 0.0 if hidden is None else float(hidden.penetration[0])
         if depth > DEEPEST:
-            return SignalOutcome(False, status, PENETRATION(depth=depth), cost=cost)
+            return SignalOutcome(False, status, penetration(depth), cost=cost)
         return SignalOutcome(True, status, FOLLOWED(node=name), cost=cost)
 
     def _charge(self, node: int, judged: _Judged, rows: Array) -> None:

@@ -21,6 +21,7 @@ from bt_tasksim.execution.run_log import tree_text
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.robot.urdf_visuals import mesh_files
 from bt_tasksim.scene.fixtures import load_fixture
+from bt_tasksim.scene.goal_functions import GoalFunction
 from bt_tasksim.scene.scene import Scene, WorldSource
 from bt_tasksim.scene.specs import ObjectSpec
 from bt_tasksim.trees.load import tree_module
@@ -82,7 +83,9 @@ def evaluation_subject(
     }
 
 
-def own_code(tree: Behaviour, name: str = "", plugins: Iterable[str] = ()) -> dict[str, str]:
+def own_code(
+    tree: Behaviour, name: str = "", plugins: Iterable[str] = (), scene: WorldSource | None = None
+) -> dict[str, str]:
     """Hashes of the code of people's own that takes part: the tree's file, plugins, and what these import.
 
     Comments and layout do not count, see `bt_tasksim.core.own_code`; nor does a script that is the process.
@@ -92,6 +95,7 @@ def own_code(tree: Behaviour, name: str = "", plugins: Iterable[str] = ()) -> di
         name: Name or file of the tree, which was loaded last; empty, or never loaded, where it came
             otherwise: somebody in this process has built it, and others will by this name.
         plugins: Plugins, loaded.
+        scene: The scene; the modules of its goals that are functions count.
 
     Returns:
         Hashes by ``file NAME`` or ``module NAME``.
@@ -100,13 +104,14 @@ def own_code(tree: Behaviour, name: str = "", plugins: Iterable[str] = ()) -> di
     if name.endswith(".py") and tree_module(name) in sys.modules:
         roots.append(sys.modules[tree_module(name)])
     parts = {type(part) for node in nodes_of(tree) for part in (node, getattr(node, "model", None))}
-    for module in {part.__module__ for part in parts} - {"__main__", "__mp_main__"}:
+    goals = {goal.module for goal in getattr(scene, "goals", ()) if isinstance(goal, GoalFunction)}
+    for module in ({part.__module__ for part in parts} | goals) - {"", "__main__", "__mp_main__"}:
         found = sys.modules.get(module)
         if found is not None and is_own(module, getattr(found, "__file__", None) or "<frozen"):
             roots.append(found)
     hashes: dict[str, list[str]] = {}
     for module, file in own_modules(roots).items():
-        named_by_file = module.startswith(("_tree_", "_plugin_"))
+        named_by_file = module.startswith(("_tree_", "_plugin_", "_scene_"))
         key = f"file {file.name}" if named_by_file else f"module {module}"
         hashes.setdefault(key, []).append(code_hash(file))
     return {key: of[0] if len(of) == 1 else _hash(sorted(of)) for key, of in hashes.items()}

@@ -36,11 +36,10 @@ def write(tmp_path):
     return to
 
 
-@pytest.mark.parametrize("name", ["use.py", "tree.xml", "scene.json"])
+@pytest.mark.parametrize("name", ["tree.xml", "scene.json"])
 def test_what_no_scene_can_be_is_said_with_what_one_can(name):
     sentence = refused("pick_and_place", None, name)
-    assert name in sentence and "scenario" in sentence and ".yaml" in sentence
-    assert ("scene()" in sentence) == name.endswith(".py")
+    assert name in sentence and "scenario" in sentence and ".yaml" in sentence and "scene()" in sentence
 
 
 def refused(*arguments):
@@ -221,6 +220,46 @@ def test_a_scene_file_beside_the_tree(tmp_path):
     save_tree(lift(), tmp_path / "lift.xml", scene="room.yaml")
     source = load_source(str(tmp_path / "lift.xml"))
     assert source.scene.name == "room" and isinstance(source.build(), Behaviour)
+
+
+ROOM = """
+from bt_tasksim import Scene
+
+def near(final):
+    return True
+
+def scene(robot="panda"):
+    return Scene(robot, name="own_room", objects={"cup": "on table"}, goals=[near])
+"""
+
+
+@pytest.mark.parametrize("tree", ["lift.xml", "pick_and_throw", "tree.py"])
+def test_a_scene_in_a_python_file(tree, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "room.py").write_text(ROOM)
+    save_tree(lift(), tmp_path / "lift.xml")
+    (tmp_path / "tree.py").write_text(
+        "from bt_tasksim.concept_nodes import Grasp\ndef build():\n    return Grasp('cup')\n"
+    )
+    if tree == "pick_and_throw":
+        assert "no place 'trash_bin' in the scene 'own_room'" in refused(tree, None, "room.py")
+        return
+    source = load_source(tree, "so100", "room.py")
+    assert (source.scene.name, source.scene.robot) == ("own_room", "so100")
+    assert isinstance(source.build(), Behaviour)
+
+
+def test_a_python_file_without_a_scene_and_a_tree_that_names_one(tmp_path):
+    (tmp_path / "room.py").write_text("raise SystemExit('this ran')\n")
+    (tmp_path / "empty.py").write_text("x = 1\n")
+    assert "has no function scene(): define one that returns a Scene" in refused(
+        "pick_and_throw", None, str(tmp_path / "empty.py")
+    )
+    assert refused("pick_and_throw", None, "gone.py") == "there is no scene file 'gone.py'"
+    save_tree(lift(), tmp_path / "lift.xml", scene="pick_and_throw")
+    text = (tmp_path / "lift.xml").read_text().replace("pick_and_throw", "room.py")
+    (tmp_path / "lift.xml").write_text(text)
+    assert "a tree's file runs no Python" in refused(str(tmp_path / "lift.xml"))
 
 
 def test_a_tree_that_fits_no_scene(tmp_path):

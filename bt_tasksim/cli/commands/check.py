@@ -17,8 +17,8 @@ def check(
         str,
         typer.Argument(
             metavar="FILE",
-            help="A Python file with a concept or a scene(), a robot's or a scene's YAML file, a mesh, or "
-            "the name of a robot.",
+            help="A Python file with a concept or a scene(), the YAML file of a robot, a scene or an "
+            "object, a mesh, or the name of a robot.",
         ),
     ],
     tree: Annotated[
@@ -30,10 +30,10 @@ def check(
     ] = None,
     robot: Annotated[
         str | None,
-        typer.Option(metavar="ROBOT", help="The robot for a scene or a mesh.  [default: the scene's own]"),
+        typer.Option(metavar="ROBOT", help="The robot for a scene or an object.  [default: the scene's own]"),
     ] = None,
 ) -> int:
-    """Check a concept, robot or scene of your own.
+    """Check a concept, robot, scene or object of your own.
 
     Says what is wrong with it and what to do; with an error it ends with 2. A mesh is checked as an object.
     """

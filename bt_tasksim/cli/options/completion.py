@@ -17,7 +17,7 @@ def trees(incomplete: str) -> list[str]:
 
 def scenes(incomplete: str) -> list[str]:
     """Scenarios, and scene files."""
-    return [*_scenarios(incomplete), *_files(incomplete, ".yaml", ".yml")]
+    return [*_scenarios(incomplete), *_files(incomplete, ".yaml", ".yml", ".py")]
 
 
 def robots(incomplete: str) -> list[str]:

@@ -31,7 +31,7 @@ class TreeOptions:
         str | None,
         typer.Option(
             metavar="S",
-            help="A scenario's scene or a .yaml file, if not the tree's own.",
+            help="A scenario's scene, a .yaml file, or a .py file with scene(), if not the tree's own.",
             autocompletion=completion.scenes,
         ),
     ] = None

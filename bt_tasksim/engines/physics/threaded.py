@@ -108,6 +108,11 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
         self._state: WorldState | None = None
         self._hidden: Hidden | None = None
 
+    def deepest_pair(self, row: int) -> tuple[str, str, float, float] | None:
+        """See `PhysicsBatch.deepest_pair`."""
+        world = self.simulated[row]
+        return None if world is None else world.deepest_pair
+
     # ---- what an engine adds ----------------------------------------------------------------------------
 
     @abstractmethod

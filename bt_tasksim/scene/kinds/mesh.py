@@ -61,7 +61,7 @@ class MeshKind(ShapeKind):
         best grips: fingers that close about the middle of an L meet nothing.
         """
         path = _given(size.mesh)
-        return _axes(path, size, file_version(path))
+        return _axes(path, size.size, file_version(path))
 
     def grips(self, size: ShapeSize) -> Grips:
         """See `ShapeKind.grips`: opposite points of its surface."""
@@ -81,10 +81,10 @@ def _grips(path: str, size: Size, version: tuple[int, ...]) -> Grips:
 
 
 @lru_cache(maxsize=256)
-def _axes(path: str, size: ShapeSize, version: tuple[int, ...]) -> tuple[GraspAxis, ...]:
-    mesh, box = mesh_solid(path, size.size), level_grasp_axes(size)
+def _axes(path: str, size: Size, version: tuple[int, ...]) -> tuple[GraspAxis, ...]:
+    mesh, box = mesh_solid(path, size), level_grasp_axes(ShapeSize(size, mesh=path))
     met = tuple(axis for axis in box if _met(mesh, axis))
-    return met or _grips(path, size.size, version).axes(_WIDEST) or box
+    return met or _grips(path, size, version).axes(_WIDEST) or box
 
 
 def _met(mesh: TriangleMesh, axis: GraspAxis) -> bool:

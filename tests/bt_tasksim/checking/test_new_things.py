@@ -135,3 +135,10 @@ def test_a_urdf_elsewhere_and_one_without_a_hand_are_refused(tmp_path):
     with pytest.raises(InputError, match="no chain of joints leads from 'stick' to one hand"):
         write_robot("stick", "a", "a/stick.urdf")
     assert not os.listdir("b") and sorted(os.listdir("a")) == ["small.urdf", "stick.urdf"]
+
+
+@pytest.mark.parametrize("name", ["trees", "concept_nodes", "json", "numpy", "bt_tasksim"])
+def test_a_tree_is_not_called_like_a_module_that_it_would_hide(name):
+    with pytest.raises(InputError, match="is installed already: choose another name"):
+        write_tree(name)
+    assert not os.listdir()

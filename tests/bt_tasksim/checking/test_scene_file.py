@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
-from bt_tasksim import Goal, InputError, ObjectSpec, Scene, SpotSpec
+from bt_tasksim import Fixture, Goal, InputError, ObjectSpec, Scene, SpotSpec
 from bt_tasksim.checking.kinds import check_file
-from bt_tasksim.checking.report import ERROR, WARNING
+from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.checking.scene_file import check_scene
+from bt_tasksim.checking.scene_goals import check_together
+from bt_tasksim.checking.scene_room import check_room
 from bt_tasksim.core.resources import asset
 from bt_tasksim.trees.load import load_source
 
@@ -63,13 +67,91 @@ def test_goals_that_cannot_be_are_named():
     assert "too small for it in 6 of 6 draws" in said[0][1] and "out of reach on 'coin'" in said[1][1]
 
 
+def in_the_robot(robot="panda", **scene):
+    made, report = Scene(robot, **scene), Report()
+    check_room(made, [made.sample(seed) for seed in range(2)], report)
+    return [(f.level, f.function, f.what) for f in report.findings]
+
+
+def test_what_stands_in_the_robot_is_named():
+    objects = {
+        "far": ObjectSpec("box", on="table", **HERE),
+        "near": ObjectSpec("box", on="table", centre=(-0.55, 0.0), **HERE),
+    }
+    (furniture,) = in_the_robot(fixtures=[Fixture("stand", at=(0.02, 0.0))])
+    (thing,) = in_the_robot(objects=objects)
+    assert furniture[:2] == (ERROR, "fixture 'stand'") and "mm in 'panda_link" in furniture[2]
+    assert thing[:2] == (ERROR, "near") and "of panda in 2 of 2 draws" in thing[2]
+
+
+@pytest.mark.parametrize("robot", ["panda", "so100"])
+def test_furniture_beside_a_robot_is_let_alone(robot):
+    assert not in_the_robot(robot, fixtures=["shelf"], objects={"box": "on table"})
+
+
+def together(goals, **objects):
+    scene = Scene(fixtures=["shelf"], objects=objects, goals=goals)
+    worlds = [scene.sample(seed) for seed in range(3)]
+    report = Report()
+    check_together(scene, worlds, report)
+    return [finding.what for finding in report.findings if finding.level == ERROR]
+
+
+THREE = {
+    "a": ObjectSpec("cube", on="table"),
+    "b": ObjectSpec("cube", on="table"),
+    "c": ObjectSpec("cube", on="table"),
+}
+
+
+@pytest.mark.parametrize(
+    ("goals", "words"),
+    [
+        ([Goal("a", on="upper_board"), Goal("a", on="lower_board")], "different heights"),
+        ([Goal("a", "upper_board", "anywhere"), Goal("a", on="table")], "too far apart|different heights"),
+        ([Goal("a", relation="lifted"), Goal("a", on="table")], "in the hand in one, and let go"),
+        ([Goal("a", relation="lifted"), Goal("b", relation="lifted")], "one hand holds one object"),
+        ([Goal("a", relation="lifted"), Goal("a", relation="lifted", height=0.1)], "different heights"),
+        ([Goal("a", on="b"), Goal("b", on="c"), Goal("c", on="a")], "round in a circle"),
+        (
+            [
+                Goal("a", on="table", position_tolerance=0.005),
+                Goal("b", on="table", position_tolerance=0.005),
+            ],
+            "cannot both stand on the middle",
+        ),
+    ],
+)
+def test_goals_that_exclude_each_other_are_named(goals, words):
+    (what,) = together(goals, **THREE)
+    assert re.search(words, what), what
+
+
+@pytest.mark.parametrize(
+    "goals",
+    [
+        [Goal("a", on="upper_board", when="once"), Goal("a", on="lower_board")],
+        [Goal("a", on="b"), Goal("b", on="c"), Goal("c", on="table")],
+        [Goal("a", on="table"), Goal("a", "table", "anywhere"), Goal("a", beside="b")],
+        [Goal("a", "table", "anywhere"), Goal("b", "table", "anywhere")],
+        [Goal("a", relation="lifted"), Goal("b", on="table")],
+    ],
+)
+def test_goals_that_go_together_are_let_alone(goals):
+    assert together(goals, **THREE) == []
+
+
 def test_draws_that_fail_are_counted():
     crowd = {name: ObjectSpec(("box",), on="table", area=(0.1, 0.1)) for name in "abcdefgh"}
     report = check_scene(Scene(objects=crowd))
     draws = only(report, "draws")
-    assert any(level == WARNING and "of 50 draws" in what for level, what in draws), report.lines()
+    assert any(level == WARNING and "of 50 draws, such as with seed" in what for level, what in draws), (
+        report.lines()
+    )
     hopeless = {name: ObjectSpec(("box",), on="table", area=(0.0, 0.0)) for name in "ab"}
-    assert only(check_scene(Scene(objects=hopeless)), "draws") == [(ERROR, "fails in 50 of 50 draws")]
+    assert only(check_scene(Scene(objects=hopeless)), "draws") == [
+        (ERROR, "fails in 50 of 50 draws, such as with seed 0")
+    ]
 
 
 def test_what_a_file_is_is_told_by_its_content(tmp_path, monkeypatch):

@@ -20,6 +20,7 @@ def test_files_of_the_right_kind_and_folders_are_offered():
         Path(name).touch()
     assert completion.trees("mi") == ["mine/", "mine.py", "mine.xml"]
     assert completion.trees("mine/") == ["mine/a.py"]
-    assert completion.scenes("mi") == completion.robots("mi") == ["mine/", "mine.yaml"]
+    assert completion.scenes("mi") == ["mine/", "mine.py", "mine.yaml"]
+    assert completion.robots("mi") == ["mine/", "mine.yaml"]
     assert completion.trees("no/such/") == []
     assert completion.trees(f"{Path.cwd()}/mine.p") == [f"{Path.cwd()}/mine.py"]

@@ -1,5 +1,7 @@
 """What every physics engine must do: fall, rest, hold, touch, push, and overwrite no state."""
 
+import re
+
 import numpy as np
 import pytest
 from physics_cases import PHYSICS, G, Still, holding, lifted, scene
@@ -9,6 +11,7 @@ from bt_tasksim.core.world import Command, JointTarget
 from bt_tasksim.engines.base import PhysicsEngine
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.success import penetration
 
 KINDS = ("box", "cube", "cup", "cylinder", "oval", "diamond")
 
@@ -68,6 +71,8 @@ def test_an_overlap_is_recorded_and_remembered(engine):
     deepest = float(still.physics.hidden().penetration)
     assert 0.002 < deepest < 0.0601
     assert {"thing", "table"} == set(still.physics.deepest_pair[:2])
+    said = penetration(deepest, still.physics.deepest_pair).sentence
+    assert re.fullmatch(r"(thing and table|table and thing) overlapped by .* mm at \d\.\d\d s", said), said
     still.step(30)
     assert still.physics.hidden().penetration >= deepest
     fresh = Still(scene().sample(1), engine)

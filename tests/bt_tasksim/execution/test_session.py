@@ -138,3 +138,45 @@ def test_a_session_draws_what_is_there_now():
         assert 0.001 < np.mean(np.abs(first.astype(int) - later).max(axis=-1) > 20) < 0.5, "the arm has moved"
         with pytest.raises(InputError, match="did you mean 'overview'"):
             session.image("overviev")
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Session("x", 3), r"a tree is a py_trees behaviour, .* found 'x': .*load_source\('x'\)"),
+        (lambda: Session(tree(), 3), "a scene is a Scene, found 3"),
+        (lambda: Session(tree(), "a.yaml"), r"found 'a.yaml': load_scene\('a.yaml'\)"),
+        (lambda: Session(tree(), Scene), "a scene is a Scene, found .*: call it"),
+        (lambda: Session(lambda: 3, SCENE), "should return a py_trees behaviour, found 3"),
+        (
+            lambda: Session(tree(), SCENE, policy="programmed"),
+            "found 'programmed'",
+        ),
+        (lambda: Session(tree(), SCENE, policy={"Grasp": 3}), "names by concept"),
+        (
+            lambda: Session(tree(), SCENE, options={"noise": "none"}),
+            "are EngineOptions, found a",
+        ),
+        (lambda: Session(tree(), SCENE, longest=-1), "positive number of seconds, found -1"),
+        (lambda: Session(tree(), SCENE, noise=3), "the option 'noise' should be text, found 3"),
+        (lambda: Session(tree(), SCENE, rendering="no"), "'rendering' should be True or False, found 'no'"),
+        (lambda: Session(tree(), SCENE, timeout="1"), "the option 'timeout' should be a number"),
+        (lambda: run("x", SCENE), "a tree is a py_trees behaviour"),
+        (lambda: Runner(3, SCENE), "a tree is a py_trees behaviour"),
+        (lambda: Runner(lambda: 3, SCENE), "should return a py_trees behaviour, found 3"),
+    ],
+)
+def test_what_is_no_tree_no_scene_and_no_option_is_said_in_a_sentence(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+def test_a_closed_session_says_that_it_is_closed():
+    session = Session(tree(), SCENE, seed=3)
+    session.step()
+    session.close()
+    session.close()
+    assert not session.step() and session.time > 0.0 and "broken off" in repr(session)
+    for use in (session.reset, session.image, session.__enter__):
+        with pytest.raises(InputError, match="this session is closed: make a new one"):
+            use()

@@ -1,6 +1,10 @@
 """An arm for planning: joints lead to the pose, within limits, without jumps, and as the engine's arm has
 it."""
 
+import copy
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -90,3 +94,29 @@ def test_its_tool_is_where_the_batched_kinematics_has_it(each):
     tools = poses_of(chain.seen(np.ascontiguousarray(q.T))[0])
     assert np.allclose(tools[:, :3], each.arm.tools(q)[:, :3], atol=1e-9)
     assert poses.angle_between(tools[:, 3:], each.arm.tools(q)[:, 3:]).max() < 1e-6
+
+
+def test_threads_do_not_write_into_one_another(each):
+    robot, arm = each.robot, each.arm
+    rng = np.random.default_rng(0)
+    near = robot.rest + rng.normal(scale=0.2, size=(60, len(robot.rest)))
+    targets = [arm.tool(np.clip(q, robot.arm_lower, robot.arm_upper)) for q in near]
+
+    def solved(target):
+        joints = arm.joints(target, robot.rest)
+        return None if joints is None else joints.tolist()
+
+    alone = [solved(target) for target in targets]
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            assert list(pool.map(solved, targets)) == alone
+    finally:
+        sys.setswitchinterval(usual)
+
+
+def test_a_copied_robot_has_an_arm_too(panda):
+    again = copy.deepcopy(panda.robot)
+    at = arm_of(panda.robot).tool(panda.robot.rest)
+    assert np.array_equal(arm_of(again).tool(again.rest), at)

@@ -1,6 +1,7 @@
 """The search for a way: allowed all along, the same for the same request, and none where there is none."""
 
 import itertools
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from hypothesis import given, settings
@@ -66,3 +67,30 @@ def test_a_way_is_cut_short():
 def test_points_on_a_line_are_left_out():
     points = [np.array(p, float) for p in ((0, 0), (1, 0), (2, 0), (2, 1))]
     assert len(_without_repeats(points)) == 3
+
+
+def found(seed):
+    return np.array(search(around(0.9), seed).way(np.array([-1.0, 0.0]), np.array([[1.0, 0.0]]))).tolist()
+
+
+def test_threads_find_the_ways_that_one_finds():
+    alone = [found(seed) for seed in range(1, 13)]
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(found, range(1, 13))) == alone
+
+
+def test_others_who_use_ompl_keep_their_messages_and_their_seed():
+    from ompl import util
+
+    level = util.getLogLevel()
+    try:
+        util.setLogLevel(util.LOG_INFO)
+        after = []
+        for seed in (5, 6, 5):
+            util.RNG.setSeed(seed)
+            found(1)
+            after.append(util.RNG().getLocalSeed())
+        assert after[0] == after[2] != after[1]
+        assert util.getLogLevel() == util.LOG_INFO
+    finally:
+        util.setLogLevel(level)

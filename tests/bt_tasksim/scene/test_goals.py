@@ -255,3 +255,42 @@ def test_once_is_any_moment_at_which_it_is_at_rest_and_let_go():
 def test_goals_for_the_end_alone_are_not_watched():
     configuration, world = drawn(Scene(objects=OBJECTS, goals=[Goal("red", on="blue")]))
     assert not Moments(configuration, world).open
+
+
+def test_all_goals_that_are_not_reached_are_named_and_the_first_one_gives_the_reason():
+    wanted = [Goal("red", on="blue"), Goal("blue", on="green"), Goal("green", "table", "anywhere")]
+    found = verdict(wanted, {})
+    assert found.reason == "not_in_place" and not found.success
+    assert found.why.startswith(
+        "2 of 3 goals are not reached (red on blue, blue on green): red does not stand"
+    )
+    many = verdict([Goal(a, on=b) for a in OBJECTS for b in OBJECTS if a != b], {})
+    assert "6 of 6 goals" in many.why and many.why.count(" on ") == 6 and ", and 1 more)" in many.why
+    assert verdict(wanted[:1], {}).why.startswith("red does not stand on blue")
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda final: final.hidden.objects,
+        lambda final: final.pose("red"),
+        lambda final: final.place("table").pose,
+        lambda final: final.surface("table"),
+        lambda final: final.world.places["table"].access,
+        lambda final: final.configuration.places[0].pose,
+    ],
+)
+def test_no_function_writes_into_what_others_are_given(written):
+    def careless(final):
+        written(final)[...] = 0.0
+        return True
+
+    with pytest.raises(InputError, match=r"'careless' raised ValueError.*read-only \(test_goals.py:\d+\)"):
+        verdict([careless], {})
+
+
+def test_other_functions_are_other_goals():
+    one, two = (Scene(objects=OBJECTS, goals=[judge]) for judge in (lambda f: True, lambda f: False))
+    assert one != two and one == Scene(objects=OBJECTS, goals=one.goals)
+    world = one.sample(0)
+    assert ActorConfiguration.from_json(world.to_json()).functions == world.functions

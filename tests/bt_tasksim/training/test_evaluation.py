@@ -10,7 +10,15 @@ import pytest
 
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.core import plugins
-from bt_tasksim.core.errors import InputError, LeafError, LostEngine, MachineError, NoWayError, Terminated
+from bt_tasksim.core.errors import (
+    InputError,
+    LeafError,
+    LostEngine,
+    MachineError,
+    NoDrawError,
+    NoWayError,
+    Terminated,
+)
 from bt_tasksim.core.outcomes import CANNOT_START, DONE, TIME_OVER
 from bt_tasksim.demos_decomp.log_file import read_log
 from bt_tasksim.execution.pipelines import EngineOptions
@@ -319,3 +327,49 @@ def test_a_seed_that_no_log_can_keep_is_refused_before_the_run(seed):
 def test_the_largest_seed_is_kept(tmp_path):
     result, _ = write_run(tmp_path / "one", Runner(pick_and_place.build(), pick_and_place.scene()), 2**64 - 1)
     assert read_log(tmp_path / "one" / "run.h5").demonstrations[0].seed == result.seed == 2**64 - 1
+
+
+CROWD = """
+from bt_tasksim import ObjectSpec, Scene
+from bt_tasksim.concept_nodes import Wait
+
+def scene():
+    box = ObjectSpec("box", on="table", area=({side}, {side}), size=(0.06, 0.06, 0.05), gap=0.01)
+    return Scene(objects={{f"box {{i}}": box for i in range(7)}})
+
+def build():
+    return Wait(duration=0.1)
+"""
+
+
+@pytest.mark.parametrize("how", [{"batch": 1}, {"batch": 3}, {"batch": 2, "workers": 2}])
+def test_a_seed_that_has_no_world_is_counted_and_the_others_are_run(how, tmp_path):
+    (tmp_path / "crowd.py").write_text(CROWD.format(side=0.11))
+    job = Job(str(tmp_path / "crowd.py"), batch=how["batch"])
+    found = evaluate(job, range(8), workers=how.get("workers"))
+    assert [outcome.seed for outcome in found.outcomes] == list(range(8)) and found.complete
+    without = found.undrawn
+    assert 0 < len(without) < 8 and found.successes == 8 - len(without)
+    content = found.to_json()
+    assert content["undrawn_seeds"] == without and content["failures"] == {"no_draw": len(without)}
+    for outcome in found.outcomes:
+        if outcome.seed in without:
+            assert outcome.reason == "no_draw" and outcome.status == "INVALID"
+            assert f"with seed {outcome.seed}, object 'box" in outcome.why
+    assert f"{len(without)} of 8 seeds could not be drawn" in str(found)
+
+
+def test_where_no_seed_has_a_world_that_is_an_error_which_names_one(tmp_path):
+    (tmp_path / "crowd.py").write_text(CROWD.format(side=0.05))
+    with pytest.raises(NoDrawError, match=r"with seed 5, object 'box .' finds no free spot") as error:
+        evaluate(Job(str(tmp_path / "crowd.py"), batch=1), [5, 6])
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("batch", [1, 2])
+def test_bodies_that_overlapped_too_deeply_are_named(batch, monkeypatch):
+    monkeypatch.setattr("bt_tasksim.scene.success.DEEPEST", 0.0)  # whatever touches
+    (found,) = evaluate(Job("pick_and_throw", batch=batch), [30]).outcomes
+    bodies, when = found.outcome.names["bodies"], found.outcome.names["moment"]
+    assert found.reason == "penetration" and " and " in bodies and "two bodies" not in bodies
+    assert when.startswith(" at ") and found.why.startswith(f"{bodies} overlapped by ")

@@ -127,3 +127,19 @@ def test_engines_of_a_job_count():
     other = dataclasses.replace(job, options=EngineOptions(noise="hard"))
     assert differing(subject(job), subject(job)) == ""
     assert differing(subject(job), subject(other)) == "choice of engines"
+
+
+def test_goals_in_another_file_take_part(tree, tmp_path):
+    room = tmp_path / "own_room.py"
+    room.write_text(
+        "from bt_tasksim import Scene\n\ndef near(final):\n    return True\n\n"
+        "def scene(robot='panda'):\n    return Scene(robot, objects={'cup': 'on table'}, goals=[near])\n"
+    )
+
+    def code():
+        with Player(Job(str(tree), scene=str(room))) as player:
+            return own_code(player.runner.tree, str(tree), (), player.runner.scene)
+
+    before = code()
+    room.write_text(room.read_text().replace("return True", "return False"))
+    assert before.keys() == code().keys() and differing(before, code()) == "file own_room.py"

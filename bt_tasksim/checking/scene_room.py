@@ -1,0 +1,95 @@
+"""Whether something of a scene stands in its robot before anything has moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bt_tasksim.checking.report import ERROR, WARNING, Report
+from bt_tasksim.checking.robot_touching import DEEP, LinkPart, link_part
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.robot.description import RobotDescription, load_robot
+from bt_tasksim.robot.urdf_visuals import load_collisions
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.hulls import convex
+from bt_tasksim.scene.shapes import BoxPiece, Piece
+
+if TYPE_CHECKING:
+    from bt_tasksim.scene.scene import Scene
+
+
+def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Report) -> None:
+    """No furniture and no object stands in the robot, which is at rest with an open hand.
+
+    Args:
+        scene: The scene.
+        worlds: Draws of it.
+        report: Where findings go.
+    """
+    robot = load_robot(scene.robot)
+    try:
+        links = _links(robot)
+    except InputError as error:
+        what = f"was not compared with what stands there: {error}"
+        report.add(WARNING, scene.name, "robot", what, "put the files of its URDF there")
+        return
+    for fixture in worlds[0].fixtures:
+        boxes = [BoxPiece(np.array(box.pose), np.array(box.size) / 2) for box in fixture.boxes]
+        link, depth = _deepest(links, fixture.pose_array(), boxes)
+        if depth > DEEP:
+            what = f"stands {1000 * depth:.0f} mm in '{link}' of {robot.name}"
+            remedy = f"put it elsewhere, such as Fixture('{fixture.name}', at=(x, y))"
+            report.add(ERROR, scene.name, f"fixture '{fixture.name}'", what, remedy)
+    for name in scene.object_names:
+        deep = [found for world in worlds if (found := _of_object(links, world, name))[1] > DEEP]
+        if deep:
+            link, depth = max(deep, key=lambda found: found[1])
+            often = f"in {len(deep)} of {len(worlds)} draws"
+            what = f"is in '{link}' of {robot.name} {often}, by {1000 * depth:.0f} mm"
+            level = ERROR if len(deep) == len(worlds) else WARNING
+            report.add(level, scene.name, name, what, "draw it from an area beside the robot")
+
+
+def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
+    """The parts of its links, and where they are at rest."""
+    import coal
+
+    from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+
+    parts = [part for shape in load_collisions(robot.urdf) if (part := link_part(shape)) is not None]
+    joints = np.concatenate([robot.rest, robot.hand_open])
+    at = PinocchioKinematics(robot).link_poses(joints, sorted({part.link for part in parts}))
+    frames = [poses.multiply(at[part.link], part.pose) for part in parts]
+    placed = [coal.Transform3s(poses.to_matrix(f[3:]), f[:3]) for f in frames]
+    return list(zip(parts, placed, strict=True))
+
+
+def _of_object(
+    links: Sequence[tuple[LinkPart, Any]], world: ActorConfiguration, name: str
+) -> tuple[str, float]:
+    actor = next(actor for actor in world.objects if actor.name == name)
+    return _deepest(links, np.array(actor.pose), actor.shape().collision)
+
+
+def _deepest(
+    links: Sequence[tuple[LinkPart, Any]], pose: Array, pieces: Sequence[Piece]
+) -> tuple[str, float]:
+    """The link that pieces of a body at ``pose (7,)`` overlap most, and by how many metres."""
+    import coal
+
+    request, found = coal.DistanceRequest(), ("", 0.0)
+    for piece in pieces:
+        if isinstance(piece, BoxPiece):
+            frame, form = poses.multiply(pose, piece.pose), coal.Box(*(2 * piece.half_size).tolist())
+        else:
+            frame, form = pose, convex(np.asarray(piece.vertices, float))
+        at = coal.Transform3s(poses.to_matrix(frame[3:]), frame[:3])
+        for part, placed in links:
+            depth = -float(coal.distance(part.form, placed, form, at, request, coal.DistanceResult()))
+            if depth > found[1]:
+                found = part.link, depth
+    return found
