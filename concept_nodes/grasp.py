@@ -119,8 +119,8 @@ FEELING = 0.05
 """Speed in m/s at which a programmed grasp feels its way where it has little room: a finger that meets an
 edge at 0.18 m/s presses 78 N before it can be stopped. Near its base an arm comes slower, see `FIRM`."""
 YIELDS = 15.0
-"""Newtons against the approach from which on a hand gives way: a finger that stands on something as it comes, or
-a jaw that swings and presses what it closes on against its support."""
+"""Newtons against the approach from which on a hand gives way: a finger that stands on something as it comes,
+or a jaw that swings and presses what it closes on against its support."""
 YIELDING = 0.0005
 """Metres by which it does so in a control period, at twice that force and beyond; it does not come back."""
 
@@ -149,7 +149,7 @@ class _Chosen(NamedTuple):
     Attributes:
         goal: Tool poses ``(N, 7)``.
         standoff: Metres ``(N,)`` before them from which the hand comes straight on.
-        tight: Numbers ``(N,)``, 1 where the hand has little room there, see `Choice.tight`.
+        tight: Numbers ``(N,)``, 1 where the hand feels its way, see `Choice.tight`.
         known: Numbers ``(N,)``, 1 for a grasp at a known grip, 0 for the usual one.
         closure: How far ``(N,)`` the hand is closed as it comes.
         routes: The motions that lead there, in the worlds where the usual way does not serve.

@@ -84,7 +84,8 @@ class Choice(NamedTuple):
         goal: Tool pose ``(7,)``.
         standoff: Metres before it from which the hand comes straight on.
         routes: The motions that lead there; none where the usual way does.
-        tight: The opened hand has little room there, beside the object and what else is around.
+        tight: The opened hand has little room there, beside the object and what else is around, or tips and
+            pushes aside what it does not take well: it feels its way.
         usual: It is the usual grasp.
         closure: How far the hand is closed as it comes.
     """
@@ -133,7 +134,7 @@ class Chooser:
         firmly: bool = False,
     ) -> None:
         self._view, self._target, self._standoff, self._pace = view, target, standoff, pace
-        self._firmly = firmly
+        self._firmly, self._loses = firmly, loses(view.robot)
         self._close = close = closer > ROOMS[0]
         self._openings: dict[float, Opening] = {}
         if close:
@@ -173,7 +174,7 @@ class Chooser:
             routes = (
                 (followed(at.arm, coming, self._pace), followed(at.arm, on, self._gently)) if hurried else ()
             )
-            tight = hand.tight(goal)
+            tight = self._loses or hand.tight(goal)
             return Choice(goal, begins.standoff, routes, tight, usual=True, closure=hand.closure)
         found = self._come(goal, begins, hand, at)
         return None if found is None else found._replace(usual=True)
@@ -344,7 +345,7 @@ class Chooser:
         if line is None:
             return self._no("to which no way was found") or None
         straight = followed(at.arm, np.concatenate([way.joints[-1:], line]), self._gently)
-        tight = hand.tight(goal)
+        tight = self._loses or hand.tight(goal)
         return self._slid(Choice(goal, begins.standoff, (way, straight), tight, closure=hand.closure), at)
 
     @cached_property
@@ -377,8 +378,12 @@ def rooms(robot: RobotDescription) -> list[tuple[float, bool]]:
     What a jaw that swings or a hand of many fingers holds poorly it loses, so it rather goes closely past
     things. A gripper of two fingers holds at every grip, and rather keeps room.
     """
-    loses = standing_side(robot) is not None or len(robot.tips) > TWO
-    return [(closer, firmly) for firmly in ((True, False) if loses else (False,)) for closer in ROOMS]
+    return [(closer, firmly) for firmly in ((True, False) if loses(robot) else (False,)) for closer in ROOMS]
+
+
+def loses(robot: RobotDescription) -> bool:
+    """A hand that a jaw which swings or many fingers make tip, push aside or lose what it does not take well."""
+    return standing_side(robot) is not None or len(robot.tips) > TWO
 
 
 class _Served:

@@ -97,10 +97,10 @@ class Firm:
         return 1.0 / (1.0 + math.exp(-odds)) - 1.0 / (1.0 + math.exp(-least))
 
     def features(self, tool: Array) -> tuple[float, float]:
-        """Of a squeeze at a tool pose ``(7,)``: its angle, and the lever at which the object's weight turns it.
+        """Of a squeeze at a tool pose ``(7,)``: its angle, and the lever of the object's weight.
 
-        In radians, infinite where there is none; and metres, about the axis along which the fingers close: from
-        wherever the hand comes, what lies straight below the fingers does not turn in them.
+        In radians, infinite where there is none; and metres, about the axis along which the fingers close:
+        from wherever the hand comes, what lies straight below the fingers does not turn in them.
         """
         found = self._squeeze(tool)
         closing = poses.to_matrix(tool[3:])[:, 1]

@@ -26,7 +26,7 @@ class GraspMemory(NamedTuple):
         closure: Closure at the previous tick.
         settled: Ticks in a row with opposing contacts and a still hand.
         preshape: Closure at which the hand comes.
-        tight: Boolean ``(N,)``: the object leaves the open hand little room.
+        tight: Boolean ``(N,)``: the hand feels its way, see `grasp_choice.Choice.tight`.
         touched: Which fingertips ``(N, n_tips)`` have touched anything since the approach began, 0 or 1.
         first: How far before the grasp pose the tool was at the first contact, metres; 0 without one.
         estimate: What the estimate says ``(N, 5)``: height of the grasp pose and of the object's centre

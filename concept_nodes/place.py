@@ -253,7 +253,7 @@ class Place(ConceptModel[PlaceMemory]):
         return standing_pose(frame, now, model)
 
     def _found(self, view: WorldView, goal: Array) -> tuple[Array, Route]:
-        """The tool pose ``(7,)`` to go to, and the way; turned by its symmetry, or tipped, where it cannot stay so.
+        """The tool pose ``(7,)`` to go to, and the way; turned by its symmetry, or tipped, where need be.
 
         Raises:
             NoWayError: There is none; says what would touch what as it is held now.

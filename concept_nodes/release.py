@@ -128,8 +128,8 @@ class Release(ConceptModel[ReleaseMemory]):
         path = retreat_path(seen, found, self.speed)
         before = -array_namespace(seen.tool).ones_like(path.duration)
         ends = constant(np.array([float(seen.robot.closure(hand)) for hand in opened]), seen.tool)
-        # A hand that presses is told to be farther shut than it can be, and lets go of that first: else fingers
-        # that lag differently push what they hold as they part.
+        # A hand that presses is told to be farther shut than it can be, and lets go of that first: else
+        # fingers that lag differently push what they hold as they part.
         start = array_namespace(before).where(seen.opposed(), -before, seen.closure)
         return ReleaseMemory(path, start, seen.closure, ends, before, seen.object(self.target))
 

@@ -14,8 +14,8 @@ from bt_tasksim.core.world import ObjectModel
 HEADINGS = 12
 """Headings that are tried where any will do."""
 TIPPED = (0.07, 0.14)
-"""Radians by which something may lean that is put down where it cannot stand upright at once: what has turned in
-a hand of fingers that swing. It stands up when it is let go. Less than `place.LEANING`."""
+"""Radians by which something may lean that is put down where it cannot stand upright at once: what has turned
+in a hand of fingers that swing. It stands up when it is let go. Less than `place.LEANING`."""
 
 
 def standing_options(view: WorldView, target: str, reference: str, hover: float = 0.0) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -83,6 +83,21 @@ class RobotBuilder:
         return builder
 
 
+class HandMotion(NamedTuple):
+    """How a hand is told to move.
+
+    Attributes:
+        fast: With more than `FAST`.
+        opens: It opens; None: it does not move.
+    """
+
+    fast: bool
+    opens: bool | None
+
+
+STANDS = HandMotion(False, None)
+
+
 class Robot:
     """A robot in one world: what is asked of its drives, and where its frames are.
 
@@ -156,14 +171,14 @@ class Robot:
             joint.set_drive_target(value)
             joint.set_drive_velocity_target(0.0)
 
-    def drive_to(self, position: list[float], velocity: list[float]) -> tuple[bool, bool]:
+    def drive_to(self, position: list[float], velocity: list[float]) -> HandMotion:
         """Tell the drives where to go, as far as it is news: a call costs as much as all the rest of it.
 
         A drive of stiffness k and damping d that is told to be at x with the speed v pushes with
         ``k (x - q) + d (v - q')``: the same as when it is told to be at ``x + (d / k) v`` and at rest.
 
         Returns:
-            The hand closes or opens fast; and it opens.
+            What the hand is told to do.
         """
         told = [x + lead * v for x, v, lead in zip(position, velocity, self._lead, strict=True)]
         for tell, now, before in zip(self._tell, told, self._told, strict=True):
@@ -172,10 +187,10 @@ class Robot:
         self._told = told
         closing = velocity[self._n_arm :]
         if not any(closing):
-            return False, False
-        fast = [v for v, most in zip(closing, self._fast, strict=True) if abs(v) > most]
+            return STANDS
+        fast = any(abs(v) > most for v, most in zip(closing, self._fast, strict=True))
         opens = any(v * way > 0.0 for v, way in zip(closing, self._opens, strict=True))
-        return bool(fast), bool(fast) and opens
+        return HandMotion(fast, opens)
 
 
 def _set_surfaces(
