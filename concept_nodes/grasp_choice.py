@@ -382,7 +382,7 @@ def rooms(robot: RobotDescription) -> list[tuple[float, bool]]:
 
 
 def loses(robot: RobotDescription) -> bool:
-    """A hand that a jaw which swings or many fingers make tip, push aside or lose what it does not take well."""
+    """A hand with a jaw that swings, or of many fingers: it pushes aside what it does not take well."""
     return standing_side(robot) is not None or len(robot.tips) > TWO
 
 

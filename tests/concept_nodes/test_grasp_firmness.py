@@ -7,6 +7,7 @@ import pytest
 
 from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, Firm, deeper
 from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import load_robot
 
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])
@@ -58,10 +59,22 @@ def test_a_grasp_is_riskier_beside_the_middle_on_what_is_thin_and_with_a_slanted
     found, middle = firm(), above(0.04)
     least = found.risk(middle, 0.045)
     assert 0.0 <= least < 0.15
-    assert found.risk(above(0.04, x=0.03), 0.045) > least + 0.2, "fingers hold its end alone"
+    assert found.risk(above(0.04, x=0.03), 0.045) > least + 0.1, "fingers hold its end alone"
     assert found.risk(middle, 0.01) > found.risk(middle, 0.045) == found.risk(middle, np.inf)
     turned = poses.pose([0.0, 0.0, 0.04], poses.quat_multiply(poses.yaw(0.4), DOWN))
     assert found.features(turned)[0] > found.features(middle)[0]
     assert found.risk(turned, 0.045) > least
     assert 0.0 < found.risk(above(0.2), 0.045) < 1.0, "where nothing is met it is as good as lost"
     assert firm("panda").risk(middle, 0.045) == 0.0
+
+
+def test_what_is_below_the_fingers_does_not_turn_in_them_wherever_the_hand_comes_from():
+    found = firm()
+
+    def level(x: float, z: float) -> Array:
+        axes = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+        return poses.pose([x, 0.0, z], poses.frame_from_axes(*axes))
+
+    for tool in (above(0.02), above(0.05), level(0.0, 0.02), level(0.0, 0.05)):
+        assert found.features(tool)[1] == pytest.approx(0.0, abs=1e-6)
+    assert found.features(level(-0.03, 0.04))[1] == pytest.approx(0.03, abs=1e-6)

@@ -26,8 +26,8 @@ Ability hand, each a kilogram with its motor's inertia, meet on the stick of a l
 100 Hz, and by 1.0 at 200. Not for as long as something is held: twice the steps would cost twice the time."""
 LIGHTEST = 4
 """The same, at most, where something is so light that `MOST` iterations of the solver are too few, however
-slowly the hand closes. With a jaw of the SO-100 that presses on things of 10 to 50 g 37 of 40 tasks are done so,
-and 33 with up to 250 iterations instead."""
+slowly the hand closes. With a jaw of the SO-100 that presses on things of 10 to 50 g 37 of 40 tasks are done
+so, and 33 with up to 250 iterations instead."""
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
 WATCHED = 4
