@@ -32,7 +32,7 @@ from bt_tasksim.concept_nodes.grasp_pose import (
     resting_place,
 )
 from bt_tasksim.concept_nodes.holding import HOLDING, tool_distance
-from bt_tasksim.concept_nodes.limits import FIRM, FORCE_LIMIT, force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, put_down, views
 from bt_tasksim.core import poses
@@ -117,7 +117,15 @@ AS_GIVEN = math.cos(math.radians(20.0))
 
 FEELING = 0.05
 """Speed in m/s at which a programmed grasp feels its way where it has little room: a finger that meets an
-edge at 0.18 m/s presses 78 N before it can be stopped. Near its base an arm comes slower, see `FIRM`."""
+edge at 0.18 m/s presses 78 N before it can be stopped."""
+DEEP = 0.04
+"""Metres before the grasp from which on fingers may meet an edge."""
+FAR = 0.5
+"""Metres between the arm's base and its tool within which it then comes slower, in proportion to their square:
+so does the stiffness of the same drives grow. A jaw of the SO-100 that meets a ring at 50 mm/s, 0.27 m from its
+base, presses 115 N before it can be stopped."""
+SLOWEST = 0.05
+"""The least share of the reference motion's own speed at which it does so."""
 YIELDS = 15.0
 """Newtons against the approach from which on a hand gives way: a finger that stands on something as it comes,
 or a jaw that swings and presses what it closes on against its support."""
@@ -473,8 +481,10 @@ class Grasp(ConceptModel[GraspMemory]):
         outwards = poses.clip(xp.sum(touching * constant(_sides(seen.robot), touching), axis=-1), -1.0, 1.0)
         now, period = seen.elapsed - memory.delay, seen.world.control_period
         ahead = sample(memory.path, now + period)[:, :3] - sample(memory.path, now)[:, :3]
-        feeling = FEELING * poses.clip(poses.norm(seen.tool[:, :2]) / FIRM, 0.0, 1.0)
-        share = poses.clip(feeling * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), CAREFUL, 1.0)
+        near = poses.norm(seen.tool[:, :3] - memory.goal[:, :3]) < DEEP
+        firm = poses.clip(poses.norm(seen.tool[:, :2]) / FAR, 0.0, 1.0) ** 2
+        feeling = FEELING * xp.where(near, firm, xp.ones_like(firm))
+        share = poses.clip(feeling * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), SLOWEST, 1.0)
         pace = xp.where(xp.any(seen.contacts, axis=-1), xp.zeros_like(share), (share - CAREFUL) / EAGER)
         aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)
         return xp.concat([aside + self._yielding(seen, memory), pace[:, None]], axis=-1)

@@ -75,6 +75,8 @@ GENTLE = 0.5
 overshoot its end by 6 to 9 mm, and the palm meets the object."""
 SLOWER = 0.4
 """Share of the usual speed at which a hand goes closely past things."""
+BESIDE = dict(zip(ROOMS, (1.0, 0.5, 0.0), strict=True))
+"""Share of the usual room beside a grasp, by how much closer than usual one may come to things."""
 
 
 class Choice(NamedTuple):
@@ -136,6 +138,7 @@ class Chooser:
         self._view, self._target, self._standoff, self._pace = view, target, standoff, pace
         self._firmly, self._loses = firmly, loses(view.robot)
         self._close = close = closer > ROOMS[0]
+        self._beside = max((share for room, share in BESIDE.items() if room >= closer), default=0.0)
         self._openings: dict[float, Opening] = {}
         if close:
             self._pace = pace = Pace(SLOWER * pace.speed, acceleration=SLOWER**2 * pace.acceleration)
@@ -184,7 +187,7 @@ class Chooser:
         hand = opened_about(self._view.robot, width)
         closure = float(self._view.robot.closure(hand))
         if closure not in self._openings:
-            self._openings[closure] = Opening(self._view, self._target, hand, self._close)
+            self._openings[closure] = Opening(self._view, self._target, hand, self._close, self._beside)
         return self._openings[closure]
 
     def other(self, candidates: Candidates, skipped: int = 0, usual: Choice | None = None) -> Choice:

@@ -19,7 +19,8 @@ from bt_tasksim.planning.ways import WayFinder
 
 ASIDE = (0.004, 0.003)
 """Metres across and along the closing axis by which a hand should be able to come beside where it is meant
-to: estimates are wrong by some millimetres, and a mesh may have arms or a rim next to where it is held."""
+to: estimates are wrong by some millimetres, and a mesh may have arms or a rim next to where it is held. Where
+there is not so much room a share of it."""
 TIGHT = 0.008
 """Metres beside where it is meant to be at which a hand with little room would touch something: four times
 the standard deviation of good estimates, since an arm is beside its path, too."""
@@ -33,14 +34,18 @@ class Opening:
         target: What it takes.
         hand: Joints ``(n_hand,)``.
         close: It comes closer to things than usual.
+        beside: Share of `ASIDE`.
 
     Attributes:
         hand: The joints.
         closure: How far they are closed.
     """
 
-    def __init__(self, view: WorldView, target: str, hand: Array, close: bool) -> None:
+    def __init__(
+        self, view: WorldView, target: str, hand: Array, close: bool = False, beside: float = 1.0
+    ) -> None:
         self._view, self._target, self._close = view, target, close
+        self._aside = [beside * far for far in ASIDE]
         self._closer = VERY_CLOSE if close else CLOSER
         self.hand, self.closure = hand, float(view.robot.closure(hand))
 
@@ -79,7 +84,7 @@ class Opening:
         """Whether the hand alone touches nothing at a tool pose ``(7,)``, and a little beside it, either."""
         if not self.alone.free(goal):
             return False
-        return self._close or all(self.alone.free(tool) for tool in _beside(goal, *ASIDE))
+        return not any(self._aside) or all(self.alone.free(tool) for tool in _beside(goal, *self._aside))
 
     def tight(self, goal: Array) -> bool:
         """Whether it has little room at a tool pose ``(7,)``, beside the object and what else is around."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,10 +30,13 @@ from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT, METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.hand_collision import HandCollisions
 from bt_tasksim.planning.reference_motion import Path, posture, sample
-from bt_tasksim.planning.things import Leave
+from bt_tasksim.planning.surroundings import pieces_of
+from bt_tasksim.planning.things import Leave, Thing
 from bt_tasksim.robot.kinematics.hand import SPARE, opened_about, standing_side, wide_at
-from bt_tasksim.scene.spatial_laws import beyond_walls
+from bt_tasksim.scene.spatial_laws import beyond_walls, floats
 
 OPENED = Form(
     "hand {opening} open, {contacts} fingertips in contact, {force} at the wrist{touch}",
@@ -58,6 +62,8 @@ FALLING = 0.6
 """Seconds after the hand has drawn back within which something has fallen."""
 OPEN = 0.15
 """Closure, beyond that to which it opens, below which a hand is open; at most a quarter of its way."""
+AT = 0.004
+"""Metres within which the hand is at a piece of what it holds."""
 UP = np.array([0.0, 0.0, 1.0])
 SPARES = (0.006, 0.010, 0.014, 0.018, SPARE)
 """Metres by which a jaw that swings opens wider than what it lets go of, the last where there is room."""
@@ -174,14 +180,16 @@ class Release(ConceptModel[ReleaseMemory]):
     def _beside(self, seen: Seen) -> Array:
         """Metres ``(N,)`` by which the object's middle is outside what it was to fall into; 0 where unseen.
 
-        What lies on other things above its rim is not in it, unless it stands on its floor.
+        What lies on other things above its rim is not in it, unless it stands on its floor. What seems to be in
+        the air is not seen any more: it is taken for where it was last.
         """
         xp = array_namespace(seen.tool)
         if self.into is None or self.into not in seen.world.place_columns:
             return xp.zeros_like(seen.tool[:, 0])
-        far = beyond_walls(Estimates(seen), self.target, self.into)
-        far = xp.maximum(far, xp.zeros_like(far))
-        return xp.where(xp.isfinite(far), far, xp.zeros_like(far))
+        where = Estimates(seen)
+        far = beyond_walls(where, self.target, self.into)
+        told = xp.isfinite(far) & ~floats(where, self.target, self.into)
+        return xp.where(told, xp.maximum(far, xp.zeros_like(far)), xp.zeros_like(far))
 
     def done(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """The hand is open, touches nothing and has drawn back; what was to fall into something is in it."""
@@ -213,13 +221,26 @@ class Release(ConceptModel[ReleaseMemory]):
 def _opened(view: WorldView, target: str) -> Array:
     """Joints ``(n_hand,)`` of the hand that has let go of what it holds.
 
-    One with a jaw that swings opens as wide as it may without touching anything else.
+    One with a jaw that swings opens as wide as it may without touching anything else, or another wall of what
+    it holds.
     """
     robot = view.robot
     wide = wide_at(robot, float(robot.closure(view.hand)))
     found = [opened_about(robot, wide, spare) for spare in SPARES]
-    for k, hand in enumerate(found[1:] if standing_side(robot) is not None else []):
+    if standing_side(robot) is None:
+        return found[-1]
+    walls = _other_walls(view, target)
+    for k, hand in enumerate(found[1:]):
         finder = view.finder(hand=hand, leave=Leave(hand={target}), closer=TOUCHING)
-        if not finder.collisions.free(finder.start):
+        alone = HandCollisions(bodies_of(robot), hand, walls)
+        if not finder.collisions.free(finder.start) or not alone.free(view.tool):
             return found[k]
     return found[-1]
+
+
+def _other_walls(view: WorldView, target: str) -> list[Thing]:
+    """The pieces of what is held that the hand is not at."""
+    bodies = bodies_of(view.robot)
+    pieces = [Thing(target, view.objects[target], pieces=[p]) for p in pieces_of(view.model(target))]
+    away = [HandCollisions(bodies, view.hand, [replace(p, margin=AT)]).free(view.tool) for p in pieces]
+    return [piece for piece, is_away in zip(pieces, away, strict=True) if is_away]

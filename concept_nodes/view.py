@@ -14,11 +14,13 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, constant
 from bt_tasksim.core.transfer import fetched
 from bt_tasksim.core.world import ObjectModel, WorldModel
-from bt_tasksim.planning.surroundings import pieces_of, things_of
+from bt_tasksim.planning.surroundings import adrift, pieces_of, things_of
 from bt_tasksim.planning.things import Held, Leave, Thing
 from bt_tasksim.planning.ways import WayFinder
 from bt_tasksim.robot.description import RobotDescription
 
+AT_HAND = 0.05
+"""Metres beyond its own size within which the hand may hold an object."""
 PALM = 0.005
 """Metres that a palm keeps from what its fingers close on, since the estimate may be wrong."""
 
@@ -38,6 +40,7 @@ class WorldView(NamedTuple):
         tool: Tool pose ``(7,)``.
         arm: The arm's joints ``(n_arm,)``.
         hand: The hand's joints ``(n_hand,)``.
+        adrift: Objects that are seen no more, and were last seen as they fell: nobody keeps clear of them.
     """
 
     robot: RobotDescription
@@ -46,6 +49,7 @@ class WorldView(NamedTuple):
     tool: Array
     arm: Array
     hand: Array
+    adrift: Collection[str] = ()
 
     def model(self, name: str) -> ObjectModel:
         """What is known beforehand of an object."""
@@ -71,7 +75,8 @@ class WorldView(NamedTuple):
         the second one, which is called `nearly` it, there is some: fingers may be excepted from that, and a
         palm not.
         """
-        others = {name: pose for name, pose in self.objects.items() if name not in without}
+        apart = {*without, *self.adrift} - {taken}
+        others = {name: pose for name, pose in self.objects.items() if name not in apart}
         found = things_of(self.world, others, closer)
         if taken not in others:
             return found
@@ -123,12 +128,25 @@ def views(seen: Seen) -> list[WorldView]:
     observation, columns = seen.observation, seen.world.columns
     arrays = (seen.objects, observation.tool_pose, observation.arm_position, observation.hand_position)
     objects, tool, arm, hand = (np.asarray(values, float) for values in fetched(arrays))
+    (held,) = fetched([seen.opposed()])
     found = []
     for k in range(len(tool)):
         world = seen.world.model_of(k)
         estimates = {model.name: objects[k, columns[model.name]] for model in world.objects}
-        found.append(WorldView(seen.robot, world, estimates, tool[k], arm[k], hand[k]))
+        gone = _adrift(world, estimates, tool[k] if held[k] else None)
+        found.append(WorldView(seen.robot, world, estimates, tool[k], arm[k], hand[k], gone))
     return found
+
+
+def _adrift(world: WorldModel, estimates: Mapping[str, Array], holds: Array | None) -> frozenset[str]:
+    """Objects in the air, see `adrift`, but for what a hand that holds something has at its tool ``(7,)``."""
+    known = {name: pose for name, pose in estimates.items() if np.isfinite(pose).all()}
+    asked = [name for name, pose in known.items() if holds is None or _beyond(world.object(name), pose, holds)]
+    return adrift(things_of(world, known), asked) if asked else frozenset()
+
+
+def _beyond(model: ObjectModel, pose: Array, tool: Array) -> bool:
+    return bool(np.linalg.norm(pose[:3] - tool[:3]) > AT_HAND + max(model.extent))
 
 
 def put_down(seen: Seen) -> Seen:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +15,8 @@ CLEAR_OF_FURNITURE = 0.008
 """Metres kept from furniture, whose place is calibrated."""
 CLEAR_OF_OBJECTS = 0.01
 """Metres kept from objects, beside the uncertainty of their estimates."""
+BORNE = 0.03
+"""Metres below an object within which something has to be that bears it, see `adrift`."""
 
 
 def pieces_of(model: ObjectModel) -> tuple[Array, ...]:
@@ -48,3 +50,35 @@ def things_of(
         if bool(np.isfinite(pose).all())
     ]
     return [*furniture, *loose]
+
+
+def adrift(things: Sequence[Thing], names: Collection[str]) -> frozenset[str]:
+    """Those of some objects that nothing is below: they are not at rest there, but were last seen in motion.
+
+    Boxes about things are compared, so what may be borne counts as borne.
+
+    Args:
+        things: Everything that is there.
+        names: The objects in question.
+    """
+    boxes = [(thing.name, *_bounds(thing, piece)) for thing in things for piece in _pieces(thing)]
+    found = set()
+    for name in names:
+        own = [(low, high) for other, low, high in boxes if other == name]
+        low, high = np.min([low for low, _ in own], axis=0), np.max([high for _, high in own], axis=0)
+        low = low - np.array([0.0, 0.0, BORNE])
+        if not any(
+            other != name and (least < high).all() and (most > low).all() for other, least, most in boxes
+        ):
+            found.add(name)
+    return frozenset(found)
+
+
+def _pieces(thing: Thing) -> Sequence[Array]:
+    return thing.pieces if thing.size is None else [box_corners(thing.size)]
+
+
+def _bounds(thing: Thing, piece: Array) -> tuple[Array, Array]:
+    """Least and largest coordinates ``(3,)`` of a piece of a thing, robot base frame."""
+    corners = poses.transform(thing.pose, np.asarray(piece))
+    return corners.min(axis=0), corners.max(axis=0)

@@ -23,6 +23,8 @@ SUNK = 0.01
 where it stands on it."""
 ABOVE = 0.002
 """Metres from which what is over another thing is higher than that stands: it rests on it, or in it."""
+BORNE = 0.02
+"""Metres above a surface from which on what seems to be there does not rest on it."""
 BELOW = 0.01
 """Metres by which what stands on a surface may seem to be below it."""
 DIRECTIONS = 90
@@ -197,6 +199,29 @@ def beyond_hollow(body: Body, hollow: Hollow) -> Array:
     floor, rim = boxes[..., 4], boxes[..., 5]
     above = xp.minimum(height - rim, abs(low - floor) - SUNK)
     return xp.min(xp.maximum(aside, xp.maximum(above, floor - SUNK - height)), axis=-1)
+
+
+def floats(where: Whereabouts, name: str, container: str) -> Array:
+    """Booleans ``(N,)``: nothing known is right below an object, so it is not at rest where it seems to be.
+
+    Args:
+        where: Where everything is.
+        name: The object.
+        container: Something that bears what is below its rim, too.
+    """
+    body = where.body(name)
+    low = lowest(body)
+    hollow = where.hollow(container)
+    xp = array_namespace(low)
+    rim = hollow.frame[:, 2] + xp.max(hollow.boxes[..., 5], axis=-1)
+    borne = low < rim + BORNE
+    for surface in (where.surface(place) for place in where.surfaces):
+        over = beyond_edges(surface.frame, surface.centre, surface.half, body.pose) <= 0.0
+        borne = borne | (surface.carries & over & (abs(low - surface.frame[:, 2]) < BORNE))
+    for other in (where.body(other) for other in where.bodies if other != name):
+        top = xp.max(other.reach[..., 2], axis=-1)
+        borne = borne | ((_beyond_outline(body.pose, other) <= 0.0) & (abs(low - top) < BORNE))
+    return ~borne
 
 
 def lowest(body: Body) -> Array:
