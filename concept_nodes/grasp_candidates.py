@@ -50,6 +50,9 @@ PAD = 0.008
 THIN = 0.012
 """Metres of width below which a grip is disfavoured: a hand that comes some millimetres beside a wall misses
 it."""
+MISSED = 2.0
+"""How much more so for a jaw that swings: of four bowls of 5 cm whose walls of 3 mm it was to take, it threw all
+aside, and held all of them by both sides."""
 TIGHT = 0.007
 """Metres of room on either side below which a grip is disfavoured: estimates are wrong by millimetres."""
 AS_WIDE = 0.9
@@ -63,6 +66,8 @@ alone turns its hand about an approach, and that one goes all around."""
 SWUNG = 2.0
 """What a grip costs for each radian by which a jaw that swings leans away from it: where it leans it meets an
 edge, and pushes what it holds out of the hand."""
+WALL = 0.005
+"""Metres of width below which a grip is a poor one for a jaw that swings."""
 POOR, LEANT = 0.6, 0.2
 """Share of the firmest grip's firmness below which another one is a poor one, and radians by which a jaw that
 swings leans from which it is."""
@@ -171,7 +176,8 @@ def candidates(view: WorldView, target: str, approach: Array, neutral: Array) ->
         position = np.concatenate([position + 0.0 * axes] * 2, axis=1)
     turned = np.arccos(np.clip(along @ approach, -1.0, 1.0))
     room = (view.robot.opening - widths) / 2
-    own = turned + 1.5 * (1.0 - firmness) + np.maximum(0.0, 1.0 - widths / THIN)
+    thin = np.maximum(0.0, 1.0 - widths / THIN)
+    own = turned + 1.5 * (1.0 - firmness) + (thin if side is None else MISSED * thin)
     own = own + np.maximum(0.0, 1.0 - room / TIGHT) + SWUNG * swung_at(view.robot, widths)
     ease = 1.0 if len(view.robot.arm_joints) >= FULL else EASE
     costs = ease * poses.angle_between(rotation, neutral) + 20.0 * shifts + own[:, None, None]
@@ -189,7 +195,7 @@ def candidates(view: WorldView, target: str, approach: Array, neutral: Array) ->
     parts = [np.broadcast_to(a, shape) for a, shape in zip((position, rotation), placed, strict=True)]
     tools = np.concatenate(parts, axis=-1)
     firm = firmness >= POOR * np.max(grips.firmness, initial=0.0)
-    poor = ~firm | (swung_at(view.robot, widths) > LEANT)
+    poor = ~firm | (swung_at(view.robot, widths) > LEANT) | ((side is not None) & (widths < WALL))
     shallow = poor[:, None, None] | (reach[:, None, None] + longer - shifts < HOLD)
     held, bad = (np.broadcast_to(v, costs.shape).reshape(-1) for v in (widths[:, None, None], shallow))
     return Candidates(tools.reshape(-1, 7)[wanted], costs.reshape(-1)[wanted], held[wanted], bad[wanted])
