@@ -51,8 +51,8 @@ THIN = 0.012
 """Metres of width below which a grip is disfavoured: a hand that comes some millimetres beside a wall misses
 it."""
 MISSED = 2.0
-"""How much more so for a jaw that swings: of four bowls of 5 cm whose walls of 3 mm it was to take, it threw all
-aside, and held all of them by both sides."""
+"""How much more so for a jaw that swings: of four bowls of 5 cm whose walls of 3 mm it was to take, it threw
+all aside, and held all of them by both sides."""
 TIGHT = 0.007
 """Metres of room on either side below which a grip is disfavoured: estimates are wrong by millimetres."""
 AS_WIDE = 0.9

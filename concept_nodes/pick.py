@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -28,6 +29,9 @@ ROOMS = (CLOSER, VERY_CLOSE, TOUCHING)
 """How much closer than usual one may come to things, tried one after the other."""
 SHARES = (1.0, 0.7, 0.5, 0.3, 0.2)
 """Shares of the distance that are tried where not all of it is clear."""
+SLANTS = (0.0, 0.5, 1.0)
+"""How far it goes towards the robot on the way, in metres for each metre away from the support, tried one
+after the other: at the end of its reach an arm cannot go straight up, and from under a board nothing can."""
 
 
 @register("concept")
@@ -83,8 +87,7 @@ class Pick(Carry):
             NoWayError: Something is in the way at once in one of the worlds.
         """
         found = [self._clear(view) for view in views(seen)]
-        far = constant(np.array([share for share, _ in found]), seen.tool)
-        goal = poses.shifted(seen.tool, far[:, None] * constant(self.direction, seen.tool))
+        goal = poses.shifted(seen.tool, constant(np.array([away for away, _ in found]), seen.tool))
         return MoveMemory(straight_path(seen, goal, self.speed, [joints for _, joints in found]))
 
     def aim(self, view: WorldView) -> Aim | None:
@@ -94,20 +97,29 @@ class Pick(Carry):
         lifted = np.array([poses.shifted(now, share * self.distance * up) for share in (1.0, 0.5, 0.2)])
         return Aim(lifted, "be lifted", on_the_way=True)
 
-    def _clear(self, view: WorldView) -> tuple[float, Array]:
-        """How far the way is clear in metres, and the joints ``(n, n_arm)`` along it."""
+    def _clear(self, view: WorldView) -> tuple[Array, Array]:
+        """How far the way is clear, ``(3,)`` in metres, and the joints ``(n, n_arm)`` along it."""
         for closer in ROOMS:
             finder = view.finder([self.target], held=view.held(self.target), closer=closer)
-            for share in SHARES:
-                end = poses.shifted(view.tool, share * self.distance * np.array(self.direction))
+            for direction, share in itertools.product(self._ways(view), SHARES):
+                away = share * self.distance * direction
+                end = poses.shifted(view.tool, away)
                 joints = finder.straight([view.tool, end], leans=finder.leanings[-1])
                 if joints is not None:
-                    return share * self.distance, np.concatenate([finder.start[None], joints])
-        touches = finder.touched(end)
+                    return away, np.concatenate([finder.start[None], joints])
+        least = poses.shifted(view.tool, SHARES[-1] * self.distance * np.array(self.direction))
+        touches = finder.touched(least)
         why = f"{touches[0][0]} would touch {touches[0][1]}" if touches else "the arm cannot follow"
         raise NoWayError(
             f"{self.target} cannot be lifted by {1000 * SHARES[-1] * self.distance:.0f} mm: {why}"
         )
+
+    def _ways(self, view: WorldView) -> list[Array]:
+        """Directions ``(3,)`` with a part of one metre a metre away from the support, see `SLANTS`."""
+        away = np.array(self.direction)
+        back = -view.tool[:3] * np.array([1.0, 1.0, 0.0])
+        back = back - float(back @ away) * away
+        return [away + slant * back / max(float(np.linalg.norm(back)), 1e-9) for slant in SLANTS]
 
     def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
         """As in `Carry`; or the hand's force on the object over ``squeeze``, where that is larger."""

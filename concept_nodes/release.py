@@ -180,8 +180,8 @@ class Release(ConceptModel[ReleaseMemory]):
     def _beside(self, seen: Seen) -> Array:
         """Metres ``(N,)`` by which the object's middle is outside what it was to fall into; 0 where unseen.
 
-        What lies on other things above its rim is not in it, unless it stands on its floor. What seems to be in
-        the air is not seen any more: it is taken for where it was last.
+        What lies on other things above its rim is not in it, unless it stands on its floor. What seems to be
+        in the air is not seen any more: it is taken for where it was last.
         """
         xp = array_namespace(seen.tool)
         if self.into is None or self.into not in seen.world.place_columns:
