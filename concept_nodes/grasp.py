@@ -122,8 +122,8 @@ DEEP = 0.04
 """Metres before the grasp from which on fingers may meet an edge."""
 FAR = 0.5
 """Metres between the arm's base and its tool within which it then comes slower, in proportion to their
-square: so does the stiffness of the same drives grow. A jaw of the SO-100 that meets a ring at 50 mm/s, 0.27 m
-from its base, presses 115 N before it can be stopped."""
+square: so does the stiffness of the same drives grow. A jaw of the SO-100 that meets a ring at 50 mm/s,
+0.27 m from its base, presses 115 N before it can be stopped."""
 SLOWEST = 0.05
 """The least share of the reference motion's own speed at which it does so."""
 YIELDS = 15.0

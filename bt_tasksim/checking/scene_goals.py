@@ -12,7 +12,7 @@ from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.outlines import distance, rectangle
 from bt_tasksim.scene.relations import relation_named
-from bt_tasksim.scene.relations.inside import SUNK
+from bt_tasksim.scene.spatial_laws import SUNK
 from bt_tasksim.scene.specs import Goal
 
 if TYPE_CHECKING:

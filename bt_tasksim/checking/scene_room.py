@@ -32,7 +32,7 @@ def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repor
     """
     robot = load_robot(scene.robot)
     try:
-        links = _links(robot)
+        links = robot.derived("links at rest", _links)
     except InputError as error:
         what = f"was not compared with what stands there: {error}"
         report.add(WARNING, scene.name, "robot", what, "put the files of its URDF there")
@@ -52,6 +52,12 @@ def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repor
             what = f"is in '{link}' of {robot.name} {often}, by {1000 * depth:.0f} mm"
             level = ERROR if len(deep) == len(worlds) else WARNING
             report.add(level, scene.name, name, what, "draw it from an area beside the robot")
+
+
+def in_robot(robot: RobotDescription, world: ActorConfiguration) -> str:
+    """The first object of a draw that begins in the robot at rest; empty where none does."""
+    links = robot.derived("links at rest", _links)
+    return next((a.name for a in world.objects if _of_object(links, world, a.name)[1] > DEEP), "")
 
 
 def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
