@@ -32,7 +32,7 @@ from bt_tasksim.concept_nodes.grasp_pose import (
     resting_place,
 )
 from bt_tasksim.concept_nodes.holding import HOLDING, tool_distance
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, gentler, strain
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, put_down, views
 from bt_tasksim.core import poses
@@ -120,16 +120,12 @@ FEELING = 0.05
 edge at 0.18 m/s presses 78 N before it can be stopped."""
 DEEP = 0.04
 """Metres before the grasp from which on fingers may meet an edge."""
-FAR = 0.5
-"""Metres between the arm's base and its tool within which it then comes slower, in proportion to their
-square: so does the stiffness of the same drives grow. A jaw of the SO-100 that meets a ring at 50 mm/s,
-0.27 m from its base, presses 115 N before it can be stopped."""
 SLOWEST = 0.05
 """The least share of the reference motion's own speed at which it does so."""
 YIELDS = 15.0
 """Newtons against the approach from which on a hand gives way: a finger that stands on something as it comes,
 or a jaw that swings and presses what it closes on against its support."""
-YIELDING = 0.0005
+YIELDING = 0.0008
 """Metres by which it does so in a control period, at twice that force and beyond; it does not come back."""
 
 
@@ -482,8 +478,8 @@ class Grasp(ConceptModel[GraspMemory]):
         now, period = seen.elapsed - memory.delay, seen.world.control_period
         ahead = sample(memory.path, now + period)[:, :3] - sample(memory.path, now)[:, :3]
         near = poses.norm(seen.tool[:, :3] - memory.goal[:, :3]) < DEEP
-        firm = poses.clip(poses.norm(seen.tool[:, :2]) / FAR, 0.0, 1.0) ** 2
-        feeling = FEELING * xp.where(near, firm, xp.ones_like(firm))
+        share = gentler(seen.tool)
+        feeling = FEELING * xp.where(near, share, xp.ones_like(share))
         share = poses.clip(feeling * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), SLOWEST, 1.0)
         pace = xp.where(xp.any(seen.contacts, axis=-1), xp.zeros_like(share), (share - CAREFUL) / EAGER)
         aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)

@@ -5,17 +5,29 @@ from __future__ import annotations
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.outcomes import register_reason
-from bt_tasksim.core.poses import Array, norm
+from bt_tasksim.core.poses import Array, clip, norm
 from bt_tasksim.core.units import NEWTONS
 
-FIRM = 0.3
-"""Metres between the arm's base and its tool within which it goes slower still, in proportion: the same
-drives press harder there. The SO-100, 0.14 m from its base, meets a table at 24 mm/s with 71 N."""
+FAR = 0.5
+"""Metres between the arm's base and its tool within which a hand meets things more slowly, see `gentler`."""
 FORCE_LIMIT = 60.0
 """N at the wrist: well above what carrying and placing take, well below what breaks a cup or a finger."""
 WRIST_STRAINED = register_reason(
     "wrist_strained", "force at the wrist is {value:.3g}, above {limit:.3g}", value=NEWTONS, limit=NEWTONS
 )
+
+
+def gentler(tool: Array) -> Array:
+    """Share ``(N,)`` of the usual speed at which an arm should come upon things, from 0 to 1.
+
+    It falls with the square of the distance between the arm's base and its tool, as the stiffness of the same
+    drives grows. A jaw of the SO-100 that meets a ring at 50 mm/s, 0.27 m from its base, presses 115 N before
+    it can be stopped.
+
+    Args:
+        tool: Tool poses ``(N, 7)``, robot base frame.
+    """
+    return clip(norm(tool[:, :2]) / FAR, 0.0, 1.0) ** 2
 
 
 def strain(seen: Seen, limit: float) -> Limit:

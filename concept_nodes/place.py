@@ -30,7 +30,7 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.closer import DROPPED, PUT_DOWN, TOUCHING, with_room
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
-from bt_tasksim.concept_nodes.limits import FIRM, FORCE_LIMIT, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
 from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of, tipped
 from bt_tasksim.concept_nodes.surface import (
@@ -433,7 +433,7 @@ class Place(ConceptModel[PlaceMemory]):
 
     def _progress(self, seen: Seen, memory: PlaceMemory) -> Array:
         xp = array_namespace(seen.tool)
-        gently = GENTLY * poses.clip(poses.norm(seen.tool[:, :2]) / FIRM, 0.0, 1.0)
+        gently = GENTLY * gentler(seen.tool)
         pace = xp.minimum(xp.maximum(self._above(seen) / SLOWLY, gently), xp.ones_like(gently))
         on = memory.progress + seen.world.control_period * pace
         return xp.where(self._supported(seen, memory), memory.progress, on)

@@ -85,3 +85,23 @@ def test_the_squeeze_counts_at_the_beginning_too(recorded_run):
     pick = Pick.value(decision.leaf.model.target, squeeze=float(hidden.hand_force[0, 0]))
     cost = pick.sufficient_cost(Known(hidden, decision.seen.world, harder), decision.memory)
     assert cost == pytest.approx([3.0])
+
+
+def test_where_the_arm_cannot_go_straight_up_it_goes_towards_itself(toy, monkeypatch):
+    from bt_tasksim.planning.ways import WayFinder
+
+    straight = WayFinder.straight
+
+    def within_reach(self, way, *args, **kwargs):
+        far = np.linalg.norm(way[-1][:2]) > np.linalg.norm(way[0][:2]) - 0.005
+        return None if far else straight(self, way, *args, **kwargs)
+
+    monkeypatch.setattr(WayFinder, "straight", within_reach)
+    stage = toy(Pick("cup", distance=0.1))
+    stage.world.hold("cup")
+    stage.look()
+    start = stage.world.now.tool_pose.copy()
+    assert stage.tick(100) == Status.SUCCESS
+    gone = stage.world.steps[-1].tool[:3] - start[:3]
+    assert gone[2] == pytest.approx(0.1, abs=1e-3)
+    assert np.allclose(gone[:2] / 0.05, -start[:2] / np.linalg.norm(start[:2]), atol=0.02)

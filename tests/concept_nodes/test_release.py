@@ -84,3 +84,13 @@ def test_a_finger_that_stands_still_goes_aside_before_the_hand_draws_back(toy, m
     assert gone[-1] == pytest.approx([0.0, -SLIDE, -0.12], abs=2e-3)
     aside = gone[np.abs(gone[:, 2]) < 1e-3]
     assert aside[:, 1].min() == pytest.approx(-SLIDE, abs=1e-3), "it goes aside first"
+
+
+def test_a_hand_that_presses_lets_go_of_its_pressure_first(toy):
+    stage = start(toy, Release("cup", opening=0.4))
+    stage.world.put(contacts=np.array([True, True]))
+    stage.look()
+    assert stage.tick(200) == Status.SUCCESS
+    hands = np.array([c.hand[0] for c in stage.world.steps])
+    assert hands[0] > 0.85, "as far shut as it was told to be, and no step down to where it is"
+    assert np.diff(hands).min() > -0.2 and hands[-1] == 0.0

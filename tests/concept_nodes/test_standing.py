@@ -9,11 +9,13 @@ from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.concept_nodes.standing import (
     HEADINGS,
+    TIPPED,
     headings,
     nearest_first,
     standing_height,
     standing_options,
     supports_of,
+    tipped,
 )
 from bt_tasksim.concept_nodes.surface import heading_of
 from bt_tasksim.concept_nodes.view import views
@@ -79,3 +81,16 @@ def test_the_least_turned_come_first():
     found = nearest_first(options, poses.yaw(1.0))
     angles = poses.angle_between(found[:, 3:], poses.yaw(1.0)[None])
     assert np.all(np.diff(angles) >= -1e-12) and angles[0] <= np.pi / HEADINGS + 1e-9
+
+
+def test_tipped_poses_lean_about_the_tools_x_axis_the_least_first(view):
+    options = standing_options(view, "box", "goal")[:3]
+    grip = poses.relative(view.objects["box"], view.tool)
+    found = tipped(options, grip).reshape(-1, len(options), 7)
+    assert len(found) == 2 * len(TIPPED) and np.allclose(found[..., :3], options[:, :3])
+    tools = poses.multiply(options, grip[None])
+    for leaning, angle in zip(found, np.repeat(TIPPED, 2), strict=True):
+        turned = poses.multiply(leaning, grip[None])
+        assert np.allclose(poses.angle_between(leaning[:, 3:], options[:, 3:]), angle)
+        for before, after in zip(tools, turned, strict=True):
+            assert np.allclose(poses.to_matrix(before[3:])[:, 0], poses.to_matrix(after[3:])[:, 0])

@@ -26,9 +26,9 @@ Ability hand, each a kilogram with its motor's inertia, meet on the stick of a l
 100 Hz, and by 1.0 at 200. Not for as long as something is held: twice the steps would cost twice the time."""
 LIGHTEST = 4
 """The same, at most, where something is so light that `MOST` iterations of the solver are too few, while the
-hand closes, however slowly, and as long as it holds something. At 100 Hz a jaw of the SO-100 that presses with
-30 N on a cup of 12 g sinks in by 2 mm as this leaves the table; and of 40 tasks with things of 10 to 50 g 37 are
-done with shorter steps at closing, and 33 with up to 250 iterations instead."""
+hand closes, however slowly, and as long as it holds something. At 100 Hz a jaw of the SO-100 that presses
+with 30 N on a cup of 12 g sinks in by 2 mm as this leaves the table; and of 40 tasks with things of 10 to 50 g
+37 are done with shorter steps at closing, and 33 with up to 250 iterations instead."""
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
 WATCHED = 4

@@ -5,7 +5,13 @@ import pytest
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.world import Obstacle, WorldModel
-from bt_tasksim.planning.surroundings import CLEAR_OF_FURNITURE, CLEAR_OF_OBJECTS, pieces_of, things_of
+from bt_tasksim.planning.surroundings import (
+    CLEAR_OF_FURNITURE,
+    CLEAR_OF_OBJECTS,
+    adrift,
+    pieces_of,
+    things_of,
+)
 from bt_tasksim.scene.shapes import ShapeSize, object_model
 
 
@@ -47,3 +53,19 @@ def test_pieces_lie_within_the_extent_and_reach_its_sides(kind):
     corners = np.concatenate(pieces_of(model))
     assert np.allclose(corners.max(axis=0), np.array(model.extent) / 2, atol=2e-3)
     assert np.allclose(corners.min(axis=0), -np.array(model.extent) / 2, atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("height", "gone"), [(0.26, False), (0.28, False), (0.33, True), (0.15, True), (0.2, False)]
+)
+def test_what_nothing_is_below_is_adrift(world, height, gone):
+    seen = {"a": poses.pose([0.5, 0.0, height])}
+    assert (adrift(things_of(world, seen), ["a"]) == {"a"}) is gone
+
+
+def test_what_stands_on_another_object_is_not_adrift_and_beside_it_it_is(world):
+    below = poses.pose([0.5, 0.0, 0.26])
+    on, beside = poses.pose([0.51, 0.0, 0.36]), poses.pose([0.6, 0.0, 0.36])
+    assert not adrift(things_of(world, {"a": on, "b": below}), ["a", "b"])
+    assert adrift(things_of(world, {"a": beside, "b": below}), ["a", "b"]) == {"a"}
+    assert not adrift(things_of(world, {"a": beside, "b": below}), [])
