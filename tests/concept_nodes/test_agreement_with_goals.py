@@ -54,6 +54,7 @@ def seen_exactly(world, hidden):
         tool_pose=hidden.tool_pose[None],
         arm_position=np.zeros((1, len(ROBOT.arm_joints))),
         hand_position=np.asarray(ROBOT.hand_open, float)[None],
+        contacts=np.zeros((1, len(ROBOT.tips)), bool),
     )
     return Seen(observation, WorldFacts.of([world]), ROBOT, np.zeros(1))
 

@@ -7,7 +7,7 @@ import pytest
 
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Grasp, grasp_features
-from bt_tasksim.concept_nodes.grasp import FEELING
+from bt_tasksim.concept_nodes.grasp import FEELING, SLOWEST
 from bt_tasksim.concept_nodes.grasp_features import (
     ACROSS,
     ACTIONS,
@@ -266,8 +266,8 @@ def test_where_there_is_little_room_the_programmed_motion_feels_its_way(near):
         now, period = seen.elapsed - memory.delay, seen.world.control_period
         way = sample(memory.path, now + period)[0, :3] - sample(memory.path, now)[0, :3]
         share = CAREFUL + EAGER * action[0, TIME_SCALING]
-        assert CAREFUL - 1e-9 <= share <= 1.0 + 1e-9
-        assert share <= CAREFUL + 1e-9 or share * np.linalg.norm(way) / period <= FEELING + 1e-9
+        assert SLOWEST - 1e-9 <= share <= 1.0 + 1e-9
+        assert share <= SLOWEST + 1e-9 or share * np.linalg.norm(way) / period <= FEELING + 1e-9
         assert not action[0, ACROSS].any(), "nothing is felt"
 
 

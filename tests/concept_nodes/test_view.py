@@ -34,7 +34,7 @@ def test_in_torch_it_is_the_same(toy):
 
     seen = toy(Grasp("cup")).context.seen(ONE, np.zeros(1))
     fields = dataclasses.fields(type(seen.observation)) if dataclasses.is_dataclass(seen.observation) else ()
-    names = [f.name for f in fields] or ["objects", "tool_pose", "arm_position", "hand_position"]
+    names = [f.name for f in fields] or ["objects", "tool_pose", "arm_position", "hand_position", "contacts"]
     there = type("There", (), {n: torch.from_numpy(np.array(getattr(seen.observation, n))) for n in names})()
     known = seen.world.map(lambda values: torch.from_numpy(np.array(values)))
     (one,), (other,) = views(seen), views(Seen(there, known, seen.robot, seen.elapsed))

@@ -56,7 +56,7 @@ def test_pieces_lie_within_the_extent_and_reach_its_sides(kind):
 
 
 @pytest.mark.parametrize(
-    ("height", "gone"), [(0.26, False), (0.28, False), (0.33, True), (0.15, True), (0.2, False)]
+    ("height", "gone"), [(0.26, False), (0.28, False), (0.33, True), (0.1, True), (0.2, False)]
 )
 def test_what_nothing_is_below_is_adrift(world, height, gone):
     seen = {"a": poses.pose([0.5, 0.0, height])}
