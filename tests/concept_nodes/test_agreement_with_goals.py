@@ -1,5 +1,6 @@
 """Where estimates are exact, a condition answers what the success evaluator says, whatever the state."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Clear
 from bt_tasksim.concept_nodes.spots import spots_on
 from bt_tasksim.concept_nodes.view import views
+from bt_tasksim.concept_nodes.whereabouts import Estimates
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.facts import WorldFacts
@@ -20,6 +22,7 @@ from bt_tasksim.core.registry import parts
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.relations import FinalState, relation_named
 from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.spatial_laws import floats
 from bt_tasksim.scene.specs import Goal, ObjectSpec
 from tests.bt_tasksim.scene.states import state
 
@@ -254,3 +257,16 @@ def test_nothing_unseen_finds_room_or_gives_it():
     seen = cluttered(1, [])
     seen.observation.objects[0, seen.world.column("thing 0")] = np.nan
     assert not Clear.value("thing 0", "it", anywhere=True).holds(seen)[0]
+
+
+@pytest.mark.parametrize(
+    ("height", "floats_there"), [(0.0, False), (0.015, False), (0.12, True), (0.4, True)]
+)
+def test_what_is_seen_in_the_air_is_not_at_rest_there(room, height, floats_there):
+    drawn, world = room
+    hidden = state(drawn)
+    at = world.objects.index(world.object("bowl"))
+    objects = hidden.objects.copy()
+    objects[at, 2] += height
+    seen = seen_exactly(world, replace(hidden, objects=objects))
+    assert floats(Estimates(seen), "bowl", "tray").tolist() == [floats_there]

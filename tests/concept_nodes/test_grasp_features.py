@@ -7,7 +7,7 @@ import pytest
 
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Grasp, grasp_features
-from bt_tasksim.concept_nodes.grasp import FEELING, SLOWEST
+from bt_tasksim.concept_nodes.grasp import FEELING, SLOWEST, YIELDING
 from bt_tasksim.concept_nodes.grasp_features import (
     ACROSS,
     ACTIONS,
@@ -269,6 +269,22 @@ def test_where_there_is_little_room_the_programmed_motion_feels_its_way(near):
         assert SLOWEST - 1e-9 <= share <= 1.0 + 1e-9
         assert share <= SLOWEST + 1e-9 or share * np.linalg.norm(way) / period <= FEELING + 1e-9
         assert not action[0, ACROSS].any(), "nothing is felt"
+
+
+@pytest.mark.parametrize(("push", "goes"), [(0.0, 0.0), (14.0, 0.0), (22.5, 0.5), (30.0, 1.0), (90.0, 1.0)])
+def test_a_hand_that_is_pushed_back_gives_way_and_stays_back(near, push, goes):
+    seen, memory = instant(near, near.real - 1)
+    wrench = np.array([[0.0, 0.0, -push, 0.0, 0.0, 0.0]])
+    touching = without_contacts(seen, but=0)
+    felt = dataclasses.replace(touching.observation, wrench=wrench)
+    pushed = Seen(felt, seen.world, seen.robot, seen.elapsed, seen.later, seen.failures)
+    gone = memory.offset.copy()
+    for offset in (0.0, -0.002):
+        gone[:, ALONG] = offset
+        there = memory._replace(offset=gone, middle=np.zeros_like(memory.middle))
+        action = near.model.programmed_motion(pushed, there)
+        wanted = -(action[0, ALONG] ** 2) * SCALE[ALONG]
+        assert wanted == pytest.approx(offset - goes * YIELDING, abs=1e-9)
 
 
 def test_a_finger_that_stands_on_something_goes_outwards(near):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, WRIST_STRAINED, force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import FAR, FORCE_LIMIT, WRIST_STRAINED, force_at_wrist, gentler, strain
 
 
 class Felt:
@@ -30,3 +30,9 @@ def test_each_world_has_its_own_force(rows_alike):
     force = np.linalg.norm(wrench[:, :3], axis=-1)
     assert np.array_equal(applies, force > 60.0) and np.allclose(force_at_wrist(Felt(wrench)), force)
     assert strain(Felt(wrench), 60.0).at(7).numbers == pytest.approx({"value": force[7], "limit": 60.0})
+
+
+def test_an_arm_comes_the_more_gently_the_nearer_its_tool_is_to_its_base():
+    tools = np.zeros((4, 7))
+    tools[:, 0], tools[:, 2] = [FAR / 4, FAR / 2, FAR, 2 * FAR], 0.3
+    assert gentler(tools) == pytest.approx([1 / 16, 1 / 4, 1.0, 1.0])

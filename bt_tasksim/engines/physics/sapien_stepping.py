@@ -27,8 +27,8 @@ Ability hand, each a kilogram with its motor's inertia, meet on the stick of a l
 LIGHTEST = 4
 """The same, at most, where something is so light that `MOST` iterations of the solver are too few, while the
 hand closes, however slowly, and as long as it holds something. At 100 Hz a jaw of the SO-100 that presses
-with 30 N on a cup of 12 g sinks in by 2 mm as this leaves the table; and of 40 tasks with things of 10 to 50 g
-37 are done with shorter steps at closing, and 33 with up to 250 iterations instead."""
+with 30 N on a cup of 12 g sinks in by 2 mm as this leaves the table; and of 40 tasks with things of 10 to
+50 g 37 are done with shorter steps at closing, and 33 with up to 250 iterations instead."""
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
 WATCHED = 4

@@ -10,7 +10,7 @@ from bt_tasksim.concept.context import one_world
 from bt_tasksim.core.world import Command
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physics.sapien import SapienPhysics
-from bt_tasksim.engines.physics.sapien_stepping import CLOSING, FINE
+from bt_tasksim.engines.physics.sapien_stepping import CLOSING, FINE, LIGHTEST
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.trees.load import load_source
@@ -88,6 +88,17 @@ def test_steps_are_shorter_while_the_hand_closes_fast():
     closing = [steps_of(runner, closure) for closure in (0.3, 0.6)]
     assert all(steps.sum() == pytest.approx(0.05) for steps in closing)
     assert len(closing[-1]) == CLOSING * len(held), "the fingers are on their way"
+
+
+@pytest.mark.parametrize(("mass", "shorter"), [(0.2, 1), (0.02, 3), (0.005, LIGHTEST)])
+def test_steps_are_shorter_as_long_as_something_light_is_held(mass, shorter):
+    runner = holding("box", mass)
+    for _ in range(10):
+        runner.pipeline.step(Command())
+    assert len(steps_of(runner, 1.0)) == shorter * 5
+    for _ in range(40):
+        runner.pipeline.step(Command(hand=np.array([0.0])))
+    assert len(steps_of(runner, 0.0)) == 5, "it has been let go"
 
 
 @pytest.mark.parametrize("height", [0.1, 0.25, 0.45])
