@@ -12,7 +12,7 @@ from bt_tasksim.core.transfer import sent
 from bt_tasksim.core.world import ObjectModel
 from bt_tasksim.planning.things import box_corners
 from bt_tasksim.scene.hollows import NOTHING
-from bt_tasksim.scene.spatial_laws import Body, Hollow, Surface, Whereabouts
+from bt_tasksim.scene.spatial_laws import Hollow, LevelSurface, PlacedObject, Whereabouts
 
 
 class Estimates(Whereabouts):
@@ -34,17 +34,17 @@ class Estimates(Whereabouts):
         """See `Whereabouts.surfaces`."""
         return self._seen.world.place_columns
 
-    def body(self, name: str) -> Body:
+    def body(self, name: str) -> PlacedObject:
         """See `Whereabouts.body`."""
         pose, model = self._seen.object(name), self._seen.model(name)
         nan = array_namespace(pose).full_like(pose, np.nan)
         there = array_namespace(pose).where(model.present[:, None], pose, nan)
-        return Body(there, self._known(name, _outer, (0.0, 0.0, 0.0)), model.cubic)
+        return PlacedObject(there, self._known(name, _outer, (0.0, 0.0, 0.0)), model.cubic)
 
-    def surface(self, name: str) -> Surface:
+    def surface(self, name: str) -> LevelSurface:
         """See `Whereabouts.surface`."""
         place = self._seen.place(name)
-        return Surface(place.pose, place.centre, place.extent / 2, place.present & place.carries)
+        return LevelSurface(place.pose, place.centre, place.extent / 2, place.present & place.carries)
 
     def hollow(self, name: str) -> Hollow:
         """See `Whereabouts.hollow`."""

@@ -148,10 +148,10 @@ def _in_batch(engine: str, seeds: Sequence[int], worlds: int, threads: int) -> d
 
     judged = runner._result
 
-    def result(episode: Any, hidden: Hidden, k: int) -> Any:
+    def result(episode: Any, hidden: Hidden, k: int, overlap: Any) -> Any:
         row = next(r for r, other in drawn.items() if other is episode.configuration)
         out[episode.seed] = hashes.take(row)
-        return judged(episode, hidden, k)
+        return judged(episode, hidden, k, overlap)
 
     with (
         hashes.watch(physics),

@@ -31,7 +31,7 @@ DIRECTIONS = 90
 """Level lines along which two outlines are looked at for a gap, besides their own edges."""
 
 
-class Body(NamedTuple):
+class PlacedObject(NamedTuple):
     """An object in ``N`` worlds.
 
     Attributes:
@@ -50,7 +50,7 @@ class Body(NamedTuple):
         return poses.transform(self.pose[:, None, :], self.corners)
 
 
-class Surface(NamedTuple):
+class LevelSurface(NamedTuple):
     """A level rectangle in ``N`` worlds, on which things may stand.
 
     Attributes:
@@ -92,11 +92,11 @@ class Whereabouts(abc.ABC):
         """Names of the places."""
 
     @abc.abstractmethod
-    def body(self, name: str) -> Body:
+    def body(self, name: str) -> PlacedObject:
         """An object; where it is not, or was never seen, its pose is not a number."""
 
     @abc.abstractmethod
-    def surface(self, name: str) -> Surface:
+    def surface(self, name: str) -> LevelSurface:
         """A place."""
 
     @abc.abstractmethod
@@ -189,7 +189,7 @@ def beyond_walls(where: Whereabouts, name: str, place: str) -> Array:
     return beyond_hollow(where.body(name), where.hollow(place))
 
 
-def beyond_hollow(body: Body, hollow: Hollow) -> Array:
+def beyond_hollow(body: PlacedObject, hollow: Hollow) -> Array:
     """Metres ``(N,)`` by which an object's middle is outside a hollow, see `beyond_walls`."""
     xp = array_namespace(body.pose)
     middle = poses.localise(hollow.frame, body.pose[:, :3])
@@ -224,7 +224,7 @@ def floats(where: Whereabouts, name: str, container: str) -> Array:
     return ~borne
 
 
-def lowest(body: Body) -> Array:
+def lowest(body: PlacedObject) -> Array:
     """Height ``(N,)`` in metres of an object's lowest point."""
     return array_namespace(body.pose).min(body.reach[..., 2], axis=-1)
 
@@ -294,7 +294,7 @@ def _normals(frame: Array) -> Array:
     return xp.stack(found, axis=1)
 
 
-def _rectangle(surface: Surface) -> Array:
+def _rectangle(surface: LevelSurface) -> Array:
     """Corners ``(N, 4, 3)`` of surfaces."""
     xp = array_namespace(surface.frame)
     flat = surface.centre[:, None, :] + constant(_SIGNS, surface.half)[None] * surface.half[:, None, :]
@@ -302,7 +302,7 @@ def _rectangle(surface: Surface) -> Array:
     return poses.transform(surface.frame[:, None, :], corners)
 
 
-def _beyond_outline(pose: Array, below: Body) -> Array:
+def _beyond_outline(pose: Array, below: PlacedObject) -> Array:
     """Metres ``(N,)`` by which the middles of objects with poses ``(N, 7)`` are not over another one."""
     return between(pose[:, None, :2], below.reach[..., :2], _normals(below.pose))
 

@@ -30,7 +30,7 @@ from bt_tasksim.scene.outlines import (
     whole_outline,
 )
 from bt_tasksim.scene.shape_kind import ShapeKind
-from bt_tasksim.scene.spatial_laws import Body, Hollow, beyond_hollow
+from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject, beyond_hollow
 from bt_tasksim.scene.specs import ObjectSpec
 
 
@@ -106,7 +106,7 @@ class Candidate:
 
     def within(self, container: ObjectActor) -> bool:
         """Its middle is in the hollow of another object."""
-        body = Body(
+        body = PlacedObject(
             self.pose[None], outer_corners([p.corners() for p in self.pieces])[None], np.zeros(1, bool)
         )
         boxes = container.shape().hollow

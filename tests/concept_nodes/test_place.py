@@ -9,9 +9,9 @@ from py_trees.common import Status
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Place
 from bt_tasksim.concept_nodes.holding import NOT_HELD
+from bt_tasksim.concept_nodes.limits import FAR
 from bt_tasksim.concept_nodes.place import (
     FELT,
-    FIRM,
     GENTLY,
     HARD,
     LATE,
@@ -265,7 +265,7 @@ def test_where_it_is_not_above_the_place_or_not_beside_the_other_it_cannot_start
     assert stage.tick() == Status.FAILURE and stage.tree.outcome.is_a(NOT_BESIDE)
 
 
-@pytest.mark.parametrize(("far", "share"), [(2 * FIRM, GENTLY), (FIRM, GENTLY), (0.5 * FIRM, 0.5 * GENTLY)])
+@pytest.mark.parametrize(("far", "share"), [(2 * FAR, GENTLY), (FAR, GENTLY), (0.5 * FAR, 0.25 * GENTLY)])
 def test_near_the_base_of_the_arm_it_goes_slower_still(toy, far, share):
     stage = held(toy, Place("cup", on="goal"))
     stage.tick(3)

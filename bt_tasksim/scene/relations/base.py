@@ -18,7 +18,7 @@ from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.geometry import Shape
 from bt_tasksim.scene.hollows import NOTHING
 from bt_tasksim.scene.outlines import Slab, rectangle, slabs, whole_outline
-from bt_tasksim.scene.spatial_laws import Body, Hollow, Surface, Whereabouts, leaning
+from bt_tasksim.scene.spatial_laws import Hollow, LevelSurface, PlacedObject, Whereabouts, leaning
 from bt_tasksim.scene.specs import Goal
 
 TOUCHING = 1e-4
@@ -121,16 +121,16 @@ class _Truth(Whereabouts):
         """See `Whereabouts.surfaces`."""
         return self._final.world.places
 
-    def body(self, name: str) -> Body:
+    def body(self, name: str) -> PlacedObject:
         """See `Whereabouts.body`."""
         cubic = np.array([self._final.model(name).cubic])
-        return Body(self._final.pose(name)[None], self._shape(name).outer[None], cubic)
+        return PlacedObject(self._final.pose(name)[None], self._shape(name).outer[None], cubic)
 
-    def surface(self, name: str) -> Surface:
+    def surface(self, name: str) -> LevelSurface:
         """See `Whereabouts.surface`."""
         place = self._final.place(name)
         half = np.array([place.extent], float) / 2
-        return Surface(
+        return LevelSurface(
             place.pose[None], np.array([place.centre], float), half, np.array([bool(place.fixture)])
         )
 

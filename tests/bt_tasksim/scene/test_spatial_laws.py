@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from bt_tasksim.core import poses
 from bt_tasksim.scene.outlines import distance, slabs, whole_outline
 from bt_tasksim.scene.shapes import ShapeSize, shape
-from bt_tasksim.scene.spatial_laws import Body, Hollow, _normals, between, beyond_hollow, leaning
+from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject, _normals, between, beyond_hollow, leaning
 from tests.bt_tasksim.scene.solids import solids
 
 QUATERNIONS = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
@@ -25,7 +25,9 @@ def body(*placed):
     """Several solids as one in as many worlds."""
     most = max(len(made.outer) for made, _ in placed)
     corners = [made.outer[np.minimum(np.arange(most), len(made.outer) - 1)] for made, _ in placed]
-    return Body(np.array([pose for _, pose in placed]), np.array(corners), np.zeros(len(placed), bool))
+    return PlacedObject(
+        np.array([pose for _, pose in placed]), np.array(corners), np.zeros(len(placed), bool)
+    )
 
 
 def gaps(a, b):
@@ -66,7 +68,7 @@ def test_a_world_gets_the_same_bits_in_any_company(some, others):
     inside = beyond_hollow(a, Hollow(b.pose, boxes))
     together, lean = gaps(a, b), leaning(a.pose[:, 3:], a.cubic)
     for k in range(len(some)):
-        one, other = (Body(*(values[k : k + 1] for values in bodies)) for bodies in (a, b))
+        one, other = (PlacedObject(*(values[k : k + 1] for values in bodies)) for bodies in (a, b))
         assert gaps(one, other)[0] == together[k]
         assert beyond_hollow(one, Hollow(other.pose, boxes[k : k + 1]))[0] == inside[k]
         assert leaning(one.pose[:, 3:], one.cubic)[0] == lean[k]
