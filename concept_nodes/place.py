@@ -435,6 +435,7 @@ class Place(ConceptModel[PlaceMemory]):
         xp = array_namespace(seen.tool)
         gently = GENTLY * gentler(seen.tool)
         pace = xp.minimum(xp.maximum(self._above(seen) / SLOWLY, gently), xp.ones_like(gently))
+        pace = xp.where(memory.progress >= memory.path.duration, xp.ones_like(pace), pace)
         on = memory.progress + seen.world.control_period * pace
         return xp.where(self._supported(seen, memory), memory.progress, on)
 
