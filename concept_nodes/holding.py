@@ -12,6 +12,8 @@ HOLDING = "holding"
 """Name of the goal that `Grasp` reaches, `Pick`, `Bring` and `Place` maintain, and `Release` ends."""
 REACH = 0.03
 """Metres by which the estimate of something that is held may lie outside the grasp."""
+BETWEEN = 0.003
+"""The same of what is between the fingers."""
 
 
 def tool_distance(seen: Seen, target: str) -> Array:
@@ -36,5 +38,12 @@ def holding(seen: Seen, target: str, reach: float = REACH) -> Array:
 
 
 def not_held(seen: Seen, target: str) -> Possible:
-    """The outcome that an object is not in the hand, where it is not."""
-    return NOT_HELD.where(~holding(seen, target), object=target, distance=tool_distance(seen, target))
+    """The outcome that an object is not in the hand, where it is not.
+
+    What is between the fingers and touched by one of them may be held: for an instant a finger may not be
+    felt. If it is not, the goal is lost before anything has come of it.
+    """
+    distance = tool_distance(seen, target)
+    felt = array_namespace(distance).any(seen.contacts, axis=-1)
+    held = (seen.opposed() & (distance < REACH)) | (felt & (distance < BETWEEN))
+    return NOT_HELD.where(~held, object=target, distance=distance)

@@ -73,3 +73,14 @@ def test_opposition_is_any_of_each_group(rows_alike, robot):
         return Seen(observation, None, description, np.zeros(len(rows))).opposed()
 
     assert np.array_equal(rows_alike(opposed, len(patterns)), expected)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "gap", "may_be"), [((1, 0), 0.0, True), ((0, 0), 0.0, False), ((1, 0), 0.01, False)]
+)
+def test_what_one_finger_touches_between_the_others_may_be_held(seen, contacts, gap, may_be):
+    half = seen.model("box").extent[0, 2] / 2
+    seen = with_tool(seen, [0, 0, half + gap])
+    seen.observation = dataclasses.replace(seen.observation, contacts=np.array([contacts], bool))
+    assert not holding(seen, "box")[0]
+    assert not_held(seen, "box").applies.tolist() == [not may_be]
