@@ -198,7 +198,7 @@ class Bring(Carry):
             else:
                 supports = supports_of(view, self.to) if self.to is not None else frozenset()
                 floor = float(floors[k]) if put_down else None
-                ends = _Goals(goals[k], self._options(view), floor, supports)
+                ends = self._emptier(view, _Goals(goals[k], self._options(view), floor, supports))
             turn = middles[k] if bool(turned[k]) else None
             way, route = _found(
                 view,
@@ -275,6 +275,17 @@ class Bring(Carry):
         heights = [standing_options(view, self.target, self.to, share * self.hover) for share in LOWER]
         now = view.objects[self.target][3:]
         return np.concatenate([nearest_first(options, now) for options in heights])
+
+    def _emptier(self, view: WorldView, goals: _Goals) -> _Goals:
+        """Over the emptiest part of a container that has something in it, rather than over its middle."""
+        place = None if self.to is None else view.world.places.get(self.to)
+        if goals.options is None or place is None or place.kind != "bin":
+            return goals
+        middle = poses.transform(np.asarray(place.pose), np.array([*place.centre, 0.0]))[:2]
+        if np.linalg.norm(goals.options[0, :2] - middle) < 1e-6:
+            return goals
+        grip = poses.relative(view.objects[self.target], view.tool)
+        return goals._replace(first=poses.multiply(goals.options[0], grip))
 
     def _goal(self, seen: Seen, now: Array) -> tuple[Array, Array]:
         """Poses ``(N, 7)`` of the object at the end, and the destination's origin that ``via`` refers to."""

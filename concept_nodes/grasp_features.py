@@ -8,6 +8,7 @@ import numpy as np
 
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
+from bt_tasksim.concept_nodes.limits import gentler
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.robot.description import RobotDescription
@@ -49,7 +50,7 @@ went back 1 mm in a control period, and 5 or 6 with 2 and 3 mm."""
 PUSHING = 0.4
 """Share of its speed at which a hand closes one finger of which stands still: the other one pushes what it
 meets up to that one, and at its full speed of 0.15 m/s a jaw of the SO-100 strains the wrist with 60 to 120 N
-then."""
+then. As long as it alone touches something it goes slower still, the stiffer its arm is, see `gentler`."""
 PERIOD = 0.05
 """Seconds that `RATE` refers to."""
 
@@ -197,7 +198,9 @@ def closed(scaling: Array, asked: Array, tightening: float, seen: Seen, memory: 
     slow = (scaling < 1.0) & (share < 1.0)
     if standing_side(seen.robot) is not None:
         usual = xp.where(slow, share, xp.ones_like(share))
-        share, slow = xp.minimum(usual, xp.full_like(share, PUSHING)), slow | (scaling > 0.0)
+        alone = xp.any(seen.contacts, axis=-1) & ~seen.opposed()
+        pushing = PUSHING * xp.where(alone, gentler(seen.tool), xp.ones_like(share))
+        share, slow = xp.minimum(usual, pushing), slow | (scaling > 0.0)
     step = share * (seen.robot.hand_speed * seen.world.control_period)
     reached = xp.where(slow, xp.minimum(asked, memory.closed + step), asked)
     return xp.where(memory.closing >= 0.0, reached, memory.preshape)

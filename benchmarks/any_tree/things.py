@@ -60,16 +60,18 @@ def draw_things(
     for k in range(1, count + 1):
         mesh = rng.random() < MESHES
         form = str(rng.choice(list(FORMS) if mesh else list(KINDS)))
-        spec: dict[str, object] = {"mass": setting.mass}
-        if mesh:
-            spec |= {
-                "kinds": ("mesh",),
-                "mesh": str(mesh_file(folder, form, seed // SAME, setting.mesh_scale)),
-            }
-        else:
-            spec |= {"kinds": (form,), "size": setting.sizes.get(form), "exponents": STANDING}
-        found.append(Thing(f"{form}_{k}", form, spec))
+        found.append(thing_of(k, form, setting, seed // SAME, folder))
     return found
+
+
+def thing_of(number: int, form: str, setting: Setting, seed: int, folder: Path) -> Thing:
+    """A thing of a kind or form; its mesh, made from a seed, is written into a folder."""
+    spec: dict[str, object] = {"mass": setting.mass}
+    if form in FORMS:
+        spec |= {"kinds": ("mesh",), "mesh": str(mesh_file(folder, form, seed, setting.mesh_scale))}
+    else:
+        spec |= {"kinds": (form,), "size": setting.sizes.get(form), "exponents": STANDING}
+    return Thing(f"{form}_{number}", form, spec)
 
 
 def mesh_file(folder: Path, form: str, seed: int, scale: float) -> Path:

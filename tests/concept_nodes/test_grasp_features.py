@@ -23,6 +23,7 @@ from bt_tasksim.concept_nodes.grasp_features import (
     SCALE,
     TIME_SCALING,
 )
+from bt_tasksim.concept_nodes.limits import gentler
 from bt_tasksim.core import poses
 from bt_tasksim.planning.reference_motion import sample
 from bt_tasksim.robot.kinematics.hand import tips_in_tool
@@ -240,9 +241,11 @@ def test_one_jaw_that_closes_alone_comes_slowly_at_any_pace(near, monkeypatch):
     seen, memory = approaching(near, contact=1)
     memory = memory._replace(closing=np.array([0.1]), closed=np.array([0.2]))
     step = near.robot.hand_speed * near.period
-    for scaling, share in ((0.0, 0.0), (0.25, 0.25), (1.0, PUSHING)):
-        found = grasp_features.closed(np.array([scaling]), np.array([1.0]), 1.0, seen, memory)
-        assert float(found[0]) == pytest.approx(0.2 + share * step)
+    touching = PUSHING * float(gentler(seen.tool)[0])
+    for at, most in ((seen, touching), (without_contacts(seen), PUSHING)):
+        for scaling in (0.0, 0.05, 0.25, 1.0):
+            found = grasp_features.closed(np.array([scaling]), np.array([1.0]), 1.0, at, memory)
+            assert float(found[0]) == pytest.approx(0.2 + min(scaling, most) * step)
 
 
 def test_displacements_are_in_the_tools_frame():
