@@ -49,6 +49,7 @@ PARSED = {
 QUICK = {
     "benchmarks.any_tree": "--only 900009 --robot so100 --oracle 0",
     "benchmarks.any_tree.five": "--episodes 1 --only tower",
+    "benchmarks.any_tree.forms": "--each 1 --only box ring",
     "benchmarks.any_tree.grasp_risk": "--episodes 2 --seed 23000",
     "benchmarks.planning": "--quick",
     "benchmarks.batch": "--quick --worlds 4 --episodes 2 --trees 40",
