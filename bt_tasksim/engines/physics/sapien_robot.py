@@ -143,7 +143,7 @@ class Robot:
         self.lever, self.to_tool = wrist_frame(articulation, links[robot.wrist_link], tool)
         closing = poses.rotate(self.tool_pose[3:], np.array([0.0, 1.0, 0.0]))
         self.twist = Twist(robot.pads, robot.opposition, tool_link, closing, world.objects, world.inertia)
-        self.solving = Solving(tool_link, self.tool_pose[:3], world.objects, len(robot.tips))
+        self.solving = Solving(tool_link, self.tool_pose[:3], world.objects)
 
     def _set_drives(self, robot: RobotDescription, joint_position: Array) -> None:
         articulation = self.articulation

@@ -4,9 +4,7 @@ PhysX goes from contact to contact, so many times a step. A thing that is held f
 kept from turning by small differences between the forces at the corners of the pads, which take the solver
 longest: with 15 iterations a ladle of 0.2 kg that hangs 70 mm beside the Panda's fingers trembles between
 them by some degrees in each control period, and creeps by 18 degrees on a way on which it turns by less than
-1 with 30 of them, or with 15 in steps half as long. What a hand of many fingers holds, which press on it
-from directions of their own, creeps wherever it is held: two diamonds turned by 12 and 17 degrees on their
-way with 15, and by 1 and 4 with 60.
+1 with 30 of them, or with 15 in steps half as long.
 """
 
 from __future__ import annotations
@@ -22,9 +20,8 @@ from bt_tasksim.engines.physics.sapien_world import floats
 if TYPE_CHECKING:
     from sapien import physx
 
-LEVER, TWO = 0.035, 2
-"""Metres between the tool and the centre of mass of what it holds from which the solver works longer, in a
-hand of no more fingertips; with more of them it always does."""
+LEVER = 0.035
+"""Metres between the tool and the centre of mass of what it holds from which the solver works longer."""
 LONG = 60
 """Its position iterations then."""
 HELD = 0.5
@@ -38,7 +35,6 @@ class Solving:
         hand: The link that carries the tool.
         tool: Position ``(3,)`` of the tool in its frame, metres.
         bodies: The objects.
-        fingers: How many fingertips the hand has.
     """
 
     def __init__(
@@ -46,10 +42,8 @@ class Solving:
         hand: physx.PhysxArticulationLinkComponent,
         tool: Array,
         bodies: Sequence[physx.PhysxRigidDynamicComponent],
-        fingers: int = TWO,
     ) -> None:
         self._hand, self._bodies = hand, bodies
-        self._least = LEVER if fingers <= TWO else 0.0
         self._tool = [*(float(v) for v in tool), 1.0, 0.0, 0.0, 0.0]
         self._usual = [body.get_solver_position_iterations() for body in bodies]
         self._far = -1
@@ -61,7 +55,7 @@ class Solving:
             hand_force: Of the robot on each object, N.
         """
         which = max(range(len(hand_force)), key=hand_force.__getitem__, default=-1)
-        far = which if which >= 0 and hand_force[which] > HELD and self._lever(which) >= self._least else -1
+        far = which if which >= 0 and hand_force[which] > HELD and self._lever(which) > LEVER else -1
         if far == self._far:
             return
         if self._far >= 0:

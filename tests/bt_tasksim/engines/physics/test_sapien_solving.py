@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -66,14 +65,3 @@ def test_what_is_let_go_or_changes_hands_is_as_before():
         solving.look(force)
         assert [thing.iterations for thing in far] == expected
     Solving(body(pose([0.0, 0.0, 0.0])), TOOL, []).look([])
-
-
-@pytest.mark.parametrize(("fingers", "expected"), [(2, USUAL), (3, LONG), (5, LONG)])
-def test_in_a_hand_of_many_fingers_it_works_longer_wherever_the_thing_is_held(fingers, expected):
-    hand = body(pose([0.0, 0.0, 0.0]))
-    thing = body(pose(TOOL))
-    solving = Solving(hand, TOOL, [thing], fingers)
-    solving.look([30.0])
-    assert thing.iterations == expected
-    solving.look([0.0])
-    assert thing.iterations == USUAL
