@@ -174,29 +174,33 @@ class Release(ConceptModel[ReleaseMemory]):
             gone = Limit(FELL_OVER, tilted, FALLEN, names, counts=memory.opened >= 0.0)
         else:
             late = memory.opened > memory.path.duration + FALLING
-            gone = Limit(FELL_BESIDE, self._beside(seen), 0.0, {**names, "place": self.into}, counts=late)
+            gone = Limit(
+                FELL_BESIDE, self._beside(seen, memory), 0.0, {**names, "place": self.into}, counts=late
+            )
         return strain(seen, self.force_limit), gone
 
-    def _beside(self, seen: Seen) -> Array:
+    def _beside(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """Metres ``(N,)`` by which the object's middle is outside what it was to fall into; 0 where unseen.
 
         What lies on other things above its rim is not in it, unless it stands on its floor. What seems to be
-        in the air is not seen any more: it is taken for where it was last.
+        in the air is not seen any more: it is taken for where it was last. It is 0 until the hand has drawn
+        back; nobody asks before.
         """
         xp = array_namespace(seen.tool)
-        if self.into is None or self.into not in seen.world.place_columns:
-            return xp.zeros_like(seen.tool[:, 0])
+        nothing, back = xp.zeros_like(seen.tool[:, 0]), memory.opened >= memory.path.duration
+        if self.into is None or self.into not in seen.world.place_columns or not bool(xp.any(back)):
+            return nothing
         where = Estimates(seen)
         far = beyond_walls(where, self.target, self.into)
-        told = xp.isfinite(far) & ~floats(where, self.target, self.into)
-        return xp.where(told, xp.maximum(far, xp.zeros_like(far)), xp.zeros_like(far))
+        told = back & xp.isfinite(far) & ~floats(where, self.target, self.into)
+        return xp.where(told, xp.maximum(far, nothing), nothing)
 
     def done(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """The hand is open, touches nothing and has drawn back; what was to fall into something is in it."""
         gap = poses.norm(seen.tool[:, :3] - memory.path.table[:, -1, :3])
         free = ~array_namespace(gap).any(seen.contacts, axis=-1)
         done = (memory.opened >= memory.path.duration) & (gap < self.tolerance) & free
-        return done if self.into is None else done & (self._beside(seen) <= 0.0)
+        return done if self.into is None else done & (self._beside(seen, memory) <= 0.0)
 
     def necessary_cost(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """Share of the fingertips that still touch something."""

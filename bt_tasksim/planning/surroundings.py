@@ -61,24 +61,21 @@ def adrift(things: Sequence[Thing], names: Collection[str]) -> frozenset[str]:
         things: Everything that is there.
         names: The objects in question.
     """
-    boxes = [(thing.name, *_bounds(thing, piece)) for thing in things for piece in _pieces(thing)]
+    bounds = [_bounds(thing) for thing in things]
+    least, most = (np.concatenate(ends) for ends in zip(*bounds, strict=True))
+    whose = np.repeat([thing.name for thing in things], [len(ends[0]) for ends in bounds])
     found = set()
     for name in names:
-        own = [(low, high) for other, low, high in boxes if other == name]
-        low, high = np.min([low for low, _ in own], axis=0), np.max([high for _, high in own], axis=0)
-        low = low - np.array([0.0, 0.0, BORNE])
-        if not any(
-            other != name and (least < high).all() and (most > low).all() for other, least, most in boxes
-        ):
+        own = whose == name
+        low, high = least[own].min(axis=0) - np.array([0.0, 0.0, BORNE]), most[own].max(axis=0)
+        if not ((least < high) & (most > low))[~own].all(axis=-1).any():
             found.add(name)
     return frozenset(found)
 
 
-def _pieces(thing: Thing) -> Sequence[Array]:
-    return thing.pieces if thing.size is None else [box_corners(thing.size)]
-
-
-def _bounds(thing: Thing, piece: Array) -> tuple[Array, Array]:
-    """Least and largest coordinates ``(3,)`` of a piece of a thing, robot base frame."""
-    corners = poses.transform(thing.pose, np.asarray(piece))
-    return corners.min(axis=0), corners.max(axis=0)
+def _bounds(thing: Thing) -> tuple[Array, Array]:
+    """Least and largest coordinates ``(k, 3)`` of each piece of a thing, robot base frame."""
+    pieces = thing.pieces if thing.size is None else [box_corners(thing.size)]
+    corners = poses.transform(thing.pose, np.concatenate(pieces))
+    first = np.cumsum([0, *(len(piece) for piece in pieces[:-1])])
+    return np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)
