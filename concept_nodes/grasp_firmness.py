@@ -92,8 +92,8 @@ class Firm:
         if self._closing is None:
             return 0.0
         least, by_angle, by_lever, by_narrow = RISK
-        angle, lever = self.features(tool)
-        odds = least + by_angle * min(angle, WIDEST) + by_lever * lever + by_narrow * max(0.0, NARROW - width)
+        angle, lever, narrow = terms(*self.features(tool), width)
+        odds = least + by_angle * angle + by_lever * lever + by_narrow * narrow
         return 1.0 / (1.0 + math.exp(-odds)) - 1.0 / (1.0 + math.exp(-least))
 
     def features(self, tool: Array) -> tuple[float, float]:
@@ -129,6 +129,11 @@ class Firm:
             grip = poses.relative(tool, self._pose)
             self._asked = tool, self._closing.squeeze(self._closing.met(grip, self._pieces))
         return self._asked[1]
+
+
+def terms(angle: float, lever: float, width: float) -> tuple[float, float, float]:
+    """What `RISK` weighs: a squeeze's angle in radians, cut at `WIDEST`; a lever; metres below `NARROW`."""
+    return min(angle, WIDEST), lever, max(0.0, NARROW - width)
 
 
 def deeper(tool: Array) -> Array:

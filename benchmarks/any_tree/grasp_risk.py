@@ -32,7 +32,7 @@ from benchmarks.any_tree.things import Thing, draw_things
 from bt_tasksim import EngineOptions, ObjectSpec, Runner, Scene, poses
 from bt_tasksim.concept_nodes import Bring, Grasp, Pick, grasp, grasp_choice
 from bt_tasksim.concept_nodes.grasp_candidates import Candidates
-from bt_tasksim.concept_nodes.grasp_firmness import NARROW, WIDEST
+from bt_tasksim.concept_nodes.grasp_firmness import terms
 from bt_tasksim.core.errors import BtTasksimError, BtTasksimWarning, InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.success import DEEPEST
@@ -45,7 +45,8 @@ TURNED = math.radians(10.0)
 FOLDS = 5
 WEAK = 0.025
 """Weight of the sum of squares that keeps the law's numbers small; lengths in decimetres."""
-NAMES = ("angle", "lever", "narrow")
+NAMES, SCALES = ("angle", "lever", "narrow"), (1, 10, 10)
+"""What is weighed, see `terms`, and how many of its unit in the fit make one of its own."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -149,9 +150,7 @@ def lines(found: Sequence[dict[str, Any]]) -> list[str]:
     out = [f"{wrong.sum()} of {len(wrong)} random grasps went wrong"]
     if wrong.sum() < FOLDS or (~wrong).sum() < FOLDS:
         return [*out, "too few of either to fit a law"]
-    features = np.array(
-        [[min(g["angle"], WIDEST), 10 * g["lever"], 10 * max(0.0, NARROW - g["width"])] for g in found]
-    )
+    features = np.array([terms(g["angle"], g["lever"], g["width"]) for g in found]) * SCALES
     law = fitted(features, wrong)
     said = np.zeros(len(wrong))
     for fold in range(FOLDS):
@@ -159,7 +158,7 @@ def lines(found: Sequence[dict[str, Any]]) -> list[str]:
         said[held_out] = _odds(fitted(features[~held_out], wrong[~held_out]), features[held_out])
     pairs = said[wrong][:, None] - said[~wrong][None]
     right = float(np.mean(pairs > 0) + np.mean(pairs == 0) / 2)
-    numbers = ", ".join(f"{n} {v:.3g}" for n, v in zip(NAMES, law[1:] * [1, 10, 10], strict=True))
+    numbers = ", ".join(f"{n} {v:.3g}" for n, v in zip(NAMES, law[1:] * SCALES, strict=True))
     return [
         *out,
         f"log odds: {law[0]:.2f}, {numbers}",
