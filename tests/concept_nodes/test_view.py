@@ -64,3 +64,16 @@ def test_numbers_that_differ_in_the_last_bit_are_the_same_to_a_search():
     value = np.array([0.1 + 0.2, 1.0])
     (one,), (other,) = host_numbers([value]), host_numbers([np.nextafter(value, 2.0)])
     assert np.array_equal(one, other) and np.allclose(one, value, atol=1e-9)
+
+
+@pytest.mark.parametrize(("contacts", "gone"), [((False, False), True), ((True, True), False)])
+def test_what_was_last_seen_in_the_air_is_in_nobodys_way_unless_it_is_held(toy, contacts, gone):
+    stage = toy(Grasp("cup"))
+    objects = stage.world.now.objects.copy()
+    objects[stage.world.model.object_index("box"), :3] = stage.world.now.tool_pose[:3]
+    stage.world.put(objects=objects, contacts=np.array(contacts))
+    stage.look()
+    (found,) = views(stage.context.seen(ONE, np.zeros(1)))
+    assert ("box" in found.adrift) is gone
+    assert ("box" in {thing.name for thing in found.things()}) is not gone
+    assert "box" in {thing.name for thing in found.things(taken="box")}, "what is taken is always there"
