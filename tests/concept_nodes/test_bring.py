@@ -8,8 +8,9 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Bring, Place
-from bt_tasksim.concept_nodes.bring import standing_pose
+from bt_tasksim.concept_nodes.bring import _Goals, standing_pose
 from bt_tasksim.concept_nodes.holding import NOT_HELD
+from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.facts import WorldFacts
@@ -206,3 +207,22 @@ def test_things_of_unlike_kinds_stand_in_one_batch_as_each_one_alone(rows_alike)
             ),
             30,
         )
+
+
+def test_over_a_container_that_has_something_in_it_it_ends_beside_that(toy):
+    stage = toy(Bring("cup", to="bin"))
+    stage.world.hold("cup")
+    stage.look()
+    view = views(stage.context.seen(ONE, np.zeros(1)))[0]
+    goal = view.world.place("goal")
+    place = dataclasses.replace(goal, name="bin", kind="bin", extent=(0.3, 0.3), height=0.1)
+    world = dataclasses.replace(view.world, places={**view.world.places, "bin": place})
+    middle = poses.transform(np.asarray(place.pose), np.array([*place.centre, 0.0]))
+    for beside, empty in ((1.0, True), (0.0, False)):
+        there = poses.pose(middle + np.array([beside, 0.0, 0.02]))
+        now = view._replace(world=world, objects={**view.objects, "box": there})
+        model = stage.tree.model
+        goals = model._emptier(now, _Goals(view.tool, model._options(now), None, frozenset()))
+        assert np.array_equal(goals.first, view.tool) is empty
+        ends = poses.multiply(goals.first, poses.inverse(poses.relative(now.objects["cup"], now.tool)))
+        assert empty or 0.05 < abs(ends[:2] - middle[:2]).max() < 0.15
