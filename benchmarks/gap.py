@@ -81,7 +81,7 @@ def _one(runner: Runner, robot: Any, evaluation: EvaluationClient, seed: int) ->
     except BtTasksimError as error:
         outcome = outcome_of_error(error)
         ended, reason, why = False, outcome.cause.reason.name, outcome.sentence
-    truth = _settled(evaluation)
+    truth = settled_truth(evaluation)
     model = configuration.world_model([tip.name for tip in robot.tips], robot.opening)
     verdict = evaluate_success(configuration, model, truth)
     if ended:
@@ -89,7 +89,7 @@ def _one(runner: Runner, robot: Any, evaluation: EvaluationClient, seed: int) ->
     return Episode(seed, ended and verdict.success, reason, why)
 
 
-def _settled(evaluation: EvaluationClient) -> Hidden:
+def settled_truth(evaluation: EvaluationClient) -> Hidden:
     """The truth once things have come to rest, or have not for as long as a simulation would wait."""
     end, quiet = time.monotonic() + SETTLE, 0
     while True:

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import sealed
-from benchmarks.any_tree.episodes import Conditions, Player, play_one
+from benchmarks.any_tree.episodes import Conditions, play_one, player_of
 from benchmarks.any_tree.report import lines, summary
 from benchmarks.any_tree.settings import SETTINGS
 from benchmarks.any_tree.trees import TREES
@@ -50,6 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--tree", default="obvious", choices=TREES)
     parser.add_argument("--grasp", metavar="POLICY", help="policy of the grasps, default the pinned one")
     parser.add_argument("--engines", default="sapien")
+    parser.add_argument("--twin", action="store_true", help="on the twin, over ROS and in real time")
     parser.add_argument("--noise", default="fine")
     parser.add_argument("--perception", default="state")
     parser.add_argument("--ros", default="", metavar="FILE", help="a robot's topics, for engines over ROS")
@@ -65,7 +66,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     with tempfile.TemporaryDirectory(prefix="any_tree_") as folder:
         asked = Conditions(
-            options.robot, options.tree, options.grasp, engines, Path(folder), options.stream, options.oracle
+            options.robot,
+            options.tree,
+            options.grasp,
+            engines,
+            Path(folder),
+            options.stream,
+            options.oracle,
+            options.twin,
         )
         try:
             if options.only:
@@ -128,7 +136,7 @@ def _resumed(path: Path, about: dict[str, Any]) -> dict[int, dict[str, Any]]:
 def _played(asked: Conditions, seeds: Sequence[int], workers: int) -> Iterator[dict[str, Any]]:
     """What becomes of each draw, as they end."""
     if workers <= 1:
-        player = Player(asked)
+        player = player_of(asked)
         try:
             yield from (player.play(seed) for seed in seeds)
         finally:

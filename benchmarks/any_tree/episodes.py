@@ -36,6 +36,7 @@ class Conditions:
         folder: Where meshes are written.
         stream: Stream of the scene's draw.
         oracle: Seconds that the oracle has for each draw that failed; 0: it is not asked.
+        twin: On the twin, over ROS and in real time, instead of the engines of the options.
     """
 
     robot: str
@@ -45,10 +46,13 @@ class Conditions:
     folder: Path
     stream: str = "evaluation"
     oracle: float = 0.0
+    twin: bool = False
 
     def to_data(self) -> dict[str, Any]:
         """What results say of it, and by which they are told apart."""
         options = {key: getattr(self.options, key) for key in ("engines", "perception", "noise")}
+        if self.twin:  # whose noise is its own
+            options |= {"engines": "twin", "noise": "fine"}
         return {"robot": self.robot, "tree": self.tree, "grasp": self.grasp, "stream": self.stream, **options}
 
 
@@ -122,16 +126,26 @@ class Player:
         asked = self._conditions
         if self._pipeline is None:
             self._pipeline = build_pipeline(load_robot(asked.robot), asked.options)
-        longest = LONGEST[0] + LONGEST[1] * len(drawn.steps)
         runner = Runner(
-            lambda: drawn.tree(asked.tree, asked.grasp), drawn.scene, asked.options, self._pipeline, longest
+            lambda: drawn.tree(asked.tree, asked.grasp),
+            drawn.scene,
+            asked.options,
+            self._pipeline,
+            longest(drawn),
         )
         outcome = replace(episode(runner, drawn.seed, drawn.stream), wall_time=0.0)
-        found = outcome.to_data()
-        nodes = {node.name: node for node in runner.tree.iterate()}
-        node = nodes.get(outcome.leaf)
-        found["concept"] = concept_name(type(node.model)) if isinstance(node, ConceptNode) else ""
-        return found
+        return {**outcome.to_data(), "concept": self.concept_of(runner, outcome.leaf)}
+
+    @staticmethod
+    def concept_of(runner: Runner, leaf: str) -> str:
+        """Name of the concept of a leaf; empty for anything else."""
+        node = {node.name: node for node in runner.tree.iterate()}.get(leaf)
+        return concept_name(type(node.model)) if isinstance(node, ConceptNode) else ""
+
+
+def longest(drawn: Task) -> float:
+    """Seconds after which an episode is stopped."""
+    return LONGEST[0] + LONGEST[1] * len(drawn.steps)
 
 
 def judged(drawn: Task, seconds: float) -> Mapping[str, Any]:
@@ -152,7 +166,16 @@ def play_one(asked: Conditions, seed: int) -> dict[str, Any]:
     return _player(asked).play(seed)
 
 
+def player_of(asked: Conditions) -> Player:
+    """What runs draws under these conditions."""
+    if not asked.twin:
+        return Player(asked)
+    from benchmarks.any_tree.on_twin import TwinPlayer
+
+    return TwinPlayer(asked)
+
+
 @lru_cache(maxsize=1)
 def _player(asked: Conditions) -> Player:
     """The player of a worker process."""
-    return Player(asked)
+    return player_of(asked)

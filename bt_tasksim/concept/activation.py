@@ -20,6 +20,7 @@ from bt_tasksim.concept.context import Context
 from bt_tasksim.concept.contract import Contract
 from bt_tasksim.concept.following import following
 from bt_tasksim.concept.functions import ConceptFunctions, any_of, booleans, first_of, sequence_of
+from bt_tasksim.concept.planner import PATIENCE, SOON, Plan
 from bt_tasksim.concept.reporting import as_statement
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.batch_leaf import FAILURE, RUNNING, SUCCESS
@@ -34,11 +35,14 @@ from bt_tasksim.core.outcomes import (
     TIMED_OUT,
     Outcome,
     Statement,
+    register_reason,
 )
 from bt_tasksim.core.poses import Array, array_namespace, host
 from bt_tasksim.core.transfer import Index, fetched
+from bt_tasksim.core.units import SECONDS
 from bt_tasksim.policy.policy import Action
 
+PLANNED_TOO_LONG = register_reason("planned_too_long", "no plan was there after {limit}", limit=SECONDS)
 LOST_TICKS = 3
 """Ticks in a row without a maintained goal after which it counts as lost (contacts flicker)."""
 
@@ -96,6 +100,16 @@ class Activation:
         self._lost: Array = np.zeros(worlds, np.int64)
         self._later: tuple[Any, ...] | None = None
         self._failures: Array = np.zeros(worlds, np.int64)
+        self._plans: dict[int, Plan] = {}
+
+    @property
+    def plans(self) -> bool:
+        """It waits for a plan, see `bt_tasksim.concept.planner`."""
+        return bool(self._plans)
+
+    def drop_plans(self) -> None:
+        """Wait for no plan any more."""
+        self._plans.clear()
 
     def elapsed(self, rows: Array) -> Array:
         """Seconds ``(k,)`` since it began."""
@@ -128,12 +142,17 @@ class Activation:
             begins = rows[fresh]
             self.activations[begins] += 1
             self._lost[begins], self._nearer[begins] = 0, 0.0
+            for row in begins.tolist() if self._plans else ():
+                del self._plans[row]
         for row, refusal in self._context.refused.items():
             if refusal.leaf is self._leaf and row in rows:
                 position = int(np.searchsorted(rows, row))
                 self._fail(statuses, position, row, refusal.outcome)
         if fresh.any():
             self._begin(rows, fresh & (statuses == RUNNING), statuses)
+        for row in sorted(self._plans):
+            if row in rows:
+                self._look_at_plan(row, int(np.searchsorted(rows, row)), statuses)
         judged = self._going(rows, statuses)
         if not len(judged.rows):
             return judged
@@ -219,6 +238,10 @@ class Activation:
             if not len(can):
                 return
             begins, positions, seen = begins[can], positions[can], seen.at(can)
+        if context.planner is not None:
+            for k, row in enumerate(begins.tolist()):
+                self._plans[row] = context.planner.begin(model.begin, seen.at(np.array([k])))
+            return
         try:
             self._remember(begins, model.begin(seen), "begin")
         except NoWayError:
@@ -230,13 +253,41 @@ class Activation:
             try:
                 self._remember(np.array([row]), self._model.begin(seen.at(np.array([k]))), "begin")
             except NoWayError as error:
-                for goal in self._model.maintains:
-                    self._context.no_way_with(goal, self._model.actor, row)
-                self._fail(statuses, position, row, CANNOT_START(NO_WAY(what=error)))
+                self._no_way(statuses, position, row, error)
+
+    def _no_way(self, statuses: Array, position: int, row: int, error: NoWayError) -> None:
+        for goal in self._model.maintains:
+            self._context.no_way_with(goal, self._model.actor, row)
+        self._fail(statuses, position, row, CANNOT_START(NO_WAY(what=error)))
+
+    def _look_at_plan(self, row: int, position: int, statuses: Array) -> None:
+        """Begin with the plan that was waited for in a world, if it is there; its clock begins then."""
+        plan, planner, now = self._plans[row], self._context.planner, self._context.times[row]
+        assert planner is not None
+        if not plan.ready(SOON):
+            if now - self._started[row] > PATIENCE:
+                del self._plans[row]
+                self._fail(statuses, position, row, CANNOT_START(PLANNED_TOO_LONG(limit=PATIENCE)))
+            return
+        del self._plans[row]
+        seen = self.seen(np.array([row]))
+        try:
+            memory = plan.result()
+        except NoWayError as error:
+            self._no_way(statuses, position, row, error)
+            return
+        if plan.outdated(seen):
+            self._plans[row] = planner.begin(self._model.begin, seen)
+            self._plans[row].anew = plan.anew + 1
+            return
+        self._started[row] = now
+        self._remember(np.array([row]), memory, "begin")
 
     def _going(self, rows: Array, statuses: Array) -> Judged:
-        """The worlds in which nothing has failed so far."""
+        """The worlds in which nothing has failed so far, and no plan is waited for."""
         going = np.flatnonzero(statuses == RUNNING)
+        if self._plans:
+            going = going[[row not in self._plans for row in rows[going].tolist()]]
         on = rows[going]
         memory = self.memory
         if memory is not None and len(on) < self._context.worlds:

@@ -13,6 +13,7 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.beliefs import Beliefs, Believed
+from bt_tasksim.concept.planner import Planner
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.bundles import Rows
 from bt_tasksim.core.culprit import place_of
@@ -94,6 +95,8 @@ class Context:
         self.ask_hidden: Callable[[Array | None], Hidden | None] = lambda rows: None
         """Asks for the hidden state ``(k, ...)`` of worlds ``rows (k,)``, or of all, the objects of each in
         its own order; None where nobody knows it."""
+        self.planner: Planner | None = None
+        """Plans beside a robot's loop; None where time stands still meanwhile."""
         self.times: Array = np.zeros(worlds)
         """Seconds ``(N,)`` since each episode began."""
         self._refused: dict[int, Refusal] = {}

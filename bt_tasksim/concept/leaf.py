@@ -20,6 +20,8 @@ from bt_tasksim.core.outcomes import INTERRUPTED
 from bt_tasksim.policy.policy import PROGRAMMED, Action, Policy, PolicySlot, concept_name, named_policy
 from bt_tasksim.robot.description import RobotDescription
 
+PLANS = "plans, and the arm stands where it is"
+"""What a leaf says that waits for its plan on a robot."""
 ONE = np.array([0])
 """Numbers of the worlds of a tree of py_trees: there is one."""
 
@@ -135,6 +137,11 @@ class ConceptNode(ModelLeaf):
         return 0 if self._activation is None else int(self._activation.activations[0])
 
     @property
+    def plans(self) -> bool:
+        """It waits for its plan: it has become active, and does not act yet; on a robot only."""
+        return self._activation is not None and self._activation.plans
+
+    @property
     def policy_in_use(self) -> Policy:
         """The policy that decides; resolved when the tree is set up."""
         if self.lacks_policy:
@@ -203,6 +210,8 @@ class ConceptNode(ModelLeaf):
         outcome = self.activation.outcomes.get(0)
         if outcome is not None or self.outcome is not None or self.feedback_message:
             self.report(outcome)
+        if self.plans:
+            self.feedback_message = PLANS
         return STATUSES[int(statuses[0])]
 
     def terminate(self, new_status: Status) -> None:
@@ -211,6 +220,8 @@ class ConceptNode(ModelLeaf):
             return
         if self.status == Status.RUNNING:
             self.report(INTERRUPTED())
+        if self._activation is not None:
+            self._activation.drop_plans()
         if self._context is not None:
             self._context.withdraw(self, ONE)
 

@@ -17,6 +17,7 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.context import Context, one_world
 from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.concept.planner import Planner
 from bt_tasksim.concept.reporting import as_statement, speaker, whole_outcome
 from bt_tasksim.core.closing import Closing
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
@@ -108,6 +109,8 @@ class Runner(Closing):
         self.pipeline = pipeline or build_pipeline(self.robot, self.options)
         self.scene, self.longest = self.pipeline.worlds(scene), longest
         self.context = Context(self.robot)
+        if self.pipeline.real:
+            self.context.planner = Planner()
         self._planted: WorldBlackboard | None = None
         self.configuration: ActorConfiguration | None = None
         self.plant(tree)
@@ -138,6 +141,8 @@ class Runner(Closing):
 
     def close(self) -> None:
         """Close the engines."""
+        if self.context.planner is not None:
+            self.context.planner.close()
         self.pipeline.close()
 
     def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 import yaml
 
+from benchmarks.any_tree.episodes import Conditions, player_of
 from benchmarks.faults import Bench, Seen, bench_of, measure
 from benchmarks.sweep import sweeping
 from bt_tasksim.core.errors import InputError, MachineError
@@ -104,6 +105,41 @@ def test_a_fault_ends_in_a_hold_and_a_fresh_run_works(bench: Bench, fault: str, 
     assert seen.fastest < 1.0 and seen.hardest < 4.2, "no faster and no harder than a command may be"
     assert re.search(said, seen.said + seen.by), seen
     assert not seen.running and seen.again
+
+
+def test_planning_for_longer_than_the_watchdog_waits_stops_nothing(bench: Bench) -> None:
+    bench.restart()
+    bench.evaluation.load(bench.configuration)
+    runner, sweep = sweeping(bench.twin.port)
+    begin, took, sweep.lasts = type(sweep).begin, 5 * runner.robot.safety.watchdog, 1.0
+
+    def slowly(model: Any, seen: Any) -> Any:
+        time.sleep(took)
+        return begin(model, seen)
+
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(type(sweep), "begin", slowly)
+            result = runner.run(0)
+    finally:
+        runner.close()
+    assert result.status.name == "SUCCESS", result.why
+    assert result.sim_time > sweep.lasts + took
+
+
+def test_meshes_among_other_things_on_the_twin(tmp_path: Path) -> None:
+    """Tasks of the benchmark, with planned grasps and ways; one of three is enough on a busy machine."""
+    asked = Conditions("panda", "obvious", None, EngineOptions(), tmp_path, twin=True)
+    player, found = player_of(asked), []
+    try:
+        for seed in (988016, 988027, 988041):
+            found.append(player.play(seed))
+            if found[-1]["success"]:
+                break
+    finally:
+        player.close()
+    assert found[-1]["success"], found
+    assert list(tmp_path.glob("*.obj"))
 
 
 @pytest.mark.parametrize("fault", ["SIGKILL of the runner", "emergency stop"])
