@@ -14,7 +14,7 @@ from bt_tasksim.planning.things import Thing, box_corners
 CLEAR_OF_FURNITURE = 0.008
 """Metres kept from furniture, whose place is calibrated."""
 CLEAR_OF_OBJECTS = 0.01
-"""Metres kept from objects, beside the uncertainty of their estimates."""
+"""Metres kept from objects, what estimates are wrong by included: five standard deviations of good ones."""
 BORNE = 0.03
 """Metres below an object within which something has to be that bears it, see `adrift`."""
 
@@ -26,9 +26,7 @@ def pieces_of(model: ObjectModel) -> tuple[Array, ...]:
     return model.solid.pieces
 
 
-def things_of(
-    world: WorldModel, objects: Mapping[str, Array], closer: float = 0.0, uncertainty: float = 0.0
-) -> list[Thing]:
+def things_of(world: WorldModel, objects: Mapping[str, Array], closer: float = 0.0) -> list[Thing]:
     """Furniture and objects of one world.
 
     Args:
@@ -36,14 +34,13 @@ def things_of(
         objects: Estimated poses ``(7,)`` of the objects to keep clear of, by name; those that were never seen
             are NaN, and left out.
         closer: Share from 0 to 1 by which one may come closer than usual.
-        uncertainty: Metres by which the estimates may be wrong.
     """
     usual = 1.0 - closer
     furniture = [
         Thing(box.fixture or "furniture", box.pose, box.size, margin=usual * CLEAR_OF_FURNITURE)
         for box in world.obstacles
     ]
-    margin = usual * (CLEAR_OF_OBJECTS + uncertainty)
+    margin = usual * CLEAR_OF_OBJECTS
     loose = [
         Thing(name, poses.unit_pose(pose), pieces=pieces_of(world.object(name)), margin=margin)
         for name, pose in objects.items()

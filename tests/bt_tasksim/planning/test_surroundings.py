@@ -29,9 +29,9 @@ AT = poses.pose([0.4, 0.1, 0.05])
 
 
 def test_furniture_and_objects_have_their_margins(world):
-    board, a, b = things_of(world, {"a": AT, "b": AT}, uncertainty=0.004)
+    board, a, b = things_of(world, {"a": AT, "b": AT})
     assert (board.name, board.size, board.margin) == ("shelf", (0.5, 0.5, 0.02), CLEAR_OF_FURNITURE)
-    assert [a.name, b.name] == ["a", "b"] and a.margin == pytest.approx(CLEAR_OF_OBJECTS + 0.004)
+    assert [a.name, b.name] == ["a", "b"] and a.margin == CLEAR_OF_OBJECTS
     assert np.array_equal(a.pose, AT)
 
 
