@@ -96,6 +96,9 @@ OTHERS = 8
 SLOWLY, GENTLY = 0.02, 0.4
 """Metres above where the object should stand below which it goes slower, and the least share of the path's
 speed: what meets its support at 80 mm/s in the hand of a stiff arm strains the wrist with 60 to 80 N."""
+UNSURE = 0.005
+"""Metres by which something may stand higher than it is seen to: twice the error of a good estimate. An arm
+near its base, which is stiff, goes as slowly as it can from there on."""
 FELT = 2
 """Ticks in a row for which the support must be felt."""
 
@@ -433,8 +436,9 @@ class Place(ConceptModel[PlaceMemory]):
 
     def _progress(self, seen: Seen, memory: PlaceMemory) -> Array:
         xp = array_namespace(seen.tool)
-        gently = GENTLY * gentler(seen.tool)
-        pace = xp.minimum(xp.maximum(self._above(seen) / SLOWLY, gently), xp.ones_like(gently))
+        share = gentler(seen.tool)
+        gently, unsure = GENTLY * share, UNSURE * (1.0 - share)
+        pace = xp.minimum(xp.maximum((self._above(seen) - unsure) / SLOWLY, gently), xp.ones_like(gently))
         pace = xp.where(memory.progress >= memory.path.duration, xp.ones_like(pace), pace)
         on = memory.progress + seen.world.control_period * pace
         return xp.where(self._supported(seen, memory), memory.progress, on)
