@@ -32,7 +32,13 @@ from bt_tasksim.concept_nodes.closer import DROPPED, PUT_DOWN, TOUCHING, with_ro
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
-from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of, tipped
+from bt_tasksim.concept_nodes.standing import (
+    aside_options,
+    nearest_first,
+    standing_options,
+    supports_of,
+    tipped,
+)
 from bt_tasksim.concept_nodes.surface import (
     NEAR,
     apart,
@@ -272,7 +278,8 @@ class Place(ConceptModel[PlaceMemory]):
     def _turned(self, view: WorldView) -> Array:
         """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first.
 
-        Those last in which it leans there; an arm of few joints leans it by itself.
+        After them those a little aside of there, and last those in which it leans there; an arm of few joints
+        leans it by itself.
         """
         here = self.on in view.world.places or self.on in view.objects
         if self.on is None or not here or self.anywhere or self.distance is not None:
@@ -281,7 +288,9 @@ class Place(ConceptModel[PlaceMemory]):
         grip = poses.relative(now, view.tool)
         options = nearest_first(standing_options(view, self.target, self.on), now[3:])
         leaning = tipped(options[:1], grip) if len(view.arm) >= FULL else options[:0]
-        tried = np.concatenate([options[1 : 1 + OTHERS], leaning])
+        aside = aside_options(view, self.on, options[:1])
+        nearest = np.argsort(np.linalg.norm(aside[:, :2] - now[:2], axis=-1), kind="stable")
+        tried = np.concatenate([options[1 : 1 + OTHERS], aside[nearest], leaning])
         return poses.multiply(tried, grip[None]) + self.overshoot * self._along
 
     def _down(self, view: WorldView, goal: Array) -> Route:
@@ -350,7 +359,8 @@ class Place(ConceptModel[PlaceMemory]):
         if self.on is not None and not self.anywhere:
             options = standing_options(view, self.target, self.on)
             options = nearest_first(options, view.objects[self.target][3:])
-            return Aim(options, f"be put down on {self.on}", supports_of(view, self.on))
+            aside = aside_options(view, self.on, options)
+            return Aim(options, f"be put down on {self.on}", supports_of(view, self.on), aside=aside)
         if self.on is not None:
             spots = spots_on(view, self.target, self.on)
         else:
