@@ -32,7 +32,13 @@ from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, DROPPED, NARROWLY,
 from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, resting_place
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.spots import GAP, Spots, spots_beside, spots_on
-from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of, tipped
+from bt_tasksim.concept_nodes.standing import (
+    aside_options,
+    nearest_first,
+    standing_options,
+    supports_of,
+    tipped,
+)
 from bt_tasksim.concept_nodes.surface import top_frame, upright
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, views
 from bt_tasksim.core import poses
@@ -65,6 +71,8 @@ ROOMS = (
 )
 """What is tried one after the other: how much closer than usual one may come to things on the way, the share
 of the usual speed, the same closeness where it is put down, and metres above its support where that ends."""
+BESIDE = ((BROUGHT, SLOWER, TOUCHING, 0.0),)
+"""The same for what is put down a little aside of where it should stand, see `aside_options`."""
 SLANTED = (CARRIED, 1.0, BROUGHT, 0.0), (BROUGHT, SLOWER, TOUCHING, 0.0)
 """The same for an arm of few joints where nothing else serves: what has turned in its hand it sets down
 slanted."""
@@ -198,7 +206,11 @@ class Bring(Carry):
             else:
                 supports = supports_of(view, self.to) if self.to is not None else frozenset()
                 floor = float(floors[k]) if put_down else None
-                ends = self._emptier(view, _Goals(goals[k], self._options(view), floor, supports))
+                options = self._options(view)
+                aside = None
+                if self.to is not None and options is not None and put_down:
+                    aside = aside_options(view, self.to, options)
+                ends = self._emptier(view, _Goals(goals[k], options, floor, supports, aside))
             turn = middles[k] if bool(turned[k]) else None
             way, route = _found(
                 view,
@@ -224,7 +236,10 @@ class Bring(Carry):
             spots = self._spots(view)
             return Aim(_over(spots, self.hover)[spots.few], f"be brought {self._where}", on_the_way=True)
         options = self._options(view)
-        return None if options is None else Aim(options, f"be brought to {self.to}", on_the_way=True)
+        if options is None or self.to is None:
+            return None
+        aside = aside_options(view, self.to, options)
+        return Aim(options, f"be brought to {self.to}", on_the_way=True, aside=aside)
 
     @property
     def _chooses(self) -> bool:
@@ -338,12 +353,14 @@ class _Goals(NamedTuple):
         options: Poses ``(k, 7)`` of the object; None: there is no other.
         floor: Height in metres of the object's middle once it is put down from there; None where it is not.
         supports: Names of what it then touches.
+        aside: Other poses ``(m, 7)`` where none of these will do; None: there are none.
     """
 
     first: Array
     options: Array | None
     floor: float | None
     supports: frozenset[str]
+    aside: Array | None = None
 
 
 class _Proposed(NamedTuple):
@@ -374,11 +391,12 @@ def _found(
     few = len(view.arm) < FULL
     leaning = None if few else _leaning(view, target, goals)
 
-    def find(room: tuple[float, float, float, float, float]) -> tuple[list[Array], Route | None]:
-        closer, share, down, above, leans = room
+    grip = poses.relative(view.objects[target], view.tool)
+
+    def find(room: tuple[_Goals, float, float, float, float, float]) -> tuple[list[Array], Route | None]:
+        ends, closer, share, down, above, leans = room
         pace = Pace(share * speed)
         pace = pace._replace(acceleration=share**2 * pace.acceleration)
-        ends = goals if leans <= LEANS or leaning is None else leaning
         way = _Way(view, target, ends, pace, closer, down, above, leans)
         straight = way.straight(proposed)
         if straight is not None and proposed.via and share == 1.0:
@@ -386,8 +404,15 @@ def _found(
         rounded = None if straight is None else way.rounded(straight)
         return [view.tool, ends.first], way.searched() if rounded is None else rounded
 
-    slanted = SLANTED if few else TIPPING if leaning is not None else ()
-    return with_room([*((*room, LEANS) for room in ROOMS), *((*room, SET_DOWN) for room in slanted)], find)
+    tried = [(goals, *room, LEANS) for room in ROOMS]
+    if goals.aside is not None and len(goals.aside):
+        aside = goals._replace(first=poses.multiply(goals.aside[0], grip), options=goals.aside)
+        tried += [(aside, *room, LEANS) for room in BESIDE]
+    if few:
+        tried += [(goals, *room, SET_DOWN) for room in SLANTED]
+    elif leaning is not None:
+        tried += [(leaning, *room, SET_DOWN) for room in TIPPING]
+    return with_room(tried, find)
 
 
 def _leaning(view: WorldView, target: str, goals: _Goals) -> _Goals | None:

@@ -20,7 +20,7 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes import grasp_features
 from bt_tasksim.concept_nodes.closer import with_room
 from bt_tasksim.concept_nodes.grasp_candidates import Candidates, candidates, narrowest_grip
-from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, rooms
+from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, goes_aside, rooms
 from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, CLOSE, EAGER, HASTE, SCALE
 from bt_tasksim.concept_nodes.grasp_firmness import SLANTED
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
@@ -336,10 +336,10 @@ class Grasp(ConceptModel[GraspMemory]):
     def _choice(self, view: WorldView, asked: _Asked, later: Sequence[Any]) -> Choice:
         """The grasp in one world, see `_chosen`."""
 
-        def find(room: tuple[float, bool]) -> Choice:
-            closer, firmly = room
+        def find(room: tuple[float, bool, bool]) -> Choice:
+            closer, firmly, aside = room
             pace = Pace(self.speed)
-            chooser = Chooser(view, self.target, self.standoff, pace, later, closer, firmly)
+            chooser = Chooser(view, self.target, self.standoff, pace, later, closer, firmly, aside)
             usual = chooser.usual(asked.usual, asked.way)
             if usual is not None and not asked.failed:
                 return usual
@@ -348,7 +348,7 @@ class Grasp(ConceptModel[GraspMemory]):
             others = others.keeping(~others.poor) if swings else others
             return chooser.other(self._as_given(others, view), asked.failed, usual)
 
-        return with_room(rooms(view.robot), find)
+        return with_room(rooms(view.robot, goes_aside(view, self.target, later)), find)
 
     def _as_given(self, others: Candidates, view: WorldView) -> Candidates:
         """Those that have the approach and the closing axis that the author gave, if any."""

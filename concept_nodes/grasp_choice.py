@@ -123,6 +123,7 @@ class Chooser:
         later: The concepts that come after the grasp.
         closer: How much closer than usual what follows may come to things.
         firmly: Grasps that the fingers would hardly hold do not count.
+        aside: It may be put down a little aside of where it should stand, see `Aim.aside`.
     """
 
     def __init__(
@@ -134,6 +135,7 @@ class Chooser:
         later: Sequence[Any],
         closer: float,
         firmly: bool = False,
+        aside: bool = False,
     ) -> None:
         self._view, self._target, self._standoff, self._pace = view, target, standoff, pace
         self._firmly, self._loses = firmly, loses(view.robot)
@@ -142,7 +144,7 @@ class Chooser:
         self._openings: dict[float, Opening] = {}
         if close:
             self._pace = pace = Pace(SLOWER * pace.speed, acceleration=SLOWER**2 * pace.acceleration)
-        self._aims = _aims(view, target, later, closer)
+        self._aims = _aims(view, target, later, closer, aside)
         self._why: Counter[str] = Counter()
         self._gently = pace._replace(acceleration=GENTLE)
 
@@ -375,13 +377,26 @@ class Chooser:
         return False
 
 
-def rooms(robot: RobotDescription) -> list[tuple[float, bool]]:
-    """What is tried one after the other: how much closer than usual one may come to things, and only firmly.
+def rooms(robot: RobotDescription, aside: bool = False) -> list[tuple[float, bool, bool]]:
+    """What is tried one after the other: how much closer than usual, only firmly, and aside.
 
     What a jaw that swings or a hand of many fingers holds poorly it loses, so it rather goes closely past
-    things. A gripper of two fingers holds at every grip, and rather keeps room.
+    things, or puts them down a little aside of where they should stand. A gripper of two fingers holds at
+    every grip, and rather keeps room.
+
+    Args:
+        robot: The robot.
+        aside: Things may be put down a little aside, see `goes_aside`.
     """
-    return [(closer, firmly) for firmly in ((True, False) if loses(robot) else (False,)) for closer in ROOMS]
+    exactly = [(closer, False) for closer in ROOMS]
+    tried = [*exactly, (ROOMS[-1], True)] if aside else exactly
+    firmly = (True, False) if loses(robot) else (False,)
+    return [(closer, firm, beside) for firm in firmly for closer, beside in tried]
+
+
+def goes_aside(view: WorldView, target: str, later: Sequence[Any]) -> bool:
+    """Whether a target may be put down a little aside of where it should stand, see `Aim.aside`."""
+    return any(aim.aside is not None and len(aim.aside) > 0 for aim in _aims_of(view, target, later))
 
 
 def loses(robot: RobotDescription) -> bool:
@@ -392,8 +407,9 @@ def loses(robot: RobotDescription) -> bool:
 class _Served:
     """An aim that a grasp has to serve."""
 
-    def __init__(self, view: WorldView, target: str, aim: Aim, closer: float) -> None:
+    def __init__(self, view: WorldView, target: str, aim: Aim, closer: float, aside: bool) -> None:
         self._view, self._target, self._aim = view, target, aim
+        self._poses = aim.aside if aside and aim.aside is not None and len(aim.aside) else aim.poses
         self._things = view.things([target], closer=closer)
         self._now = view.objects[target]
         self._hands: dict[float, HandCollisions] = {}
@@ -437,21 +453,25 @@ class _Served:
         alone = Held(self._target, STILL, pieces_of(view.model(self._target)))
         leave = Leave(hand={thing.name for thing in self._things}, held=self._aim.supports)
         object_ = HandCollisions(bodies_of(robot), robot.hand_open, self._things, alone, leave)
-        return np.array([pose for pose in self._aim.poses if object_.free(pose)]).reshape(-1, 7)
+        return np.array([pose for pose in self._poses if object_.free(pose)]).reshape(-1, 7)
 
 
-def _aims(view: WorldView, target: str, later: Sequence[Any], closer: float) -> list[_Served]:
+def _aims(view: WorldView, target: str, later: Sequence[Any], closer: float, aside: bool) -> list[_Served]:
     """What is done with the target until it is let go, the last thing first: it is the hardest."""
-    found: list[_Served] = []
+    found = [_Served(view, target, aim, closer, aside) for aim in _aims_of(view, target, later)]
+    return found[::-1]
+
+
+def _aims_of(view: WorldView, target: str, later: Sequence[Any]) -> Iterator[Aim]:
+    """What is done with the target until it is let go."""
     for model in later:
         if getattr(model, "actor", None) != target:
             continue
         aim = model.aim(view)
         if aim is not None:
-            found.insert(0, _Served(view, target, aim, closer))
+            yield aim
         if HOLDING in model.ends:
             break
-    return found
 
 
 def _straight(way: Sequence[Array], coming: WayFinder, at: WayFinder) -> tuple[Array, Array] | None:

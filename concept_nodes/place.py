@@ -32,7 +32,13 @@ from bt_tasksim.concept_nodes.closer import DROPPED, PUT_DOWN, TOUCHING, with_ro
 from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
-from bt_tasksim.concept_nodes.standing import nearest_first, standing_options, supports_of, tipped
+from bt_tasksim.concept_nodes.standing import (
+    aside_options,
+    nearest_first,
+    standing_options,
+    supports_of,
+    tipped,
+)
 from bt_tasksim.concept_nodes.surface import (
     NEAR,
     apart,
@@ -96,6 +102,9 @@ OTHERS = 8
 SLOWLY, GENTLY = 0.02, 0.4
 """Metres above where the object should stand below which it goes slower, and the least share of the path's
 speed: what meets its support at 80 mm/s in the hand of a stiff arm strains the wrist with 60 to 80 N."""
+UNSURE = 0.005
+"""Metres by which something may stand higher than it is seen to: twice the error of a good estimate. An arm
+near its base, which is stiff, goes as slowly as it can from there on."""
 FELT = 2
 """Ticks in a row for which the support must be felt."""
 
@@ -269,7 +278,8 @@ class Place(ConceptModel[PlaceMemory]):
     def _turned(self, view: WorldView) -> Array:
         """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first.
 
-        Those last in which it leans there; an arm of few joints leans it by itself.
+        After them those a little aside of there, and last those in which it leans there; an arm of few joints
+        leans it by itself.
         """
         here = self.on in view.world.places or self.on in view.objects
         if self.on is None or not here or self.anywhere or self.distance is not None:
@@ -278,7 +288,9 @@ class Place(ConceptModel[PlaceMemory]):
         grip = poses.relative(now, view.tool)
         options = nearest_first(standing_options(view, self.target, self.on), now[3:])
         leaning = tipped(options[:1], grip) if len(view.arm) >= FULL else options[:0]
-        tried = np.concatenate([options[1 : 1 + OTHERS], leaning])
+        aside = aside_options(view, self.on, options[:1])
+        nearest = np.argsort(np.linalg.norm(aside[:, :2] - now[:2], axis=-1), kind="stable")
+        tried = np.concatenate([options[1 : 1 + OTHERS], aside[nearest], leaning])
         return poses.multiply(tried, grip[None]) + self.overshoot * self._along
 
     def _down(self, view: WorldView, goal: Array) -> Route:
@@ -347,7 +359,8 @@ class Place(ConceptModel[PlaceMemory]):
         if self.on is not None and not self.anywhere:
             options = standing_options(view, self.target, self.on)
             options = nearest_first(options, view.objects[self.target][3:])
-            return Aim(options, f"be put down on {self.on}", supports_of(view, self.on))
+            aside = aside_options(view, self.on, options)
+            return Aim(options, f"be put down on {self.on}", supports_of(view, self.on), aside=aside)
         if self.on is not None:
             spots = spots_on(view, self.target, self.on)
         else:
@@ -433,8 +446,9 @@ class Place(ConceptModel[PlaceMemory]):
 
     def _progress(self, seen: Seen, memory: PlaceMemory) -> Array:
         xp = array_namespace(seen.tool)
-        gently = GENTLY * gentler(seen.tool)
-        pace = xp.minimum(xp.maximum(self._above(seen) / SLOWLY, gently), xp.ones_like(gently))
+        share = gentler(seen.tool)
+        gently, unsure = GENTLY * share, UNSURE * (1.0 - share)
+        pace = xp.minimum(xp.maximum((self._above(seen) - unsure) / SLOWLY, gently), xp.ones_like(gently))
         pace = xp.where(memory.progress >= memory.path.duration, xp.ones_like(pace), pace)
         on = memory.progress + seen.world.control_period * pace
         return xp.where(self._supported(seen, memory), memory.progress, on)

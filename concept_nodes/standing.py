@@ -19,6 +19,10 @@ TIPPED = (0.07, 0.14)
 """Radians by which something may lean that is put down where it cannot stand upright at once: what has turned
 in a hand of fingers that swing. It stands up when it is let go. Less than `place.LEANING`."""
 
+ASIDE = 0.01
+"""Metres beside where something should stand at which it is put down where it cannot be put there itself:
+half of what `AtPose` tolerates; the rest is for errors of estimates and of the hand."""
+
 
 def standing_options(view: WorldView, target: str, reference: str, hover: float = 0.0) -> Array:
     """Poses ``(k, 7)`` of an object that stands over a place or on another object.
@@ -40,6 +44,23 @@ def standing_options(view: WorldView, target: str, reference: str, hover: float 
     turned = poses.quat_multiply(frame[None, 3:], turns)
     many, few = len(offsets), len(turned)
     return np.concatenate([np.tile(positions, (few, 1)), np.repeat(turned, many, axis=0)], axis=-1)
+
+
+def aside_options(view: WorldView, reference: str, options: Array) -> Array:
+    """Poses ``(m, 7)`` `ASIDE` of some ``(k, 7)`` over a place: nearer to the arm's base, farther, across.
+
+    None is over another object, whose top may be small, or in a container; nor beyond the place itself.
+    """
+    place = view.world.places.get(reference)
+    if place is None or place.kind == "bin" or not len(options):
+        return np.zeros((0, 7))
+    frame = np.asarray(place.pose)
+    towards = frame[:2] / max(float(np.linalg.norm(frame[:2])), 1e-9)
+    steps = ASIDE * np.array([-towards, towards, (-towards[1], towards[0]), (towards[1], -towards[0])])
+    moved = np.concatenate([options + np.array([*step, 0.0, 0.0, 0.0, 0.0, 0.0]) for step in steps])
+    there = abs(poses.localise(frame, moved[:, :3])[:, :2] - np.asarray(place.centre))
+    found: Array = moved[(there <= np.asarray(place.extent) / 2).all(axis=-1)]
+    return found
 
 
 def emptiest(view: WorldView, target: str, container: str) -> Array:

@@ -15,9 +15,11 @@ class Aim(NamedTuple):
         words: What is done there, as in "be put down on the shelf".
         supports: Names of what the target touches there.
         on_the_way: It is only passed there, so an arm of few joints may lean it.
+        aside: Other ones ``(m, 7)`` that will do where none of these is possible.
     """
 
     poses: Array
     words: str
     supports: frozenset[str] = frozenset()
     on_the_way: bool = False
+    aside: Array | None = None

@@ -1,6 +1,7 @@
 """Bring: each world as alone, where it ends, which way it takes, and what it says when it cannot."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Bring, Place
 from bt_tasksim.concept_nodes.bring import _Goals, standing_pose
 from bt_tasksim.concept_nodes.holding import NOT_HELD
+from bt_tasksim.concept_nodes.standing import ASIDE
 from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
@@ -92,6 +94,32 @@ def test_how_far_it_goes_down_follows_from_where_the_object_is_in_the_hand(toy, 
     status = stage.tick()
     assert (status == Status.RUNNING) == fits, leaf.feedback_message
     assert fits or (leaf.outcome.is_a(NO_WAY) and "ribs" in leaf.feedback_message)
+
+
+@pytest.mark.parametrize("overlap", [-0.01, 0.004])
+def test_what_cannot_stand_exactly_there_is_put_down_a_little_aside(toy, overlap):
+    """A kerb stands some millimetres into the place of a cup, on the side away from the arm."""
+    bring, place = Bring("cup", to="goal"), Place("cup", on="goal")
+    stage = toy(sequence("put down", bring, place))
+    model = stage.world.model
+    goal, cup = np.asarray(model.place("goal").pose), model.object("cup").extent
+    away = goal[:2] / np.linalg.norm(goal[:2])
+    middle = goal[:2] + away * (cup[0] / 2 - overlap + 0.01)
+    kerb = poses.pose([*middle, goal[2] + 0.01], poses.yaw(math.atan2(away[1], away[0])))
+    obstacles = (*model.obstacles, Obstacle(kerb, (0.02, 0.1, 0.02), "kerb"))
+    stage.context.begin([dataclasses.replace(model, obstacles=obstacles)])
+    stage.world.hold("cup")
+    stage.look()
+    assert stage.tick() == Status.RUNNING, bring.feedback_message
+    brought = bring.memory.path.table[0, -1]
+    stage.world.put(tool_pose=brought)
+    stage.world.bend()
+    stage.world.hold("cup")
+    stage.look()
+    put_down = place.model.begin(stage.context.seen(ONE, np.zeros(1))).path.table[0, -1]
+    for end in (brought, put_down):  # the toy holds objects at the tool's origin
+        off = float((end[:2] - goal[:2]) @ away)
+        assert off == pytest.approx(-ASIDE if overlap > 0.0 else 0.0, abs=2e-3)
 
 
 def test_via_points_are_passed_in_order(toy):

@@ -11,7 +11,7 @@ from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.concept_nodes.closer import CLOSER, ROOMS
 from bt_tasksim.concept_nodes.grasp_candidates import candidates
-from bt_tasksim.concept_nodes.grasp_choice import FARTHEST, Chooser, _straight, rooms
+from bt_tasksim.concept_nodes.grasp_choice import FARTHEST, Chooser, _straight, goes_aside, rooms
 from bt_tasksim.concept_nodes.grasp_firmness import HARDLY
 from bt_tasksim.concept_nodes.grasp_opening import Opening
 from bt_tasksim.concept_nodes.holding import HOLDING
@@ -115,6 +115,21 @@ def test_a_grasp_serves_what_follows(view):
     assert np.isfinite(chosen(view, later=[later("box", both)]).goal).all()
 
 
+def test_where_no_grasp_serves_exactly_it_may_be_put_down_a_little_aside(view):
+    now = view.objects["box"]
+    away, aside = (now + np.array([x, -0.1, 0.1, 0, 0, 0, 0]) for x in (2.0, 0.0))
+    aim = Aim(away[None], "be put down there", aside=aside[None])
+    after = [later("box", aim)]
+    assert goes_aside(view, "box", after) and not goes_aside(view, "cup", after)
+    assert not goes_aside(view, "box", [later("box", aim._replace(aside=None))])
+    tools = candidates(view, "box", DOWN, view.tool[3:])
+    exactly = Chooser(view, "box", 0.1, Pace(0.5), after, CLOSER)
+    with pytest.raises(NoWayError, match="that cannot also be put down there"):
+        exactly.other(tools)
+    chooser = Chooser(view, "box", 0.1, Pace(0.5), after, CLOSER, aside=True)
+    assert np.isfinite(chooser.other(candidates(view, "box", DOWN, view.tool[3:])).goal).all()
+
+
 def test_what_others_do_and_what_comes_after_letting_go_does_not_count(view):
     away = Aim((view.objects["box"] + np.array([2.0, 0, 0, 0, 0, 0, 0]))[None], "be put down there")
     after = [later("cup", away), later("box", None, ends=(HOLDING,)), later("box", away)]
@@ -135,16 +150,21 @@ def test_the_last_piece_of_the_usual_way_is_looked_at_in_the_posture_in_which_th
     assert asked[0] == (2, None) and asked[1][0] == 2 and np.array_equal(asked[1][1], here)
 
 
+@pytest.mark.parametrize("aside", [False, True])
 @pytest.mark.parametrize("robot", ["xarm7_ability", "so100"])
-def test_a_hand_that_loses_what_it_holds_poorly_rather_goes_closely_past_things(robot):
-    asked = rooms(load_robot(robot))
+def test_a_hand_that_loses_what_it_holds_poorly_rather_goes_closely_past_things(robot, aside):
+    asked = rooms(load_robot(robot), aside)
     firm, others = asked[: len(asked) // 2], asked[len(asked) // 2 :]
-    assert all(firmly for _, firmly in firm) and not any(firmly for _, firmly in others)
-    assert [closer for closer, _ in firm] == [closer for closer, _ in others] == list(ROOMS)
+    assert all(firmly for _, firmly, _ in firm) and not any(firmly for _, firmly, _ in others)
+    exactly = [(closer, False) for closer in ROOMS]
+    for half in (firm, others):
+        assert [(c, a) for c, _, a in half] == [*exactly, *([(ROOMS[-1], True)] if aside else [])]
 
 
 def test_a_gripper_of_two_fingers_rather_keeps_room():
-    assert rooms(load_robot("panda")) == [(closer, False) for closer in ROOMS]
+    exactly = [(closer, False, False) for closer in ROOMS]
+    assert rooms(load_robot("panda")) == exactly
+    assert rooms(load_robot("panda"), aside=True) == [*exactly, (ROOMS[-1], False, True)]
 
 
 def test_what_would_hardly_be_held_is_no_firm_grasp(view):

@@ -22,6 +22,7 @@ from bt_tasksim.concept_nodes.place import (
     NOT_BESIDE,
     NOT_THERE,
     SLOWLY,
+    UNSURE,
 )
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
@@ -132,7 +133,7 @@ def test_what_leans_has_not_been_put_down(toy, share):
 
 
 @pytest.mark.parametrize(
-    ("above", "share"), [(0.1, 1.0), (SLOWLY, 1.0), (0.75 * SLOWLY, 0.75), (0.0, 0.0), (-0.005, 0.0)]
+    ("above", "share"), [(0.1, 1.0), (SLOWLY + UNSURE, 1.0), (0.75 * SLOWLY, 0.75), (0.0, 0.0), (-0.005, 0.0)]
 )
 def test_near_its_support_it_goes_slower(toy, above, share):
     stage = held(toy, Place("cup", on="goal"))
@@ -145,8 +146,9 @@ def test_near_its_support_it_goes_slower(toy, above, share):
     stage.look()
     seen = stage.context.seen(ONE, np.zeros(1))
     on = model.advance(None, seen, memory).progress - memory.progress
-    least = GENTLY * float(gentler(seen.tool)[0])
-    assert on[0] == pytest.approx(max(share, least) * 0.05, rel=1e-6)
+    gentle = float(gentler(seen.tool)[0])
+    sure = share - UNSURE * (1.0 - gentle) / SLOWLY if share < 1.0 else 1.0
+    assert on[0] == pytest.approx(max(sure, GENTLY * gentle) * 0.05, rel=1e-6)
 
 
 def test_where_it_cannot_go_straight_a_way_is_searched_for(toy):
@@ -274,6 +276,20 @@ def test_near_the_base_of_the_arm_it_goes_slower_still(toy, far, share):
     memory = model.begin(seen)
     objects, tool = seen.observation.objects[0].copy(), seen.tool[0].copy()
     objects[0, 2], tool[:2] = standing_height(stage), (far, 0.0)
+    stage.world.put(objects=objects, tool_pose=tool)
+    stage.look()
+    on = model.advance(None, stage.context.seen(ONE, np.zeros(1)), memory).progress - memory.progress
+    assert on[0] == pytest.approx(share * 0.05, rel=1e-6)
+
+
+@pytest.mark.parametrize(("far", "share"), [(FAR, 0.5), (0.2 * FAR, 0.26)])
+def test_a_stiff_arm_goes_slowly_before_what_may_stand_higher_than_it_is_seen_to(toy, far, share):
+    stage = held(toy, Place("cup", on="goal"))
+    stage.tick(3)
+    seen, model = stage.context.seen(ONE, np.zeros(1)), stage.tree.model
+    memory = model.begin(seen)
+    objects, tool = seen.observation.objects[0].copy(), seen.tool[0].copy()
+    objects[0, 2], tool[:2] = standing_height(stage) + 0.5 * SLOWLY, (far, 0.0)
     stage.world.put(objects=objects, tool_pose=tool)
     stage.look()
     on = model.advance(None, stage.context.seen(ONE, np.zeros(1)), memory).progress - memory.progress

@@ -8,8 +8,10 @@ import pytest
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.concept_nodes.standing import (
+    ASIDE,
     HEADINGS,
     TIPPED,
+    aside_options,
     emptiest,
     headings,
     nearest_first,
@@ -46,6 +48,23 @@ def test_options_are_upright_over_the_place_at_the_objects_height(view, name, ho
 def test_what_is_round_may_have_any_heading_and_a_box_those_of_its_symmetry(view):
     assert len(standing_options(view, "cup", "goal")) == HEADINGS
     assert len(standing_options(view, "box", "goal")) == view.model("box").symmetry
+
+
+def test_a_little_aside_it_stands_nearer_to_the_arm_farther_or_to_either_side(view):
+    options = standing_options(view, "box", "goal", 0.05)
+    found, place = aside_options(view, "goal", options), view.world.place("goal")
+    assert len(found) == 4 * len(options) and np.allclose(found[:, 2], options[0, 2])
+    moved = found[:, :2] - options[0, :2]
+    assert np.allclose(np.linalg.norm(moved, axis=-1), ASIDE)
+    far = np.linalg.norm(found[:, :2], axis=-1) - np.linalg.norm(options[0, :2])
+    assert far.min() == pytest.approx(-ASIDE) and far.max() == pytest.approx(ASIDE)
+    assert {tuple(r) for r in np.round(found[:, 3:], 6)} == {tuple(r) for r in np.round(options[:, 3:], 6)}
+    small = dataclasses.replace(place, extent=(1.5 * ASIDE, 1.5 * ASIDE))
+    container = dataclasses.replace(place, kind="bin")
+    for other in (small, container):
+        world = dataclasses.replace(view.world, places={**view.world.places, "goal": other})
+        assert len(aside_options(view._replace(world=world), "goal", options)) == 0
+    assert len(aside_options(view, "cup", options)) == 0, "what it stands on may be no larger"
 
 
 def test_on_another_object_it_stands_on_its_top(view):

@@ -101,6 +101,27 @@ def test_steps_are_shorter_as_long_as_something_light_is_held(mass, shorter):
     assert len(steps_of(runner, 0.0)) == 5, "it has been let go"
 
 
+@pytest.mark.parametrize(("mass", "closure"), [(0.005, 1.0), (0.2, 0.0)])
+def test_the_wrist_feels_the_mean_of_a_usual_step_however_finely_it_is_stepped(mass, closure):
+    runner = holding("box", mass)
+    for _ in range(10):
+        runner.pipeline.step(Command())
+    simulated, felt = runner.pipeline.physics.simulated, []
+    world, system = simulated.world, simulated.world.system
+
+    def step():
+        system.step()
+        felt.append((world.scene.timestep, simulated.robot.articulation.get_link_incoming_joint_forces()))
+
+    world.system = SimpleNamespace(step=step, get_contacts=system.get_contacts)
+    runner.pipeline.step(Command(hand=np.array([closure])))
+    world.system = system
+    last = round(0.01 / felt[-1][0])
+    mean = np.mean([forces for _, forces in felt[-last:]], axis=0)
+    assert last > 1 and not np.allclose(mean, felt[-1][1], atol=1e-6)
+    assert np.allclose(simulated._readings.incoming[0], mean, atol=1e-6)
+
+
 @pytest.mark.parametrize("height", [0.1, 0.25, 0.45])
 def test_what_falls_flat_lands_no_deeper_than_two_millimetres_however_fast(height):
     world = Still(lifted(scene("box", 0.18).sample(1), height))
