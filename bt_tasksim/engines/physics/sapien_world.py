@@ -40,6 +40,7 @@ class World:
             of `bt_tasksim.core.world.Hidden`, of its fingertip, or -1.
         objects: The objects' bodies.
         inertia: Frame of the principal axes (a pose, seven numbers) and principal moments (kg m^2) by object.
+        radius: Metres from the middle of an object to its farthest point, at most, by object.
     """
 
     scene: sapien.Scene
@@ -47,6 +48,7 @@ class World:
     bodies: dict[physx.PhysxRigidBaseComponent, tuple[str, int]] = field(default_factory=dict)
     objects: list[physx.PhysxRigidDynamicComponent] = field(default_factory=list)
     inertia: list[tuple[list[float], list[float]]] = field(default_factory=list)
+    radius: list[float] = field(default_factory=list)
     _materials: dict[float, physx.PhysxMaterial] = field(default_factory=dict)
     _entities: list[sapien.Entity] = field(default_factory=list)  # SAPIEN does not keep them alive
 
@@ -135,6 +137,7 @@ def _add_objects(world: World, configuration: ActorConfiguration, iterations: in
         world.objects.append(body)
         axes = [0.0, 0.0, 0.0, *np.asarray(geometry.mass.pose, float)[3:].tolist()]
         world.inertia.append((axes, inertia))
+        world.radius.append(math.hypot(*geometry.extent) / 2.0)
 
 
 def sapien_pose(pose: Iterable[float]) -> sapien.Pose:
