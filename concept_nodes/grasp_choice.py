@@ -165,12 +165,10 @@ class Chooser:
             return None
         # It is as deep as the robot's file says; others, from wherever they come, stay clear.
         at = hand.deep
-        begins = self._serves(goal, hand, at)
-        if begins is None:
+        if not self._fits(goal, hand):
             return None
-        straight = begins.standoff == self._standoff and not self._slide
-        lines = _straight([*way, goal], hand.coming, at) if straight else None
-        if lines is not None:
+        lines = None if self._slide else _straight([*way, goal], hand.coming, at)
+        if lines is not None and self._has_reach(way[-1], hand.coming, lines[0][-1]):
             # An arm that is hurried through a turn of its elbow falls behind, and overshoots the grasp.
             hurried = any(hurries(at.arm, line, self._pace) for line in lines)
             coming, on = lines
@@ -178,8 +176,9 @@ class Chooser:
                 (followed(at.arm, coming, self._pace), followed(at.arm, on, self._gently)) if hurried else ()
             )
             tight = self._loses or hand.tight(goal)
-            return Choice(goal, begins.standoff, routes, tight, usual=True, closure=hand.closure)
-        found = self._come(goal, begins, hand, at)
+            return Choice(goal, self._standoff, routes, tight, usual=True, closure=hand.closure)
+        begins = self._begins(goal, hand, at)
+        found = None if begins is None else self._come(goal, begins, hand, at)
         return None if found is None else found._replace(usual=True)
 
     def _opening(self, width: float) -> Opening:
@@ -298,10 +297,18 @@ class Chooser:
 
     def _serves(self, goal: Array, hand: Opening, at: WayFinder) -> _Begins | None:
         """Where the approach to a grasp may begin; None where the grasp is no good."""
+        return self._begins(goal, hand, at) if self._fits(goal, hand) else None
+
+    def _fits(self, goal: Array, hand: Opening) -> bool:
+        """Whether a grasp serves all that comes after it."""
         closed = poses.shifted(goal, self._slide * poses.to_matrix(goal[3:])[:, 1])
         for aim in self._aims:
             if not aim.by(closed, hand.hand, self._turns):
-                return self._no(f"that cannot also {aim.words}") or None
+                return self._no(f"that cannot also {aim.words}")
+        return True
+
+    def _begins(self, goal: Array, hand: Opening, at: WayFinder) -> _Begins | None:
+        """Where the straight approach to a grasp may begin; None where there is no such place."""
         why = ""
         for share in STANDOFFS:
             begins = self._beginnings(goal, hand.coming, at, share * self._standoff)
@@ -321,12 +328,11 @@ class Chooser:
     def _beginnings(self, goal: Array, coming: WayFinder, at: WayFinder, standoff: float) -> _Begins | str:
         """Postures from which the hand comes straight on; or why there are none, in words."""
         back = poses.shifted(goal, -standoff * poses.z_axis(goal[3:]))
-        farther = poses.shifted(back, -REACH * poses.z_axis(goal[3:]))
         starts: list[Array] = []
         for leans in coming.leanings:
             for q in () if starts else itertools.islice(coming.postures(back, leans), ENOUGH):
                 straight = at.straight([back, goal], start=q) is not None
-                if straight and coming.arm.joints(farther, q, leans=leans) is not None:
+                if straight and self._has_reach(back, coming, q, leans):
                     starts.append(q)
         if starts:
             return _Begins(standoff, np.array(starts))
@@ -337,6 +343,12 @@ class Chooser:
             if not end.free[0]:
                 return f"where the hand would touch {_other(finder.collisions.touches(end.joints[0]))}{when}"
         return "to which the hand cannot come straight"
+
+    @staticmethod
+    def _has_reach(back: Array, coming: WayFinder, start: Array, leans: float = LEANS) -> bool:
+        """Whether the arm comes farther than to a tool pose ``(7,)``, where its joints are ``start``."""
+        farther = poses.shifted(back, -REACH * poses.z_axis(back[3:]))
+        return coming.arm.joints(farther, start, leans=leans) is not None
 
     def _come(self, goal: Array, begins: _Begins, hand: Opening, at: WayFinder) -> Choice | None:
         back = poses.shifted(goal, -begins.standoff * poses.z_axis(goal[3:]))
