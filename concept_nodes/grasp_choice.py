@@ -401,14 +401,40 @@ def loses(robot: RobotDescription) -> bool:
     return standing_side(robot) is not None or len(robot.tips) > TWO
 
 
+class _Around:
+    """What stands around where the target is brought, for all that a grasp has to serve."""
+
+    def __init__(self, view: WorldView, target: str, closer: float) -> None:
+        self.view, self.target = view, target
+        self.things, self.now = view.things([target], closer=closer), view.objects[target]
+        self._hands: dict[float, HandCollisions] = {}
+        self._asked: tuple[bytes, float] | None = None
+        self._finders: dict[frozenset[str], WayFinder] = {}
+
+    def alone(self, hand: Array) -> HandCollisions:
+        """The open hand where the object is to be, without the object, which is looked at by itself."""
+        closure = float(self.view.robot.closure(hand))
+        if closure not in self._hands:
+            self._hands[closure] = HandCollisions(bodies_of(self.view.robot), hand, self.things)
+        return self._hands[closure]
+
+    def finder(self, goal: Array, hand: Array, supports: frozenset[str]) -> WayFinder:
+        """Ways with the target as a hand holds it that took it at a tool pose ``(7,)``."""
+        asked = goal.tobytes(), float(self.view.robot.closure(hand))
+        if asked != self._asked:
+            self._asked, self._finders = asked, {}
+        if supports not in self._finders:
+            view, grip = self.view, poses.relative(goal, self.now)
+            held, leave = view.held(self.target, grip), Leave(held=supports)
+            self._finders[supports] = WayFinder(view.robot, view.arm, hand, self.things, held, leave)
+        return self._finders[supports]
+
+
 class _Served:
     """An aim that a grasp has to serve."""
 
-    def __init__(self, view: WorldView, target: str, aim: Aim, closer: float) -> None:
-        self._view, self._target, self._aim = view, target, aim
-        self._things = view.things([target], closer=closer)
-        self._now = view.objects[target]
-        self._hands: dict[float, HandCollisions] = {}
+    def __init__(self, around: _Around, aim: Aim) -> None:
+        self._around, self._aim = around, aim
         self.words = aim.words
 
     def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
@@ -416,14 +442,13 @@ class _Served:
 
         The hand's joints ``(n_hand,)`` are those with which it comes: so it is going to be when it lets go.
         """
-        view, alone = self._view, self._alone(hand)
-        tools = poses.multiply(self._possible, poses.relative(self._now, goal)[None])
+        around = self._around
+        alone = around.alone(hand)
+        tools = poses.multiply(self._possible, poses.relative(around.now, goal)[None])
         tools = np.array([tool for tool in tools if alone.free(tool)]).reshape(-1, 7)
         if not len(tools):
             return False
-        held = view.held(self._target, poses.relative(goal, self._now))
-        leave = Leave(held=self._aim.supports)
-        finder = WayFinder(view.robot, view.arm, hand, self._things, held, leave)
+        finder = around.finder(goal, hand, frozenset(self._aim.supports))
         leans = finder.leanings[-1] if self._aim.on_the_way else LEANS
 
         def reached(tool: Array) -> bool:
@@ -435,32 +460,27 @@ class _Served:
 
         return any(reached(tool) and turned(tool) for tool in tools)
 
-    def _alone(self, hand: Array) -> HandCollisions:
-        """The open hand where the object is to be, without the object, which is looked at by itself."""
-        closure = float(self._view.robot.closure(hand))
-        if closure not in self._hands:
-            self._hands[closure] = HandCollisions(bodies_of(self._view.robot), hand, self._things)
-        return self._hands[closure]
-
     @cached_property
     def _possible(self) -> Array:
         """Poses ``(k, 7)`` of the aim in which the object alone touches nothing, whoever holds it."""
-        view, robot = self._view, self._view.robot
-        alone = Held(self._target, STILL, pieces_of(view.model(self._target)))
-        leave = Leave(hand={thing.name for thing in self._things}, held=self._aim.supports)
-        object_ = HandCollisions(bodies_of(robot), robot.hand_open, self._things, alone, leave)
+        view, things, supports = self._around.view, self._around.things, self._aim.supports
+        robot, target = view.robot, self._around.target
+        alone = Held(target, STILL, pieces_of(view.model(target)))
+        leave = Leave(hand={thing.name for thing in things}, held=supports)
+        object_ = HandCollisions(bodies_of(robot), robot.hand_open, things, alone, leave)
         return np.array([pose for pose in self._aim.poses if object_.free(pose)]).reshape(-1, 7)
 
 
 def _aims(view: WorldView, target: str, later: Sequence[Any], closer: float) -> list[_Served]:
     """What is done with the target until it is let go, the last thing first: it is the hardest."""
     found: list[_Served] = []
+    around = _Around(view, target, closer)
     for model in later:
         if getattr(model, "actor", None) != target:
             continue
         aim = model.aim(view)
         if aim is not None:
-            found.insert(0, _Served(view, target, aim, closer))
+            found.insert(0, _Served(around, aim))
         if HOLDING in model.ends:
             break
     return found

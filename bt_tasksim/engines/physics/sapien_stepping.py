@@ -9,7 +9,7 @@ from bt_tasksim.engines.physics.layout import body_column
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import Robot
-from bt_tasksim.engines.physics.sapien_world import DAMPING, LIGHT, MOST, PARTING, World, floats
+from bt_tasksim.engines.physics.sapien_world import DAMPING, PARTING, World, floats
 from bt_tasksim.engines.physics.threaded import FALLING
 from bt_tasksim.scene.configuration import ActorConfiguration
 
@@ -26,11 +26,12 @@ CLOSING = 2
 """How many times shorter they are while the hand closes fast, and `WATCHED` periods on: the fingers of the
 Ability hand, each a kilogram with its motor's inertia, meet on the stick of a ladle and sink in by 2.8 mm at
 100 Hz, and by 1.0 at 200. Not for as long as something is held: twice the steps would cost twice the time."""
-LIGHTEST = 4
-"""The same, at most, where something is so light that `MOST` iterations of the solver are too few, while the
-hand closes, however slowly, and as long as it holds something. At 100 Hz a jaw of the SO-100 that presses
-with 30 N on a cup of 12 g sinks in by 2 mm as this leaves the table; and of 40 tasks with things of 10 to
-50 g 37 are done with shorter steps at closing, and 33 with up to 250 iterations instead."""
+SLIGHT, LIGHTEST = 0.05, 4
+"""Kilograms below which they are shorter by as much as something is lighter, and by how much at most, while
+the hand closes, however slowly, and as long as it holds something: the solver alone does not do enough there.
+At 100 Hz a jaw of the SO-100 that presses with 30 N on a cup of 12 g sinks in by 2 mm as this leaves the
+table; and of 40 tasks with things of 10 to 50 g 37 are done with shorter steps at closing, and 33 with up to
+250 iterations instead."""
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
 WATCHED = 4
@@ -71,7 +72,7 @@ class SapienWorld:
         self._falling = self._rolling = self._asleep = False
         self._watch, self._letting_go, self._closing, self._shorter = WATCHED, 0, 0, 1
         lightest = min((actor.mass for actor in configuration.objects), default=math.inf)
-        self._light = min(math.ceil(LIGHT / lightest / MOST), LIGHTEST) if configuration.objects else 1
+        self._light = min(math.ceil(SLIGHT / lightest), LIGHTEST) if configuration.objects else 1
         self._reader = ContactReader(world, n_tips)
         self._touch = self._reader.nothing
         self._readings, self._row = readings, row
