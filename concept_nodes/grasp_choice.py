@@ -167,12 +167,10 @@ class Chooser:
             return None
         # It is as deep as the robot's file says; others, from wherever they come, stay clear.
         at = hand.deep
-        begins = self._serves(goal, hand, at)
-        if begins is None:
+        if not self._fits(goal, hand):
             return None
-        straight = begins.standoff == self._standoff and not self._slide
-        lines = _straight([*way, goal], hand.coming, at) if straight else None
-        if lines is not None:
+        lines = None if self._slide else _straight([*way, goal], hand.coming, at)
+        if lines is not None and self._has_reach(way[-1], hand.coming, lines[0][-1]):
             # An arm that is hurried through a turn of its elbow falls behind, and overshoots the grasp.
             hurried = any(hurries(at.arm, line, self._pace) for line in lines)
             coming, on = lines
@@ -180,8 +178,9 @@ class Chooser:
                 (followed(at.arm, coming, self._pace), followed(at.arm, on, self._gently)) if hurried else ()
             )
             tight = self._loses or hand.tight(goal)
-            return Choice(goal, begins.standoff, routes, tight, usual=True, closure=hand.closure)
-        found = self._come(goal, begins, hand, at)
+            return Choice(goal, self._standoff, routes, tight, usual=True, closure=hand.closure)
+        begins = self._begins(goal, hand, at)
+        found = None if begins is None else self._come(goal, begins, hand, at)
         return None if found is None else found._replace(usual=True)
 
     def _opening(self, width: float) -> Opening:
@@ -300,10 +299,18 @@ class Chooser:
 
     def _serves(self, goal: Array, hand: Opening, at: WayFinder) -> _Begins | None:
         """Where the approach to a grasp may begin; None where the grasp is no good."""
+        return self._begins(goal, hand, at) if self._fits(goal, hand) else None
+
+    def _fits(self, goal: Array, hand: Opening) -> bool:
+        """Whether a grasp serves all that comes after it."""
         closed = poses.shifted(goal, self._slide * poses.to_matrix(goal[3:])[:, 1])
         for aim in self._aims:
             if not aim.by(closed, hand.hand, self._turns):
-                return self._no(f"that cannot also {aim.words}") or None
+                return self._no(f"that cannot also {aim.words}")
+        return True
+
+    def _begins(self, goal: Array, hand: Opening, at: WayFinder) -> _Begins | None:
+        """Where the straight approach to a grasp may begin; None where there is no such place."""
         why = ""
         for share in STANDOFFS:
             begins = self._beginnings(goal, hand.coming, at, share * self._standoff)
@@ -323,12 +330,11 @@ class Chooser:
     def _beginnings(self, goal: Array, coming: WayFinder, at: WayFinder, standoff: float) -> _Begins | str:
         """Postures from which the hand comes straight on; or why there are none, in words."""
         back = poses.shifted(goal, -standoff * poses.z_axis(goal[3:]))
-        farther = poses.shifted(back, -REACH * poses.z_axis(goal[3:]))
         starts: list[Array] = []
         for leans in coming.leanings:
             for q in () if starts else itertools.islice(coming.postures(back, leans), ENOUGH):
                 straight = at.straight([back, goal], start=q) is not None
-                if straight and coming.arm.joints(farther, q, leans=leans) is not None:
+                if straight and self._has_reach(back, coming, q, leans):
                     starts.append(q)
         if starts:
             return _Begins(standoff, np.array(starts))
@@ -339,6 +345,12 @@ class Chooser:
             if not end.free[0]:
                 return f"where the hand would touch {_other(finder.collisions.touches(end.joints[0]))}{when}"
         return "to which the hand cannot come straight"
+
+    @staticmethod
+    def _has_reach(back: Array, coming: WayFinder, start: Array, leans: float = LEANS) -> bool:
+        """Whether the arm comes farther than to a tool pose ``(7,)``, where its joints are ``start``."""
+        farther = poses.shifted(back, -REACH * poses.z_axis(back[3:]))
+        return coming.arm.joints(farther, start, leans=leans) is not None
 
     def _come(self, goal: Array, begins: _Begins, hand: Opening, at: WayFinder) -> Choice | None:
         back = poses.shifted(goal, -begins.standoff * poses.z_axis(goal[3:]))
@@ -404,15 +416,41 @@ def loses(robot: RobotDescription) -> bool:
     return standing_side(robot) is not None or len(robot.tips) > TWO
 
 
+class _Around:
+    """What stands around where the target is brought, for all that a grasp has to serve."""
+
+    def __init__(self, view: WorldView, target: str, closer: float) -> None:
+        self.view, self.target = view, target
+        self.things, self.now = view.things([target], closer=closer), view.objects[target]
+        self._hands: dict[float, HandCollisions] = {}
+        self._asked: tuple[bytes, float] | None = None
+        self._finders: dict[frozenset[str], WayFinder] = {}
+
+    def alone(self, hand: Array) -> HandCollisions:
+        """The open hand where the object is to be, without the object, which is looked at by itself."""
+        closure = float(self.view.robot.closure(hand))
+        if closure not in self._hands:
+            self._hands[closure] = HandCollisions(bodies_of(self.view.robot), hand, self.things)
+        return self._hands[closure]
+
+    def finder(self, goal: Array, hand: Array, supports: frozenset[str]) -> WayFinder:
+        """Ways with the target as a hand holds it that took it at a tool pose ``(7,)``."""
+        asked = goal.tobytes(), float(self.view.robot.closure(hand))
+        if asked != self._asked:
+            self._asked, self._finders = asked, {}
+        if supports not in self._finders:
+            view, grip = self.view, poses.relative(goal, self.now)
+            held, leave = view.held(self.target, grip), Leave(held=supports)
+            self._finders[supports] = WayFinder(view.robot, view.arm, hand, self.things, held, leave)
+        return self._finders[supports]
+
+
 class _Served:
     """An aim that a grasp has to serve."""
 
-    def __init__(self, view: WorldView, target: str, aim: Aim, closer: float, aside: bool) -> None:
-        self._view, self._target, self._aim = view, target, aim
+    def __init__(self, around: _Around, aim: Aim, aside: bool) -> None:
+        self._around, self._aim = around, aim
         self._poses = aim.aside if aside and aim.aside is not None and len(aim.aside) else aim.poses
-        self._things = view.things([target], closer=closer)
-        self._now = view.objects[target]
-        self._hands: dict[float, HandCollisions] = {}
         self.words = aim.words
 
     def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
@@ -420,14 +458,13 @@ class _Served:
 
         The hand's joints ``(n_hand,)`` are those with which it comes: so it is going to be when it lets go.
         """
-        view, alone = self._view, self._alone(hand)
-        tools = poses.multiply(self._possible, poses.relative(self._now, goal)[None])
+        around = self._around
+        alone = around.alone(hand)
+        tools = poses.multiply(self._possible, poses.relative(around.now, goal)[None])
         tools = np.array([tool for tool in tools if alone.free(tool)]).reshape(-1, 7)
         if not len(tools):
             return False
-        held = view.held(self._target, poses.relative(goal, self._now))
-        leave = Leave(held=self._aim.supports)
-        finder = WayFinder(view.robot, view.arm, hand, self._things, held, leave)
+        finder = around.finder(goal, hand, frozenset(self._aim.supports))
         leans = finder.leanings[-1] if self._aim.on_the_way else LEANS
 
         def reached(tool: Array) -> bool:
@@ -439,27 +476,21 @@ class _Served:
 
         return any(reached(tool) and turned(tool) for tool in tools)
 
-    def _alone(self, hand: Array) -> HandCollisions:
-        """The open hand where the object is to be, without the object, which is looked at by itself."""
-        closure = float(self._view.robot.closure(hand))
-        if closure not in self._hands:
-            self._hands[closure] = HandCollisions(bodies_of(self._view.robot), hand, self._things)
-        return self._hands[closure]
-
     @cached_property
     def _possible(self) -> Array:
         """Poses ``(k, 7)`` of the aim in which the object alone touches nothing, whoever holds it."""
-        view, robot = self._view, self._view.robot
-        alone = Held(self._target, STILL, pieces_of(view.model(self._target)))
-        leave = Leave(hand={thing.name for thing in self._things}, held=self._aim.supports)
-        object_ = HandCollisions(bodies_of(robot), robot.hand_open, self._things, alone, leave)
+        view, things, supports = self._around.view, self._around.things, self._aim.supports
+        robot, target = view.robot, self._around.target
+        alone = Held(target, STILL, pieces_of(view.model(target)))
+        leave = Leave(hand={thing.name for thing in things}, held=supports)
+        object_ = HandCollisions(bodies_of(robot), robot.hand_open, things, alone, leave)
         return np.array([pose for pose in self._poses if object_.free(pose)]).reshape(-1, 7)
 
 
 def _aims(view: WorldView, target: str, later: Sequence[Any], closer: float, aside: bool) -> list[_Served]:
     """What is done with the target until it is let go, the last thing first: it is the hardest."""
-    found = [_Served(view, target, aim, closer, aside) for aim in _aims_of(view, target, later)]
-    return found[::-1]
+    around = _Around(view, target, closer)
+    return [_Served(around, aim, aside) for aim in _aims_of(view, target, later)][::-1]
 
 
 def _aims_of(view: WorldView, target: str, later: Sequence[Any]) -> Iterator[Aim]:

@@ -173,6 +173,11 @@ def composed(a: list[float], b: list[float]) -> list[float]:
     return [a[0] + x, a[1] + y, a[2] + z, *_mul(a[3:], b[3:])]
 
 
+def turned(a: list[float], b: list[float]) -> list[float]:
+    """`quat_multiply` of two quaternions in plain floats."""
+    return _mul(a, b)
+
+
 def inverted(pose: list[float]) -> list[float]:
     """`inverse` of a pose in plain floats."""
     x, y, z, qw, qx, qy, qz = pose
@@ -184,6 +189,11 @@ def point(pose: list[float], local: Sequence[float]) -> list[float]:
     """A point given in the frame of one pose, in its parent, all in plain floats."""
     x, y, z = _rot(pose[3:], local)
     return [pose[0] + x, pose[1] + y, pose[2] + z]
+
+
+def rotated(q: list[float], v: Sequence[float]) -> list[float]:
+    """`rotate` of one vector in plain floats."""
+    return _rot(q, v)
 
 
 def rotate(q: Array, v: Array) -> Array:

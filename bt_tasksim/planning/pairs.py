@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterable, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import numpy as np
 import pinocchio as pin
 
 from bt_tasksim.core.poses import Array
@@ -44,6 +45,7 @@ class Pairs:
     def __init__(self, model: pin.Model, shapes: Any, names: Iterable[str], leave: Leave | None) -> None:
         self._model, self._shapes, self._names, self._leave = model, shapes, list(names), leave or Leave()
         self._keys = list(self._names)
+        self._compared: list[tuple[int, int]] = []
 
     def add(self, name: str, joint: int, placement: Any, shapes: Iterable[Any], key: str = "") -> range:
         """Add shapes that move with a joint; their numbers."""
@@ -87,16 +89,20 @@ class Pairs:
 
     def compare(self, pairs: Iterable[tuple[int, int]]) -> None:
         """Compare pairs of shapes, by number, unless they may touch."""
-        names, keys, left = self._names, self._keys, set(self._leave.pairs)
-        for i, k in pairs:
-            if not left or not {(names[i], names[k]), (names[i], keys[k])} & left:
-                self._shapes.addCollisionPair(pin.CollisionPair(i, k))
+        left = set(self._leave.pairs)
+        if left:
+            names, keys = self._names, self._keys
+            pairs = [(i, k) for i, k in pairs if not {(names[i], names[k]), (names[i], keys[k])} & left]
+        self._compared += pairs
 
     @cached_property
     def _work(self) -> _Work:
+        # One at a time Pinocchio adds pairs a hundred times as slowly: it looks for each among all others.
+        compared = np.zeros((self._shapes.ngeoms,) * 2, bool)
+        compared[tuple(np.sort(self._compared, axis=1).T) if self._compared else ([], [])] = True
+        self._shapes.setCollisionPairs(compared)
         found = self._shapes.createData()
-        for request in found.collisionRequests:
-            request.security_margin = _TOUCHING
+        found.setSecurityMargins(self._shapes, np.full(compared.shape, _TOUCHING))
         tree = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._model, self._shapes, found)
         return _Work(self._model.createData(), found, tree)
 
@@ -107,7 +113,7 @@ class Pairs:
         return not touched
 
     def touches(self, q: Array) -> list[Touch]:
-        """What touches for Pinocchio's ``q``, in the order in which it was added, by names for people."""
+        """What touches for Pinocchio's ``q``, by names for people, in the order in which it was added."""
         return list(dict.fromkeys((self._names[i], self._names[k]) for i, k in self._touching(q)))
 
     def keys(self, q: Array) -> list[Touch]:
@@ -118,17 +124,12 @@ class Pairs:
         data, found, _ = self._work
         pin.computeCollisions(self._model, data, self._shapes, found, q, False)
         pairs = zip(self._shapes.collisionPairs, found.collisionResults, strict=True)
-        return [(p.first, p.second) for p, result in pairs if result.isCollision()]
+        touching = {(p.first, p.second) for p, result in pairs if result.isCollision()}
+        return [pair for pair in self._compared if tuple(sorted(pair)) in touching] if touching else []
 
     def first(self, q: Array) -> Touch | None:
         """The first of what touches for Pinocchio's ``q``; None where nothing does."""
-        data, found, _ = self._work
-        if not pin.computeCollisions(self._model, data, self._shapes, found, q, True):
-            return None
-        pairs = zip(self._shapes.collisionPairs, found.collisionResults, strict=True)
-        return next(
-            (self._names[p.first], self._names[p.second]) for p, result in pairs if result.isCollision()
-        )
+        return None if self.free(q) else next(iter(self.touches(q)), None)
 
     def placement(self, joint: int) -> Any:
         """Where a joint is for the ``q`` that was asked about last."""

@@ -112,11 +112,12 @@ class WayFinder:
         def less(share: float) -> list[Thing]:
             return [_with(thing, share) if thing.known_as in near else thing for thing in self._things]
 
-        for share in LESS:
+        none = self._among(less(0.0))
+        for share in LESS if none.free(self.start) else ():  # else it is not with more room either
             found = self._among(less(share))
             if found.free(self.start):
                 return found
-        return self._left(less(0.0))
+        return self._left(less(0.0), none)
 
     @cached_property
     def _rooms(self) -> list[Collisions | _Leaving]:
@@ -128,17 +129,24 @@ class WayFinder:
     @cached_property
     def _without_margins(self) -> Collisions:
         """What must not happen between two questions either: that something is touched."""
-        return self._left([_with(thing, 0.0) for thing in self._things])
+        things = [_with(thing, 0.0) for thing in self._things]
+        return self._left(things, self._among(things))
 
-    def _left(self, things: Sequence[Thing]) -> Collisions:
-        """Collisions among things; what touches at the beginning is left, and nobody goes through it."""
-        found = self._among(things)
+    def _left(self, things: Sequence[Thing], found: Collisions) -> Collisions:
+        """Collisions among things; what touches at the beginning is left, and nobody goes through it.
+
+        Args:
+            things: The things.
+            found: Collisions among them, with nothing left.
+        """
         if found.free(self.start):
             return found
         touches = found.keys(self.start)
         near = {key for touch in touches for key in touch}
         within = [*things, *(piece for thing in things if thing.known_as in near for piece in inner(thing))]
-        return self._among(within, [*touches, *self._among(within, touches).keys(self.start)])
+        left = self._among(within, touches)
+        more = left.keys(self.start)
+        return self._among(within, [*touches, *more]) if more else left
 
     def _among(self, things: Sequence[Thing], pairs: Collection[Touch] = ()) -> Collisions:
         leave = replace(self._leave, pairs={*self._leave.pairs, *pairs})

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import MachineError
@@ -22,6 +23,8 @@ SUPPORT_DISTANCE = 5e-4
 DEEP = 1e-3
 """Metres of overlap that are not believed before it is looked how deep the shapes are."""
 _UNKNOWN = ("none", 0)
+_Pairs = list[tuple[tuple[str, int], tuple[str, int], list[Any]]]
+"""What two bodies are and where they meet, of objects on each other and on fixtures."""
 _LYING = ("object", "fixture")
 
 
@@ -65,15 +68,36 @@ class ContactReader:
         self.penetration = 0.0
         self.deepest_pair: tuple[str, str, float, float] | None = None
 
-    def read_depth(self, time: float) -> None:
-        """Remember the deepest overlap, also between the ends of periods: fingers close within one."""
+    def read_depth(self, time: float) -> _Pairs:
+        """Remember the deepest overlap, also between the ends of periods: fingers close within one.
+
+        Returns:
+            What lies on what, for `resist_rolling`: to ask for points again costs as much as a step.
+        """
+        known, lying = self._world.bodies, []
+        for contact in self._world.system.get_contacts():
+            points = contact.points
+            separation = min([point.separation for point in points])
+            if separation > TOUCH_DISTANCE:
+                continue
+            first, second = contact.bodies
+            a, b = known.get(first, _UNKNOWN), known.get(second, _UNKNOWN)
+            if -separation > self.penetration and a[0] != "base" and b[0] != "base":
+                self._note_depth(contact, -separation, time)
+            if a[0] in _LYING and b[0] in _LYING:
+                lying.append((a, b, points))
+        return lying
+
+    def within_reach(self, objects: Collection[int]) -> bool:
+        """PhysX looks for contacts of one of these objects with something that is not the robot."""
         known = self._world.bodies
         for contact in self._world.system.get_contacts():
-            deepest = -min([point.separation for point in contact.points])
-            if deepest > self.penetration:
-                bodies = contact.bodies
-                if all(known.get(body, _UNKNOWN)[0] != "base" for body in bodies):
-                    self._note_depth(contact, deepest, time)
+            (kind_a, i), (kind_b, j) = (known.get(body, _UNKNOWN) for body in contact.bodies)
+            if (kind_a == "object" and i in objects and kind_b in _LYING) or (
+                kind_b == "object" and j in objects and kind_a in _LYING
+            ):
+                return True
+        return False
 
     def read(self, time: float, step: float, asleep: bool = False) -> Touch:
         """What touches what, and the deepest overlap.
@@ -155,28 +179,28 @@ class ContactReader:
             self.deepest_pair = (bodies[0].entity.name, bodies[1].entity.name, deep, time)
 
 
-def resist_rolling(world: World, step: float, hand_force: list[float]) -> None:
-    """Rolling resistance of what lies free, for the next step; PhysX itself knows none.
+def resist_rolling(world: World, lying: _Pairs, step: float, hand_force: list[float]) -> None:
+    """Rolling resistance of what lies free, for the next steps; PhysX itself knows none.
 
     It is PhysX's own damping, set anew for each step: unlike a torque, that lets things fall asleep.
 
     Args:
         world: The world.
+        lying: What lies on what, see `ContactReader.read_depth`.
         step: Seconds of the last physics step, over which impulses are forces.
         hand_force: Force of the robot on each object, N.
     """
     loads: list[list[list[float]]] = [[] for _ in world.objects]
-    rate, known = 1.0 / step, world.bodies
-    for contact in world.system.get_contacts():
-        first, second = contact.bodies
-        (kind_a, i), (kind_b, j) = known.get(first, _UNKNOWN), known.get(second, _UNKNOWN)
-        if (kind_a == "object" and kind_b in _LYING) or (kind_b == "object" and kind_a in _LYING):
-            impulses = [point.impulse.tolist() for point in contact.points]
-            force = [rate * sum(values) for values in zip(*impulses, strict=True)]
-            if kind_a == "object":
-                loads[i].append(force)
-            if kind_b == "object":
-                loads[j].append(force)
+    rate = 1.0 / step
+    for (kind_a, i), (kind_b, j), points in lying:
+        x = y = z = 0.0
+        for point in points:
+            px, py, pz = point.impulse.tolist()
+            x, y, z = x + px, y + py, z + pz
+        if kind_a == "object":
+            loads[i].append([rate * x, rate * y, rate * z])
+        if kind_b == "object":
+            loads[j].append([rate * x, rate * y, rate * z])
     for k, body in enumerate(world.objects):
         spin = body.angular_velocity.tolist()
         damping = DAMPING

@@ -44,7 +44,8 @@ class Solving:
         bodies: Sequence[physx.PhysxRigidDynamicComponent],
     ) -> None:
         self._hand, self._bodies = hand, bodies
-        self._tool = [*(float(v) for v in tool), 1.0, 0.0, 0.0, 0.0]
+        self._tool = [float(v) for v in tool]
+        self._centres = [floats(body.get_cmass_local_pose())[:3] for body in bodies]
         self._usual = [body.get_solver_position_iterations() for body in bodies]
         self._far = -1
 
@@ -66,7 +67,5 @@ class Solving:
 
     def _lever(self, which: int) -> float:
         """Metres between the tool and an object's centre of mass."""
-        body = self._bodies[which]
-        tool = poses.composed(list(floats(self._hand.entity_pose)), self._tool)
-        centre = poses.composed(list(floats(body.entity_pose)), list(floats(body.get_cmass_local_pose())))
-        return math.dist(tool[:3], centre[:3])
+        hand, thing = (list(floats(body.entity_pose)) for body in (self._hand, self._bodies[which]))
+        return math.dist(poses.point(hand, self._tool), poses.point(thing, self._centres[which]))

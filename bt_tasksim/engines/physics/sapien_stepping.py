@@ -10,26 +10,29 @@ from bt_tasksim.engines.physics.layout import body_column
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import Robot
-from bt_tasksim.engines.physics.sapien_world import DAMPING, LIGHT, MOST, PARTING, World, floats
+from bt_tasksim.engines.physics.sapien_world import DAMPING, PARTING, World, floats
+from bt_tasksim.engines.physics.threaded import FALLING
 from bt_tasksim.scene.configuration import ActorConfiguration
 
-FINE = 16
-"""How many times shorter steps are while something falls, and where the hand lets go of something: that may
-land before the period ends in which it begins to fall."""
-FAST = 1.0
-"""Metres per second from which such steps are shorter still, by as much as something is faster: a book that
-lands flat at 2.2 m/s sinks in by 3.3 mm in 16 steps for each, and by 1.1 mm in 32."""
+FLYING = 8
+"""How many times shorter steps are while something moves that the hand does not hold, or that it lets go of:
+a throw's path is off by 4 mm after a second in steps of 1.25 ms, and by 30 in those of 10."""
+STRIDE = 6e-4
+"""Metres that its surface goes in one step, at most, where it is within PhysX's reach of something else than
+the robot: a book that lands flat at 2.2 m/s sinks in by 3.3 mm in steps of 1.4 mm, and by 1.1 mm in half of
+those."""
 PARTING_FINELY = 0.1
 """As `PARTING`, in the shorter steps: PhysX leaves bodies the speed at which it parts them, and they jump."""
 CLOSING = 2
 """How many times shorter they are while the hand closes fast, and `WATCHED` periods on: the fingers of the
 Ability hand, each a kilogram with its motor's inertia, meet on the stick of a ladle and sink in by 2.8 mm at
 100 Hz, and by 1.0 at 200. Not for as long as something is held: twice the steps would cost twice the time."""
-LIGHTEST = 4
-"""The same, at most, where something is so light that `MOST` iterations of the solver are too few, while the
-hand closes, however slowly, and as long as it holds something. At 100 Hz a jaw of the SO-100 that presses
-with 30 N on a cup of 12 g sinks in by 2 mm as this leaves the table; and of 40 tasks with things of 10 to
-50 g 37 are done with shorter steps at closing, and 33 with up to 250 iterations instead."""
+SLIGHT, LIGHTEST = 0.05, 4
+"""Kilograms below which they are shorter by as much as something is lighter, and by how much at most, while
+the hand closes, however slowly, and as long as it holds something: the solver alone does not do enough there.
+At 100 Hz a jaw of the SO-100 that presses with 30 N on a cup of 12 g sinks in by 2 mm as this leaves the
+table; and of 40 tasks with things of 10 to 50 g 37 are done with shorter steps at closing, and 33 with up to
+250 iterations instead."""
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
 WATCHED = 4
@@ -70,12 +73,12 @@ class SapienWorld:
         self._falling = self._rolling = self._asleep = False
         self._watch, self._letting_go, self._closing, self._shorter = WATCHED, 0, 0, 1
         lightest = min((actor.mass for actor in configuration.objects), default=math.inf)
-        self._light = min(math.ceil(LIGHT / lightest / MOST), LIGHTEST) if configuration.objects else 1
+        self._light = min(math.ceil(SLIGHT / lightest), LIGHTEST) if configuration.objects else 1
         self._reader = ContactReader(world, n_tips)
         self._touch = self._reader.nothing
         self._readings, self._row = readings, row
         self._written: Touch | None = None
-        self._felt: list[Array] = []
+        self._felt: list[Array] = []  # newtons and newton metres, times seconds
         disturbance, names = configuration.disturbance, [actor.name for actor in configuration.objects]
         articulation = robot.articulation
         self._joints = (
@@ -104,68 +107,93 @@ class SapienWorld:
 
     def advance(self) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
-        self._last_dt, self._felt = self._dt, []
-        fine = self._falling or self._letting_go > 0
-        self._letting_go = max(self._letting_go - 1, 0)
-        if not self._disturbance.over:
-            for _ in range(self._substeps):
-                self._disturbed_step(fine)
-        elif fine:
-            self._fine_steps(self._substeps)
-        else:
-            self._usual_steps(self._shorter if self._closing else 1)
-            self._closing = max(self._closing - 1, 0)
+        loose = self._falling or self._letting_go > 0
+        shorter = self._shorter if self._closing else 1
+        watched = loose or self._watch > 0
+        self._letting_go, self._closing = max(self._letting_go - 1, 0), max(self._closing - 1, 0)
+        self._watch = max(self._watch - 1, 0)
+        for _ in range(self._substeps):
+            self._felt = []
+            moving = self._moving() if loose else []
+            if self._disturbs():
+                moving.append(self._pushed)
+            if moving:
+                self._fine_steps(moving)
+            else:
+                self._usual_steps(shorter, watched)
         self._time += self._dt * self._substeps
 
-    def _usual_steps(self, shorter: int) -> None:
-        """A control period in steps so many times shorter than the scene's."""
-        watched, self._watch = self._watch > 0, max(self._watch - 1, 0)
-        step = self._last_dt = self._dt / shorter
+    def _usual_steps(self, shorter: int, watched: bool) -> None:
+        """One of the scene's steps, in so many equal ones."""
+        self._last_dt = self._dt / shorter
         if shorter > 1:
-            self.world.scene.set_timestep(step)
-        for k in range(self._substeps * shorter):
-            if watched and k > 0:
-                self._reader.read_depth(self._time)
-            self._step(step)
-            if shorter > 1 and k >= (self._substeps - 1) * shorter:
+            self.world.scene.set_timestep(self._last_dt)
+        for _ in range(shorter):
+            if watched or self._rolling:
+                self._look_down()
+            self._step(self._last_dt)
+            if shorter > 1:
                 self._feel_wrist()
         if shorter > 1:
             self.world.scene.set_timestep(self._dt)
 
     def _feel_wrist(self) -> None:
-        """Remember what the joints bear in one of the shorter steps that make up the last usual one.
+        """Remember what the joints bear in one of the shorter steps that make up a usual one.
 
         What a hard blow gives in a quarter of a step is four times the force that a sensor feels over it.
         """
-        self._felt.append(self._joints[2]())
+        self._felt.append(self._last_dt * self._joints[2]())
+
+    def _look_down(self) -> None:
+        """See how deep things are in each other, and slow down what rolls."""
+        lying = self._reader.read_depth(self._time)
+        if self._rolling:
+            resist_rolling(self.world, lying, self._last_dt, self._touch.hand_force)
 
     def _step(self, seconds: float) -> None:
         """One step of PhysX so long, with what it does not know."""
-        if self._rolling:
-            resist_rolling(self.world, seconds, self._touch.hand_force)
         if self.robot.twist.holds:
             self.robot.twist.resist(seconds)
         self.world.system.step()
 
-    def _fine_steps(self, n: int) -> None:
-        world = self.world
-        speed = max((math.hypot(*body.linear_velocity) for body in world.objects), default=0.0)
-        finer = FINE * max(1, math.ceil(speed / FAST))
-        world.scene.set_timestep(self._dt / finer)
-        self._felt = []
+    def _fine_steps(self, moving: list[int]) -> None:
+        """One of the scene's steps, in shorter ones while these objects move."""
+        world, reader = self.world, self._reader
         for body in world.objects:
             body.set_max_depenetration_velocity(PARTING_FINELY)
-        self._last_dt = self._dt / finer
-        for k in range(n * finer):
-            if self._disturbance.pushing:
-                self._push()
-            self._step(self._last_dt)
-            self._reader.read_depth(self._time)
-            if k >= (n - 1) * finer:
+        for _ in range(FLYING):
+            self._look_down()
+            finer = 1
+            if reader.within_reach(moving):
+                way = max(self._speed(k) for k in moving) * self._dt / FLYING
+                finer = max(1, math.ceil(way / STRIDE))
+            self._last_dt = self._dt / (FLYING * finer)
+            world.scene.set_timestep(self._last_dt)
+            for _ in range(finer):
+                if self._disturbance.pushing:
+                    self._push()
+                self._step(self._last_dt)
                 self._feel_wrist()
         for body in world.objects:
             body.set_max_depenetration_velocity(PARTING)
         world.scene.set_timestep(self._dt)
+
+    def _speed(self, which: int) -> float:
+        """Metres a second of an object's surface, at most."""
+        body = self.world.objects[which]
+        linear, angular = body.linear_velocity.tolist(), body.angular_velocity.tolist()
+        return math.hypot(*linear) + math.hypot(*angular) * self.world.radius[which]
+
+    def _moving(self) -> list[int]:
+        """The objects that move so fast that steps have to be finer."""
+        speeds = (
+            (body.linear_velocity.tolist(), body.angular_velocity.tolist()) for body in self.world.objects
+        )
+        return [
+            k
+            for k, (linear, angular) in enumerate(speeds)
+            if math.hypot(*linear) > FALLING[0] or math.hypot(*angular) > FALLING[1]
+        ]
 
     # ---- reading ----------------------------------------------------------------------------------------
 
@@ -180,7 +208,7 @@ class SapienWorld:
         position, velocity, incoming = self._joints
         out.time[row], out.penetration[row] = self._time, self._reader.penetration
         out.position[row], out.velocity[row] = position(), velocity()
-        out.incoming[row] = sum(self._felt) / len(self._felt) if self._felt else incoming()
+        out.incoming[row] = sum(self._felt) / self._dt if self._felt else incoming()
         out.frames[row] = [floats(pose()) for pose in self._frames]
         if not still:
             for k, body in enumerate(bodies):
@@ -221,16 +249,14 @@ class SapienWorld:
 
     # ---- disturbance ------------------------------------------------------------------------------------
 
-    def _disturbed_step(self, fine: bool) -> None:
-        """One physics step; a push begins some time after the object was first held clear."""
+    def _disturbs(self) -> bool:
+        """An object is pushed now: from some time after it was first held clear."""
+        if self._disturbance.over:
+            return False
         k = self._pushed
         held = self._touch.hand_force[k] > 1.0 and not any(i == k for i, _ in self._touch.support)
         self._disturbance.watch(self._time, held)
-        if self._disturbance.pushing or fine:
-            self._fine_steps(1)
-        else:
-            self._felt = []
-            self._step(self._dt)
+        return self._disturbance.pushing
 
     def _push(self) -> None:
         """Push the object until it has left the hand, no faster than the disturbance says."""

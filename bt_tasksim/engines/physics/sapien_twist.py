@@ -14,8 +14,6 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.sapien_world import floats
@@ -56,7 +54,7 @@ class Twist:
     ) -> None:
         self._most = 2.0 / 3.0 * pads.friction * pads.min_patch_radius
         self._opposition, self._hand, self._bodies, self._inertia = opposition, hand, bodies, inertia
-        self._closing, self._across = closing, closing.tolist()
+        self._across = closing.tolist()
         self._held = -1
         self._turned = self._slipped = 0.0
 
@@ -79,17 +77,15 @@ class Twist:
         if which < 0 or min(sides) < PRESSED or hand_force[which] < PRESSED:
             self._held = -1
             return
-        hand, thing = (list(floats(body.entity_pose)) for body in (self._hand, self._bodies[which]))
+        hand, thing = _turn(self._hand), _turn(self._bodies[which])
         if which != self._held:
             self._held, self._turned, self._slipped = which, 0.0, 0.0
-            self._back = poses.composed(poses.inverted(thing), hand)
-        closing = poses.rotate(np.array(hand[3:]), self._closing)
+            self._back = poses.turned(_back(thing), hand)
         self._limit = self._most * sum(sides)
-        self._axis = closing.tolist()
+        self._axis = poses.rotated(hand, self._across)
         frame, moments = self._inertia[which]
-        turned = poses.quat_multiply(np.array(thing[3:]), np.array(frame[3:]))
-        along = poses.rotate(poses.quat_conjugate(turned), closing)
-        self._moment = float(np.sum(along * along * np.array(moments)))
+        along = poses.rotated(_back(poses.turned(thing, frame[3:])), self._axis)
+        self._moment = sum(a * a * moment for a, moment in zip(along, moments, strict=True))
 
     def resist(self, step: float) -> None:
         """Act for the next step of so many seconds.
@@ -98,10 +94,9 @@ class Twist:
         bodies that overlap, too.
         """
         body = self._bodies[self._held]
-        hand, thing = (list(floats(part.entity_pose)) for part in (self._hand, body))
-        w, *vector = poses.composed(poses.composed(poses.inverted(hand), thing), self._back)[3:]
-        sign = 2.0 if w >= 0.0 else -2.0
-        turned = sign * sum(v * n for v, n in zip(vector, self._across, strict=True))
+        w, x, y, z = poses.turned(poses.turned(_back(_turn(self._hand)), _turn(body)), self._back)
+        a, b, c = self._across
+        turned = (2.0 if w >= 0.0 else -2.0) * (x * a + y * b + z * c)
         stiffness, damping = STIFF * self._moment / (step * step), DAMPED * self._moment / step
         torque = -stiffness * (turned - self._slipped) - damping * (turned - self._turned) / step
         if abs(torque) > self._limit:
@@ -111,3 +106,14 @@ class Twist:
         self._turned = turned
         x, y, z = self._axis
         body.add_force_torque([0.0, 0.0, 0.0], [torque * x, torque * y, torque * z])
+
+
+def _turn(body: physx.PhysxRigidBaseComponent) -> list[float]:
+    """Quaternion of a body."""
+    return list(floats(body.entity_pose)[3:])
+
+
+def _back(turn: list[float]) -> list[float]:
+    """The inverse of a unit quaternion."""
+    w, x, y, z = turn
+    return [w, -x, -y, -z]

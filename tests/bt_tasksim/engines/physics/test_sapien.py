@@ -10,7 +10,7 @@ from bt_tasksim.concept.context import one_world
 from bt_tasksim.core.world import Command
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physics.sapien import SapienPhysics
-from bt_tasksim.engines.physics.sapien_stepping import CLOSING, FINE, LIGHTEST
+from bt_tasksim.engines.physics.sapien_stepping import CLOSING, FLYING, LIGHTEST, STRIDE
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.trees.load import load_source
@@ -47,9 +47,9 @@ def test_fingers_that_press_do_not_sink_into_light_things(kind, mass):
     assert hidden.penetration < 2e-4, runner.pipeline.physics.deepest_pair
 
 
-def steps_of(runner, closure):
-    """Lengths in seconds of PhysX's steps in a control period in which the hand goes there."""
-    world, found = runner.pipeline.physics.simulated.world, []
+def steps_in(physics, period):
+    """Lengths in seconds of PhysX's steps in a control period."""
+    world, found = physics.simulated.world, []
     system = world.system
 
     def step():
@@ -57,25 +57,46 @@ def steps_of(runner, closure):
         system.step()
 
     world.system = SimpleNamespace(step=step, get_contacts=system.get_contacts)
-    runner.pipeline.step(Command(hand=np.array([closure])))
+    period()
     world.system = system
     return np.array(found)
 
 
-def test_steps_are_finer_where_the_hand_lets_go_of_something():
+def steps_of(runner, closure):
+    """The same, of one in which the hand goes there."""
+    command = Command(hand=np.array([closure]))
+    return steps_in(runner.pipeline.physics, lambda: runner.pipeline.step(command))
+
+
+def test_steps_are_finer_as_soon_as_something_falls_out_of_the_hand():
     runner = holding("box", 0.2)
     for _ in range(10):
         runner.pipeline.step(Command())
     usual = steps_of(runner, 1.0)
-    letting_go = steps_of(runner, 0.0)
-    assert usual.sum() == pytest.approx(0.05) and letting_go.sum() == pytest.approx(0.05)
-    assert len(letting_go) == FINE * len(usual)
+    letting_go = [steps_of(runner, 0.0) for _ in range(10)]
+    assert all(steps.sum() == pytest.approx(0.05) for steps in [usual, *letting_go])
+    assert len(letting_go[0]) == len(usual), "it is held still"
+    begins = next(steps for steps in letting_go if len(steps) > len(usual))
+    assert begins[0] == pytest.approx(usual[0]) and begins[-1] <= usual[0] / FLYING + 1e-9, "within a period"
     for _ in range(40):
         runner.pipeline.step(Command())
     assert len(steps_of(runner, 0.0)) == len(usual), "it has come to rest"
     for _ in range(20):
         runner.pipeline.step(Command(hand=np.array([1.0])))
     assert len(steps_of(runner, 0.0)) == len(usual), "there is nothing in the hand"
+
+
+def test_what_flies_is_stepped_finely_and_what_lands_more_finely_the_faster_it_is():
+    world = Still(lifted(scene("box", 0.18).sample(1), 0.3))
+    flying = landing = 0
+    for _ in range(10):
+        fast = np.linalg.norm(world.state.velocities[0, :3])
+        steps = steps_in(world.physics, lambda: world.step(1))
+        assert steps.sum() == pytest.approx(0.05)
+        longest = steps.max() if fast > 0.5 else 0.0
+        flying += np.allclose(steps, 0.01 / FLYING, rtol=1e-4)
+        landing += steps.min() * fast < 1.01 * STRIDE and longest > steps.min()
+    assert flying > 1 and landing == 1
 
 
 def test_steps_are_shorter_while_the_hand_closes_fast():
