@@ -53,6 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--twin", action="store_true", help="on the twin, over ROS and in real time")
     parser.add_argument("--noise", default="fine")
     parser.add_argument("--perception", default="state")
+    parser.add_argument("--colours", type=int, default=0, metavar="N", help="objects in N colours alone")
     parser.add_argument("--ros", default="", metavar="FILE", help="a robot's topics, for engines over ROS")
     parser.add_argument("--stream", default="evaluation", help="stream of the draws")
     parser.add_argument("--oracle", type=float, default=60.0, metavar="S", help="seconds for a failed draw")
@@ -74,6 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.stream,
             options.oracle,
             options.twin,
+            options.colours,
         )
         try:
             if options.only:
@@ -112,8 +114,9 @@ def _name(asked: Conditions) -> str:
     """Name of the result: the robot, and what is not as usual."""
     usual = {"tree": "obvious", "grasp": None, "engines": "sapien", "perception": "state", "noise": "fine"}
     said = asked.to_data()
+    more = [f"{asked.colours}_colours"] if asked.colours else []
     unusual = [str(said[key]).replace("/", "_").replace(" ", "_") for key in usual if said[key] != usual[key]]
-    return "-".join(["any_tree", asked.robot, *(word.partition(":")[0] for word in unusual)])
+    return "-".join(["any_tree", asked.robot, *(word.partition(":")[0] for word in unusual), *more])
 
 
 def _resumed(path: Path, about: dict[str, Any]) -> dict[int, dict[str, Any]]:

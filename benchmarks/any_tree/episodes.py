@@ -37,6 +37,7 @@ class Conditions:
         stream: Stream of the scene's draw.
         oracle: Seconds that the oracle has for each draw that failed; 0: it is not asked.
         twin: On the twin, over ROS and in real time, instead of the engines of the options.
+        colours: In how many colours objects are; 0: each has one of its own, if it can.
     """
 
     robot: str
@@ -47,12 +48,14 @@ class Conditions:
     stream: str = "evaluation"
     oracle: float = 0.0
     twin: bool = False
+    colours: int = 0
 
     def to_data(self) -> dict[str, Any]:
         """What results say of it, and by which they are told apart."""
         options = {key: getattr(self.options, key) for key in ("engines", "perception", "noise")}
         if self.twin:  # whose noise is its own
             options |= {"engines": "twin", "noise": "fine"}
+        options |= {"colours": self.colours} if self.colours else {}
         return {"robot": self.robot, "tree": self.tree, "grasp": self.grasp, "stream": self.stream, **options}
 
 
@@ -82,6 +85,7 @@ class Player:
         known: dict[str, Any] = {"seed": seed}
         try:
             drawn = task(seed, asked.robot, asked.folder, asked.stream)
+            drawn = drawn.in_colours(asked.colours) if asked.colours else drawn
         except InputError as error:
             return {
                 **known,

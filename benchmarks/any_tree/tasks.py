@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from bt_tasksim.checking.scene_room import in_robot
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 from bt_tasksim.scene.outlines import distance, rectangle
+from bt_tasksim.scene.shape_kind import BRIGHT
 
 TABLE = (0.5, 0.0)
 """Origin of the table, robot base frame, metres."""
@@ -68,6 +69,14 @@ class Task:
     def tree(self, kind: str = "obvious", grasp: str | None = None):  # type: ignore[no-untyped-def]
         """A fresh tree, see `benchmarks.any_tree.trees.tree_of`."""
         return tree_of(self.steps, self.scene.goals, kind, grasp)
+
+    def in_colours(self, count: int) -> Task:
+        """The same task with objects in so many colours, in turn; else each has one of its own, if it can."""
+        specs = {
+            name: replace(spec, colour=BRIGHT[k % min(count, len(BRIGHT))])
+            for k, (name, spec) in enumerate(self.scene.objects.items())
+        }
+        return replace(self, scene=replace(self.scene, objects=specs))
 
     def sample(self) -> ActorConfiguration:
         """The world as it is drawn."""

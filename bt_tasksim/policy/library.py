@@ -1,7 +1,9 @@
 """The policies at hand: those of ``assets/policies``, which of them are pinned, and others by path.
 
 ``assets/policies/pins.json`` says which policy a leaf takes that names none: a mapping of concepts to
-mappings of robots to folders beside it, such as ``{"grasp": {"panda": "grasp-panda"}}``.
+mappings of robots to folders beside it, such as ``{"grasp": {"panda": "grasp-panda"}}``. In a
+folder's place ``programmed`` says that the concept's own policy was measured to be the better one: without a
+pin leaves do the same, but nobody has chosen.
 """
 
 from __future__ import annotations
@@ -119,13 +121,13 @@ def source_of(folder: Path) -> str:
 
 
 def folder_of_pinned(concept: str, robot: str) -> Path | None:
-    """The folder of the policy that is pinned for a concept and a robot; None where none is.
+    """The folder of the policy that is pinned for a concept and a robot; None for programmed or none.
 
     Raises:
         InputError: The pins are damaged, or the pinned policy is missing.
     """
     name = read_pins().get(concept, {}).get(robot)
-    if name is None:
+    if name is None or name == PROGRAMMED:
         return None
     folder = asset("policies", name)
     if not folder.is_dir():
@@ -135,6 +137,17 @@ def folder_of_pinned(concept: str, robot: str) -> Path | None:
             f"(or take it out with 'bt-tasksim policies --unpin {concept} {robot}')"
         )
     return folder
+
+
+def pinned_programmed() -> list[str]:
+    """Where the programmed policy is pinned, in the words of `describe`."""
+    pins = sorted(read_pins().items())
+    return [
+        printable(f"{PROGRAMMED}  {concept} on {robot}  pinned")
+        for concept, robots in pins
+        for robot, name in sorted(robots.items())
+        if name == PROGRAMMED
+    ]
 
 
 def read_pins() -> Pins:
@@ -171,6 +184,11 @@ def pin(name: str, concepts: Mapping[str, type[Learnable]]) -> PolicyCard:
         MachineError: The pins cannot be written.
     """
     known = _policy_folders(asset("policies"))
+    if name == PROGRAMMED:
+        raise InputError(
+            f"every concept has its '{PROGRAMMED}' policy: say in '{asset('policies', PINS)}' for which "
+            f"concept and robot it is to be taken"
+        )
     if name not in known:
         raise InputError(
             f"no policy '{name}' in '{asset('policies')}'{nearest(name, known)}; "
@@ -228,7 +246,8 @@ def list_policies(
     shipped = at.resolve() == asset("policies").resolve()
     pins = read_pins() if shipped else {}
     found = {at.resolve().name: at} if _is_policy(at) else _policy_folders(at)
-    found |= {name: at / name for robots in pins.values() for name in robots.values() if name not in found}
+    pinned = {name for robots in pins.values() for name in robots.values()} - {PROGRAMMED}
+    found |= {name: at / name for name in pinned if name not in found}
     return [_entry(name, path, pins, concepts or {}) for name, path in sorted(found.items())]
 
 

@@ -187,3 +187,11 @@ def test_the_five_trees_fit_their_scenes(name: str) -> None:
         assert np.isfinite([actor.pose for actor in drawn.objects]).all()
     assert len(list(tree_of(known.steps, known.scene.goals, "obvious").iterate())) > 4
     assert dataclasses.is_dataclass(known)
+
+
+def test_objects_in_one_colour_stand_where_they_stood(folder: Path) -> None:
+    drawn = task(920_003, "panda", folder)
+    before, after = drawn.sample(), drawn.in_colours(1).sample()
+    assert len({actor.colour for actor in after.objects}) == 1
+    assert [actor.pose for actor in after.objects] == [actor.pose for actor in before.objects]
+    assert Conditions("panda", "obvious", None, EngineOptions(), folder).to_data().get("colours") is None

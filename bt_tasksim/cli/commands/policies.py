@@ -45,7 +45,8 @@ def policies(
     found = library.list_policies(None, concepts)
     if folder is not None:
         found += library.list_policies(folder, concepts)
-    say("\n".join(library.describe(entry) for entry in found) or "there is no learned policy")
+    lines = [*library.pinned_programmed(), *map(library.describe, found)]
+    say("\n".join(lines) or "there is no learned policy")
     if json_ is not None:
         write_text(json_, json.dumps([entry.to_json() for entry in found], indent=2) + "\n")
         say(f"wrote {json_}")

@@ -1,7 +1,8 @@
 """A look: which known object is where in pictures that cameras took at one time.
 
-Each camera's picture is looked at by itself. Of what several cameras see of one object the fit with the most
-pixels counts, among those that explain them well. Nothing here remembers anything but the generator's state.
+Each camera's picture is looked at by itself. Of what several cameras see of one object the fit counts that
+explains all their pictures best: one camera may see the handle that is hidden from the other. Nothing here
+remembers anything but the generator's state.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel, WorldModel
 from bt_tasksim.engines.images import CameraModel, Image
 from bt_tasksim.engines.perception.camera_errors import CameraErrors, as_calibrated
-from bt_tasksim.engines.perception.pose_estimation import GOOD, Target, estimate_pose, follow
-from bt_tasksim.engines.perception.registration import DepthView, Fit
+from bt_tasksim.engines.perception.fixture_faces import boxes_near
+from bt_tasksim.engines.perception.pose_estimation import Target, estimate_pose, follow
+from bt_tasksim.engines.perception.registration import DepthView, Fit, judge_fit, sample_surface
 from bt_tasksim.engines.perception.segmentation import NEUTRAL, SMALLEST, Segment, classify, find_segments
 from bt_tasksim.scene.configuration import ActorConfiguration
 
@@ -52,16 +54,14 @@ class Sighting(NamedTuple):
         fit: Its pose there.
         camera: Name of the camera.
         segment: Its pixels.
+        doubt: Cost of the fit in all pictures that show something of its colour; the least of several is
+            believed.
     """
 
     fit: Fit
     camera: str
     segment: Segment
-
-    @property
-    def rank(self) -> tuple[bool, int]:
-        """The least of several is believed."""
-        return self.fit.cost >= GOOD, -self.segment.pixels
+    doubt: float
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,8 @@ class Looker:
             lean = [i for i in every if i not in found or not _stands(found[i].fit.pose)]
             known = capture.estimate.copy()
             for i, sighting in found.items():
-                known[i] = sighting.fit.pose
+                if i not in lean:  # else what was found does not count as what was believed before
+                    known[i] = sighting.fit.pose
             rest = [sighting for sighting in seen if sighting[0] not in lean]
             again = self._sightings(pictures, replace(capture, estimate=known), lean)
             found = shared_out(rest + again)
@@ -159,14 +160,34 @@ class Looker:
         """All that may be one of the wanted objects, with their numbers."""
         found = []
         for i in wanted:
+            views = {name: self._views(i, picture) for name, picture in pictures.items()}
             for name, picture in pictures.items():
-                for segment in picture.segments[i]:
-                    points = self._rng.permutation(segment.points)
-                    view = DepthView(picture.camera, picture.depth, points, picture.others[i])
+                for segment, view in zip(picture.segments[i], views[name], strict=True):
                     fit = self._estimated(i, view, capture)
                     if fit is not None:
-                        found.append((i, Sighting(fit, name, segment)))
+                        others = [views[other] for other in pictures if other != name]
+                        found.append((i, Sighting(fit, name, segment, self._doubt(i, fit, view, others))))
         return found
+
+    def _views(self, i: int, picture: _Picture) -> list[DepthView]:
+        """What may be an object in a picture."""
+        found = []
+        for segment in picture.segments[i]:
+            points = self._rng.permutation(segment.points)
+            near = boxes_near(self._model.obstacles, np.median(points, axis=0), self.targets[i].diameter)
+            found.append(DepthView(picture.camera, picture.depth, points, picture.others[i], near))
+        return found
+
+    def _doubt(self, i: int, fit: Fit, view: DepthView, others: Sequence[Sequence[DepthView]]) -> float:
+        """How badly a fit to a view explains what all pictures show, each by how much it shows."""
+        points = sample_surface(self.targets[i].shape)
+        costs, pixels = [fit.cost], [len(view.points)]
+        for views in filter(None, others):
+            judged = [(judge_fit(points, other, fit.pose).cost, len(other.points)) for other in views]
+            cost, size = min(judged)
+            costs.append(cost)
+            pixels.append(size)
+        return float(np.average(costs, weights=pixels))
 
     def _estimated(self, i: int, view: DepthView, capture: Capture) -> Fit | None:
         """The fit of object ``i`` to what may be it, or None."""
@@ -223,7 +244,7 @@ def shared_out(seen: Sequence[tuple[int, Sighting]]) -> dict[int, Sighting]:
                 continue
             here.add(number)
             taken |= mask
-            if number not in found or sighting.rank < found[number].rank:
+            if number not in found or sighting.doubt < found[number].doubt:
                 found[number] = sighting
     return found
 

@@ -32,6 +32,10 @@ GOOD = 0.2
 """Cost of a fit, see `Fit`, up to which a standing pose is taken without looking for others."""
 POOR = 0.5
 """Cost beyond which no pose is believed."""
+ALIKE = 0.04
+"""Difference of two fits' costs that says nothing: the usual explanation is believed then."""
+NEARLY_UPRIGHT, NEAR_SURFACE = math.radians(8.0), 0.008
+"""Radians and metres within which what was believed to be aslant, or above or in a surface, stands on it."""
 _COARSE, _FINE = (120, 350), (700, 1600)
 """Numbers of points seen and of model points, for trying and for the last word."""
 
@@ -66,17 +70,19 @@ def estimate_pose(
         target: The object.
         view: Its points and the image.
         places: Surfaces on which it may stand.
-        before: Pose ``(7,)`` at which it last was seen, if any: tried first.
+        before: Pose ``(7,)`` at which it last was seen, if any. It is believed, but for what the picture
+            shows to be a little else, unless another one explains the picture clearly better.
 
     Returns:
         The best fit, or None where no pose explains what is seen.
     """
     points = sample_surface(target.shape)
-    standing = stand_on(target, view, places, points, before)
-    if standing is not None and standing.cost < GOOD:
-        return standing
-    free = lie_about(target, view, places, points, before)
-    best = free if standing is None or free.cost < standing.cost - 0.04 else standing
+    still = None if before is None else stay(target, view, before, places)
+    best = stand_on(target, view, places, points, before)
+    if best is None or best.cost >= GOOD:
+        free = lie_about(target, view, places, points, before)
+        best = free if best is None or free.cost < best.cost - ALIKE else best
+    best = still if still is not None and still.cost < best.cost + ALIKE else best
     return best if best.cost < POOR else None
 
 
@@ -85,15 +91,45 @@ def follow(target: Target, view: DepthView, start: Array, places: Iterable[Place
 
     While it still stands on one of the places it only slides and turns there; else all motions are free.
     """
-    points = sample_surface(target.shape)
     half = np.array([0.0, 0.0, -target.model.extent[2] / 2])
     foot, up = poses.transform(start, half), poses.z_axis(start[3:])
     stands = up[2] > 0.999 and any(abs(float(foot[2] - place.pose[2])) < 0.003 for place in places)
-    free = UPRIGHT if stands else FREE
-    pose = register(
-        points.thinned(_FINE[1]), view.thinned(_FINE[0]), start, free, steps=15, reach=(0.006, 0.003)
-    )
-    return judge_fit(points, view, pose)
+    points = sample_surface(target.shape)
+    return judge_fit(points, view, _near(points, view, start, UPRIGHT if stands else FREE))
+
+
+def stay(target: Target, view: DepthView, start: Array, places: Sequence[PlaceModel]) -> Fit:
+    """The pose near ``start (7,)`` of an object that rests there: upright on a surface, if it nearly is."""
+    points = sample_surface(target.shape)
+    surface = _below(target, start, places)
+    if surface is None or float(poses.tilt(start[3:])) > NEARLY_UPRIGHT:
+        pose = _settled(_near(points, view, start, FREE), target, places)
+        return judge_fit(points, view, pose)
+    level = float(surface.pose[2]) + target.model.extent[2] / 2
+    heading = 2 * math.atan2(float(start[6]), float(start[3]))
+    upright = poses.pose([*start[:2], level], poses.yaw(heading))
+    return judge_fit(points, view, _near(points, view, upright, UPRIGHT))
+
+
+def _near(points: ModelPoints, view: DepthView, start: Array, free: Sequence[int]) -> Array:
+    """The pose near ``start (7,)`` that fits best, where the start was believed."""
+    seen, model, reach = view.thinned(_FINE[0]), points.thinned(_FINE[1]), (0.006, 0.003)
+    return register(model, seen, start, free, steps=15, reach=reach, anchored=True)
+
+
+def _below(target: Target, pose: Array, places: Sequence[PlaceModel]) -> PlaceModel | None:
+    """The place on which an object at a pose nearly stands, or None."""
+    foot = float(pose[2]) - target.model.extent[2] / 2
+    for place in places:
+        local = poses.transform(poses.inverse(place.pose), pose[:3])
+        inside = all(abs(local[i] - place.centre[i]) < place.extent[i] / 2 for i in range(2))
+        if (
+            inside
+            and abs(foot - float(place.pose[2])) < NEAR_SURFACE
+            and poses.z_axis(place.pose[3:])[2] > 0.999
+        ):
+            return place
+    return None
 
 
 def stand_on(
@@ -223,6 +259,6 @@ def _settled(pose: Array, target: Target, places: Sequence[PlaceModel]) -> Array
         local = poses.transform(poses.inverse(place.pose), pose[:3])
         inside = all(abs(local[i] - place.centre[i]) < place.extent[i] / 2 for i in range(2))
         gap = lowest - float(place.pose[2])
-        if inside and abs(gap) < 0.008:
+        if inside and abs(gap) < NEAR_SURFACE:
             return pose - np.array([0.0, 0.0, gap, 0.0, 0.0, 0.0, 0.0])
     return pose

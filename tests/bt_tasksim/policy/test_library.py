@@ -9,11 +9,13 @@ from bt_tasksim.concept_nodes import Grasp, Pick
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.resources import asset
 from bt_tasksim.policy.library import (
+    PROGRAMMED,
     describe,
     folder_of_pinned,
     list_policies,
     measured_text,
     pin,
+    pinned_programmed,
     read_pins,
     unpin,
 )
@@ -27,6 +29,9 @@ def test_what_is_shipped_can_be_used():
     assert [(e.name, e.problem) for e in found if e.problem] == []
     for concept, robots in json.loads(asset("policies", "pins.json").read_text()).items():
         for robot, name in robots.items():
+            if name == PROGRAMMED:
+                assert concept in CONCEPTS and load_robot(robot) and folder_of_pinned(concept, robot) is None
+                continue
             assert folder_of_pinned(concept, robot).name == name
             card = next(e.card for e in found if e.name == name and e.pinned)
             assert (card.concept, card.robot) == (concept, robot)
@@ -43,6 +48,20 @@ def test_pins_are_written_and_read(shipped):
     assert [(e.name, e.pinned) for e in list_policies()] == [("one", False), ("two", True)]
     assert unpin("grasp", "panda") == "two" and read_pins() == {}
     assert sorted(p.name for p in home.iterdir()) == ["one", "pins.json", "two"]
+
+
+def test_the_programmed_policy_is_pinned_in_the_file(shipped):
+    home = shipped(
+        "one", pins={"pick": {"so100": "programmed"}, "grasp": {"so100": "one", "panda": "programmed"}}
+    )
+    assert folder_of_pinned("grasp", "panda") is None and folder_of_pinned("grasp", "so100") == home / "one"
+    assert pinned_programmed() == ["programmed  grasp on panda  pinned", "programmed  pick on so100  pinned"]
+    assert [entry.name for entry in list_policies()] == ["one"]
+    with pytest.raises(InputError, match=r"every concept has its 'programmed' policy: say in '.*pins.json'"):
+        pin("programmed", CONCEPTS)
+    assert unpin("grasp", "panda") == "programmed" and pinned_programmed() == [
+        "programmed  pick on so100  pinned"
+    ]
 
 
 def test_an_empty_file_pins_nothing(shipped):

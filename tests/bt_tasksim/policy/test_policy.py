@@ -124,8 +124,9 @@ def test_every_library_and_device_decides_the_same():
 
 @pytest.mark.parametrize("name", [None, "", "programmed"])
 @pytest.mark.parametrize("concept", [Grasp, Pick])
-def test_where_nothing_is_pinned_the_programmed_policy_decides(shipped, name, concept):
-    shipped()
+@pytest.mark.parametrize("pins", [None, {"grasp": {"panda": "programmed"}}])
+def test_where_no_other_is_pinned_the_programmed_policy_decides(shipped, pins, name, concept):
+    shipped("one", pins=pins)
     policy = _resolved(concept("cup", policy=name), PANDA)
     assert isinstance(policy, ProgrammedPolicy) and policy.name == policy.source == "programmed"
 

@@ -27,3 +27,8 @@ def test_policies_are_listed_pinned_and_unpinned(call, shipped, policy):
 def test_without_a_policy_the_list_says_so(call, shipped):
     shipped()
     assert call("policies") == (0, "there is no learned policy\n", "")
+
+
+def test_where_the_programmed_one_is_pinned_the_list_says_so(call, shipped):
+    shipped(pins={"grasp": {"panda": "programmed"}})
+    assert call("policies") == (0, "programmed  grasp on panda  pinned\n", "")

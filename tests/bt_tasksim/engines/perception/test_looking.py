@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from raycast import box, image
+from raycast import CAMERA, box, cloud, image
 
 from bt_tasksim.core import poses
 from bt_tasksim.engines.perception.camera_errors import PERFECT
 from bt_tasksim.engines.perception.looking import Capture, Looker, Sighting, shared_out
-from bt_tasksim.engines.perception.registration import Fit
+from bt_tasksim.engines.perception.registration import DepthView, Fit
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import ObjectSpec
 
@@ -17,20 +17,33 @@ SMALL, LARGE = (0.05, 0.03, 0.06), (0.09, 0.08, 0.06)
 NOTHING = np.full((2, 7), np.nan)
 
 
-def sighting(camera, pixels, cost, rows=slice(0, 10)):
+def sighting(camera, pixels, cost, rows=slice(0, 10), doubt=0.1):
     mask = np.zeros((40, 40), bool)
     mask[rows] = True
-    return Sighting(Fit(np.zeros(7), 0.0, cost), camera, SimpleNamespace(mask=mask, pixels=pixels))
+    return Sighting(Fit(np.zeros(7), 0.0, cost), camera, SimpleNamespace(mask=mask, pixels=pixels), doubt)
 
 
-@pytest.mark.parametrize(
-    ("left", "right", "best"),
-    [((400, 0.1), (50, 0.05), "left"), ((400, 0.4), (50, 0.1), "right"), ((60, 0.1), (50, 0.1), "left")],
-)
-def test_of_those_that_fit_well_the_one_with_most_pixels_counts(left, right, best):
-    seen = [(0, sighting("left", *left)), (0, sighting("right", *right))]
-    assert shared_out(seen)[0].camera == best
-    assert shared_out(seen[::-1])[0].camera == best
+def test_the_sighting_that_explains_all_pictures_best_counts():
+    seen = [(0, sighting("left", 400, 0.1, doubt=0.2)), (0, sighting("right", 50, 0.12, doubt=0.15))]
+    assert shared_out(seen)[0].camera == "right"
+    assert shared_out(seen[::-1])[0].camera == "right"
+
+
+def test_what_one_camera_sees_counts_against_what_fits_in_the_others_picture():
+    spec = {"it": ObjectSpec(("box",), on="table", size=(SMALL, SMALL), area=(0, 0))}
+    world = Scene("panda", objects=spec).sample(2)
+    actor = world.objects[0]
+    looker = Looker(world, world.world_model(["left", "right"], 0.08), PERFECT, ["scene"])
+    right = np.array(actor.pose)
+    wrong = poses.multiply(right, poses.pose([0.0, 0.0, 0.0], poses.yaw(np.pi / 2)))
+    seen, which = image([(box(right, actor.size), actor.colour)])
+    whole = DepthView(CAMERA, seen.depth, cloud(CAMERA, seen.depth)[which == 1])
+    part = DepthView(CAMERA, seen.depth, whole.points[: len(whole.points) // 10])
+    right_doubt, wrong_doubt = (
+        looker._doubt(0, Fit(pose, 0.001, 0.0), part, [[whole]]) for pose in (right, wrong)
+    )
+    assert right_doubt < 0.1 < wrong_doubt - 0.05
+    assert looker._doubt(0, Fit(wrong, 0.001, 0.0), part, []) == pytest.approx(0.1)
 
 
 def test_objects_of_one_colour_do_not_have_the_same_pixels():

@@ -1,5 +1,7 @@
 """Known shapes are found where they are, from one side, through noise and behind other things."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,9 @@ from hypothesis import strategies as st
 from raycast import CAMERA, box, cloud, cylinder, image
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.world import Obstacle
 from bt_tasksim.engines.perception.camera_errors import CameraErrors
+from bt_tasksim.engines.perception.fixture_faces import boxes_near
 from bt_tasksim.engines.perception.pose_estimation import Target, estimate_pose, follow
 from bt_tasksim.engines.perception.registration import UPRIGHT, DepthView, judge_fit, register, sample_surface
 from bt_tasksim.scene.fixtures import load_fixture
@@ -17,6 +21,7 @@ PLACES = load_fixture("table").place_models()
 RED = (0.86, 0.16, 0.15)
 BOX, ROUND = (0.072, 0.046, 0.1), (0.05, 0.05, 0.09)
 ERRORS = CameraErrors(position=0, rotation=0)
+TABLE = Obstacle(poses.pose([0.5, 0.0, -0.02]), (0.8, 1.2, 0.04), "table")
 spots = st.tuples(st.floats(0.35, 0.65), st.floats(-0.3, 0.3), st.floats(-3.1, 3.1))
 
 
@@ -87,6 +92,38 @@ def test_a_half_hidden_box_is_found():
     fit = estimate_pose(target("box", BOX), part, PLACES)
     assert np.linalg.norm(fit.pose[:3] - pose[:3]) < 0.003
     assert turned(fit.pose[3:], pose[3:], 2) < np.deg2rad(2)
+
+
+@pytest.mark.parametrize("heading", [0.4, 0.4 + np.pi / 2])
+def test_of_poses_that_look_alike_the_one_that_was_believed_stays(heading):
+    nearly_square = (0.06, 0.059, 0.08)
+    seen = view(box(poses.pose([0.5, 0.0, 0.04], poses.yaw(0.4)), nearly_square), noise=ERRORS)
+    before = poses.pose([0.503, -0.002, 0.042], poses.yaw(heading + 0.05))
+    fit = estimate_pose(target("box", nearly_square), seen, PLACES, before)
+    assert turned(fit.pose[3:], poses.yaw(heading), 2) < np.deg2rad(4)
+    assert np.linalg.norm(fit.pose[:3] - [0.5, 0.0, 0.04]) < 0.003
+
+
+def test_what_was_moved_is_found_where_it_is_now():
+    pose = poses.pose([0.5, 0.0, BOX[2] / 2], poses.yaw(0.4))
+    before = poses.pose([0.46, 0.03, BOX[2] / 2], poses.yaw(1.2))
+    fit = estimate_pose(target("box", BOX), view(box(pose, BOX), noise=ERRORS), PLACES, before)
+    assert np.linalg.norm(fit.pose[:3] - pose[:3]) < 0.003
+    assert turned(fit.pose[3:], pose[3:], 2) < np.deg2rad(2)
+
+
+def test_a_pose_within_a_fixture_is_left():
+    """Of a box that lies only the top is seen: it might stand as well, most of it in the table."""
+    tip = poses.from_rotation_vector(np.array([np.pi / 2, 0, 0]))
+    lying, sunk = poses.pose([0.5, 0.0, 0.023], tip), poses.pose([0.5, 0.0, -0.004])
+    seen = view(box(lying, BOX))
+    top = replace(seen, points=seen.points[seen.points[:, 2] > 0.045])
+    near = replace(top, fixtures=boxes_near([TABLE], top.points[0], 0.1))
+    points = sample_surface(target("box", BOX).shape)
+    assert judge_fit(points, top, sunk).overlap == 0.0
+    assert judge_fit(points, near, sunk).overlap > 0.003 > judge_fit(points, near, lying).overlap
+    out = register(points.thinned(1000), near, poses.pose([0.5, 0.0, 0.012], tip), (2,))
+    assert out[2] == pytest.approx(0.023, abs=0.004)
 
 
 def test_something_else_of_the_same_colour_is_not_taken_for_it():
