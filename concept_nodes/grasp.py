@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes import grasp_features
 from bt_tasksim.concept_nodes.closer import with_room
 from bt_tasksim.concept_nodes.grasp_candidates import Candidates, candidates, narrowest_grip
-from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, goes_aside, rooms
+from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, goes_aside, rooms, thorough
 from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, CLOSE, EAGER, HASTE, SCALE
 from bt_tasksim.concept_nodes.grasp_firmness import SLANTED
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
@@ -36,6 +37,7 @@ from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, gentler
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, put_down, views
 from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
@@ -336,10 +338,9 @@ class Grasp(ConceptModel[GraspMemory]):
     def _choice(self, view: WorldView, asked: _Asked, later: Sequence[Any]) -> Choice:
         """The grasp in one world, see `_chosen`."""
 
-        def find(room: tuple[float, bool, bool]) -> Choice:
-            closer, firmly, aside = room
+        def find(room: tuple[float, bool, bool], thoroughly: bool = False) -> Choice:
             pace = Pace(self.speed)
-            chooser = Chooser(view, self.target, self.standoff, pace, later, closer, firmly, aside)
+            chooser = Chooser(view, self.target, self.standoff, pace, later, *room, thoroughly)
             usual = chooser.usual(asked.usual, asked.way)
             if usual is not None and not asked.failed:
                 return usual
@@ -348,7 +349,15 @@ class Grasp(ConceptModel[GraspMemory]):
             others = others.keeping(~others.poor) if swings else others
             return chooser.other(self._as_given(others, view), asked.failed, usual)
 
-        return with_room(rooms(view.robot, goes_aside(view, self.target, later)), find)
+        tried = rooms(view.robot, goes_aside(view, self.target, later))
+        try:
+            return with_room(tried, find)
+        except NoWayError as error:
+            if not thorough(view.robot):
+                raise
+            with suppress(NoWayError):
+                return find(tried[-1], thoroughly=True)
+            raise error
 
     def _as_given(self, others: Candidates, view: WorldView) -> Candidates:
         """Those that have the approach and the closing axis that the author gave, if any."""

@@ -120,6 +120,10 @@ class Candidates:
         turn = poses.angle_between(self.tools[:, 3:], tool[None, 3:])
         self._wrong += WRONG * np.exp(-((turn / ALIKE) ** 2))
 
+    def costing(self, costs: Array) -> Candidates:
+        """The same at other costs ``(k,)``."""
+        return Candidates(self.tools, costs, self.widths, self.poor)
+
     def keeping(self, which: Array) -> Candidates:
         """Those of a mask ``(k,)``."""
         return Candidates(self.tools[which], self.costs[which], self.widths[which], self.poor[which])

@@ -29,7 +29,9 @@ from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.arm import LEANS
 from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.closing import closing_of
 from bt_tasksim.planning.hand_collision import HandCollisions
+from bt_tasksim.planning.reach import reach_of
 from bt_tasksim.planning.route import Pace, Route, followed, hurries
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Held, Leave
@@ -44,6 +46,8 @@ STANDOFFS = (1.0, 0.6, 0.35)
 REACH = 0.008
 """Metres that the arm has to reach beyond where an approach begins: corrections of the grasp move it by so
 much."""
+SPARE = 0.008
+"""Metres beside what it takes, on either side, that a partly closed hand is open at least."""
 SLIDES = (1.0, 0.7, 0.4)
 """Shares of the way up to the object that a finger which stands still goes, as far as there is room."""
 ENOUGH = 3
@@ -61,6 +65,14 @@ ASKED = 250
 """Grasps of which a hand of many fingers is asked what its fingers meet: some milliseconds each."""
 FARTHEST = 400
 """Grasps for which joints are looked for."""
+LONGER = 4
+"""How many times as many where nothing has served: grasps from above that cannot be put down on a high tower
+use up all that are asked, before one that comes level has its turn."""
+ABOUT = 12
+"""Poses in what follows by which it is judged whether the arm comes near them."""
+USUAL, FAR = 0.3, 3.0
+"""What a grasp costs then of what it costs otherwise, and for each radian that the arm is from it, or from
+what follows."""
 UNSURE = {SURELY: 0.0, BARELY: 0.5, HARDLY: 1.5}
 """What a grasp costs more that the fingers would not hold surely, in radians of turn from the usual one."""
 RISKY = 4.0
@@ -124,6 +136,8 @@ class Chooser:
         closer: How much closer than usual what follows may come to things.
         firmly: Grasps that the fingers would hardly hold do not count.
         aside: It may be put down a little aside of where it should stand, see `Aim.aside`.
+        thoroughly: Nothing has served: more grasps are asked, first those that the arm comes near to, and
+            to what follows with them; and a hand comes partly closed where it has no room wide open.
     """
 
     def __init__(
@@ -136,9 +150,11 @@ class Chooser:
         closer: float,
         firmly: bool = False,
         aside: bool = False,
+        thoroughly: bool = False,
     ) -> None:
         self._view, self._target, self._standoff, self._pace = view, target, standoff, pace
         self._firmly, self._loses = firmly, loses(view.robot)
+        self._thoroughly, self._longer = thoroughly, LONGER if thoroughly else 1
         self._close = close = closer > ROOMS[0]
         self._beside = max((share for room, share in BESIDE.items() if room >= closer), default=0.0)
         self._openings: dict[float, Opening] = {}
@@ -185,7 +201,9 @@ class Chooser:
 
     def _opening(self, width: float) -> Opening:
         """The hand that comes about what is ``width`` metres wide."""
-        hand = opened_about(self._view.robot, width)
+        return self._opened(opened_about(self._view.robot, width))
+
+    def _opened(self, hand: Array) -> Opening:
         closure = float(self._view.robot.closure(hand))
         if closure not in self._openings:
             self._openings[closure] = Opening(self._view, self._target, hand, self._close, self._beside)
@@ -204,8 +222,10 @@ class Chooser:
         """
         served, tried, last = 0, 0, usual
         skipped -= usual is not None
+        if self._thoroughly:
+            candidates = self._in_reach(candidates)
         for goal, hand in self._free(candidates):
-            if served == MOST or tried == FARTHEST:
+            if served == self._longer * MOST or tried == self._longer * FARTHEST:
                 break
             if last is not None and _alike(goal, last.goal):
                 continue
@@ -233,6 +253,22 @@ class Chooser:
         touch = hand.alone.first(tool)
         return self._no(f"where the hand would touch {touch[1] if touch else 'something'}")
 
+    def _in_reach(self, candidates: Candidates) -> Candidates:
+        """Those first to which the arm comes easily, and with which it does what follows."""
+        tools = candidates.tools
+        far = reach_of(self._view.robot).far(tools) + sum(aim.far(tools) for aim in self._aims[:1])
+        return candidates.costing(USUAL * candidates.costs + FAR * far)
+
+    def _with_room(self, tool: Array, width: float) -> Opening | None:
+        """The hand that has room at a grasp ``(7,)`` of what is ``width`` metres wide, if any."""
+        hand = self._opening(width)
+        if self._thoroughly and self._firm.asks and not hand.free(tool):
+            robot = self._view.robot
+            less = self._opened(robot.hand_position(closing_of(robot).about(width + 2 * SPARE)[None]))
+            if less.closure > hand.closure and less.free(tool):
+                return less
+        return hand if self._has_room(tool, hand) else None
+
     def _free(self, candidates: Candidates) -> Iterator[tuple[Array, Opening]]:
         """Those at which the hand alone touches nothing, moved to hold well; those that do not come later."""
         waiting: list[tuple[float, int, Array, Opening]] = []
@@ -242,12 +278,12 @@ class Chooser:
                 cost, goal, width = candidates.taken()
             except StopIteration:
                 break
-            if asked == ASKED and self._firm.asks:
+            if asked == self._longer * ASKED and self._firm.asks:
                 break
             while waiting and waiting[0][0] <= cost:
                 yield heapq.heappop(waiting)[2:]
-            hand = self._opening(width)
-            if not self._has_room(goal, hand):
+            hand = self._with_room(goal, width)
+            if hand is None:
                 continue
             asked += 1
             centred = self._firm.centred(goal)
@@ -411,6 +447,14 @@ def goes_aside(view: WorldView, target: str, later: Sequence[Any]) -> bool:
     return any(aim.aside is not None and len(aim.aside) > 0 for aim in _aims_of(view, target, later))
 
 
+def thorough(robot: RobotDescription) -> bool:
+    """Where no grasp serves, it is looked for longer and with partly closed hands.
+
+    A hand of many fingers has so much less room, and so many more ways to hold, than what is asked at first.
+    """
+    return len(robot.tips) > TWO
+
+
 def loses(robot: RobotDescription) -> bool:
     """A hand with a jaw that swings, or of many fingers: it pushes aside what it does not take well."""
     return standing_side(robot) is not None or len(robot.tips) > TWO
@@ -475,6 +519,14 @@ class _Served:
             return all(alone.free(other) and reached(other) for other in others)
 
         return any(reached(tool) and turned(tool) for tool in tools)
+
+    def far(self, tools: Array) -> Array:
+        """How far ``(k,)`` the arm is from being there with grasps ``(k, 7)``, see `Reach.far`."""
+        grips = poses.relative(self._around.now[None], tools)
+        some = self._possible[:: max(1, len(self._possible) // ABOUT)]
+        reach = reach_of(self._around.view.robot)
+        far = [reach.far(poses.multiply(pose[None], grips)) for pose in some]
+        return np.min(far, axis=0) if far else np.zeros(len(tools))
 
     @cached_property
     def _possible(self) -> Array:

@@ -62,6 +62,10 @@ FALLING = 0.6
 """Seconds after the hand has drawn back within which something has fallen."""
 OPEN = 0.15
 """Closure, beyond that to which it opens, below which a hand is open; at most a quarter of its way."""
+STUCK = 1.0
+"""Seconds after it should be open from which on a hand that is not draws back as it opens. Fingers that swing
+reach deepest halfway: those of the Ability hand, closed on a bowl on a table, press on the table with 33 N as
+they open, and get no farther."""
 AT = 0.004
 """Metres within which the hand is at a piece of what it holds."""
 UP = np.array([0.0, 0.0, 1.0])
@@ -157,11 +161,12 @@ class Release(ConceptModel[ReleaseMemory]):
         return Command(tool=sample(memory.path, since), hand=hand[:, None], posture=arm)
 
     def advance(self, action: Array, seen: Seen, memory: ReleaseMemory) -> ReleaseMemory:
-        """Notice when the hand is open."""
+        """Notice when the hand is open, or opens no farther."""
         xp = array_namespace(seen.tool)
         slack = poses.clip(memory.held - memory.end, 0.0, 4.0 * OPEN) / 4.0
         slack = xp.where(memory.end > 0.0, slack, xp.full_like(slack, OPEN))
         open_now = (seen.elapsed > self.opening) & (seen.closure < memory.end + slack)
+        open_now = open_now | (seen.elapsed > self.opening + STUCK)
         begun = xp.where(open_now, xp.zeros_like(memory.opened), memory.opened)
         going = memory.opened >= 0.0
         return memory._replace(opened=xp.where(going, memory.opened + seen.world.control_period, begun))

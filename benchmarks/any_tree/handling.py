@@ -22,6 +22,7 @@ from bt_tasksim.core.world import WorldModel
 from bt_tasksim.planning.arm import LEANS as TURNED
 from bt_tasksim.planning.arm import SWAYS, arm_of
 from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.closing import closing_of
 from bt_tasksim.planning.collision import Collisions
 from bt_tasksim.planning.lines import STEP, line
 from bt_tasksim.planning.search import Search
@@ -57,6 +58,8 @@ WAYS = (1, 2, 3, 4)
 """Seeds of the search for a way."""
 LEANS = float(np.deg2rad(9.0))
 """Radians by which an object may lean in the end: an arm of five joints leans a little."""
+TWO = 2
+"""Fingertips of a hand that meets whatever is between its pads."""
 DEEPEST = (
     "no grip fits the hand",
     "every grasp is out of reach",
@@ -174,6 +177,9 @@ class Mover:
                 for q in self._postures(coming, tool, 2, 1):
                     actual = self._arm.tool(q)
                     grip = poses.relative(actual, pose)
+                    if not self._meets(grip):
+                        self._no(2)
+                        continue
                     held = self._collisions(hand, Held(self._actor.name, grip, self._pieces))
                     lifted = self._lifted(held, q, actual)
                     if lifted is None:
@@ -181,6 +187,16 @@ class Mover:
                         continue
                     after = self._collisions(hand)
                     yield _Grasp(q, actual, lifted, poses.inverse(grip), coming, held, after, list(order))
+
+    def _meets(self, grip: Array) -> bool:
+        """Whether fingers of both sides meet the object when they close, its pose ``(7,)`` in the tool frame.
+
+        Held back from a grip, the curled fingers of a hand of many may close before the object.
+        """
+        if len(self._robot.tips) <= TWO:
+            return True
+        closing = closing_of(self._robot)
+        return closing.squeeze(closing.met(grip, self._pieces)) is not None
 
     def _stuck(self, exhausted: bool) -> Stuck:
         most = self._touched[self._depth].most_common(2)

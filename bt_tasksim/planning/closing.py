@@ -113,6 +113,11 @@ class HandClosing:
         found = [np.interp(widths, gap[order], values[order]) for values in self._middles.T]
         return np.stack(found, axis=-1)
 
+    def about(self, width: float) -> Array:
+        """The largest closure ``()`` that is looked at with the sides at least so many metres apart, or 0."""
+        wide = self._between[:, 1] - self._between[:, 0] >= width
+        return np.asarray(self._closures[: int(np.argmin(wide)) or len(wide)].max() if wide[0] else 0.0)
+
     def met(self, grip: Array, pieces: Sequence[Array]) -> Meeting:
         """What the fingertips meet.
 

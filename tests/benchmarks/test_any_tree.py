@@ -17,13 +17,15 @@ from benchmarks.any_tree.__main__ import main
 from benchmarks.any_tree.episodes import Conditions, Player
 from benchmarks.any_tree.five import FIVE
 from benchmarks.any_tree.goals import Step, allowed
+from benchmarks.any_tree.handling import Mover, State
 from benchmarks.any_tree.oracle import judge
 from benchmarks.any_tree.report import summary
 from benchmarks.any_tree.settings import SETTINGS
 from benchmarks.any_tree.tasks import Task, task
 from benchmarks.any_tree.trees import TREES, tree_of
-from bt_tasksim import EngineOptions, Goal, ObjectSpec, Scene, SpotSpec
+from bt_tasksim import EngineOptions, Goal, ObjectSpec, Scene, SpotSpec, load_robot
 from bt_tasksim.concept.leaf import ConceptNode
+from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.scene.outlines import overlapping
 from bt_tasksim.scene.starts import parts_of
@@ -195,3 +197,16 @@ def test_objects_in_one_colour_stand_where_they_stood(folder: Path) -> None:
     assert len({actor.colour for actor in after.objects}) == 1
     assert [actor.pose for actor in after.objects] == [actor.pose for actor in before.objects]
     assert Conditions("panda", "obvious", None, EngineOptions(), folder).to_data().get("colours") is None
+
+
+@pytest.mark.parametrize(("beyond", "meets"), [(0.0, True), (0.03, True), (0.048, False)])
+def test_fingers_that_close_before_a_thing_do_not_grasp_it_in_the_oracle_either(beyond, meets):
+    """The Ability hand's end 14 mm beyond its tool's origin at most, and half the cube is 26 mm."""
+    robot = load_robot("xarm7_ability")
+    cube = ObjectSpec(kinds=("cube",), on="table", size=((0.052,) * 3,) * 2)
+    drawn = Scene("xarm7_ability", objects={"cube": cube}).sample(0)
+    (actor,) = drawn.objects
+    world = drawn.world_model([tip.name for tip in robot.tips], robot.opening)
+    state = State({"cube": np.array(actor.pose)}, robot.rest)
+    mover = Mover(robot, world, actor, state, 0.0, np.random.default_rng(0))
+    assert mover._meets(poses.pose([0.0, 0.0, beyond])) == meets

@@ -19,6 +19,7 @@ from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.world import Obstacle
+from bt_tasksim.planning.arm import arm_of
 from bt_tasksim.planning.route import Pace
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.grips import GivenGrip
@@ -206,3 +207,50 @@ def test_a_hand_of_many_fingers_takes_a_round_thing_about_its_middle_from_the_si
     deepest = from_side[np.argmin(before)]
     assert before.min() < 0.008 and firm.holds(deepest) == SURELY
     assert firm.holds(poses.shifted(deepest, -0.03 * poses.z_axis(deepest[3:]))) != SURELY
+
+
+def between_walls(apart):
+    """The view of a xArm7 with the Ability hand on a bar that stands between walls so many metres apart."""
+    from bt_tasksim import Scene
+    from bt_tasksim.concept_nodes.view import WorldView
+    from bt_tasksim.scene import ObjectSpec
+
+    robot = load_robot("xarm7_ability")
+    bar = ObjectSpec(kinds=("box",), on="table", size=((0.1, 0.02, 0.03),) * 2)
+    model = Scene("xarm7_ability", objects={"bar": bar}).sample(0).world_model(["bar"], robot.opening)
+    walls = [
+        Obstacle(
+            pose=poses.pose([0.45, side * (apart + 0.02) / 2, 0.02]), size=(0.3, 0.02, 0.04), fixture="tray"
+        )
+        for side in (1.0, -1.0)
+    ]
+    world = dataclasses.replace(model, obstacles=(*model.obstacles, *walls))
+    tool = arm_of(robot).tool(robot.rest)
+    objects = {"bar": poses.pose([0.45, 0.0, 0.015])}
+    return WorldView(robot, world, objects, tool, robot.rest, robot.hand_open)
+
+
+def test_a_hand_that_has_no_room_wide_open_comes_partly_closed_where_nothing_else_serves():
+    view = between_walls(apart=0.105)
+    neutral = poses.frame_from_axes(DOWN, np.array([0.0, 1.0, 0.0]))
+    found = candidates(view, "bar", DOWN, neutral)
+    lengthwise = abs(poses.to_matrix(found.tools[:, 3:])[:, 1, 1]) > 0.9
+
+    def asked(thoroughly):
+        chooser = Chooser(view, "bar", 0.1, Pace(0.5), (), ROOMS[-1], thoroughly=thoroughly)
+        return chooser.other(found.keeping(lengthwise))
+
+    with pytest.raises(NoWayError, match="touch tray"):
+        asked(thoroughly=False)
+    assert 0.1 < asked(thoroughly=True).closure < 0.9
+
+
+def test_grasps_with_which_the_arm_comes_to_what_follows_have_their_turn_where_nothing_else_serves(view):
+    """None but those from the side can be brought there, and all the usual ones come from above."""
+    view = between_walls(apart=0.6)
+    neutral = poses.frame_from_axes(DOWN, np.array([0.0, 1.0, 0.0]))
+    found = candidates(view, "bar", DOWN, neutral)
+    high = Aim(poses.pose([0.5, -0.45, 0.78])[None], "be put down on a tower")
+    chooser = Chooser(view, "bar", 0.1, Pace(0.5), [later("bar", high)], ROOMS[-1], thoroughly=True)
+    level = abs(poses.z_axis(chooser._in_reach(found).tools[:100, 3:])[:, 2]) < 0.6
+    assert level.mean() > 0.5 > (abs(poses.z_axis(found.tools[:100, 3:])[:, 2]) < 0.6).mean()

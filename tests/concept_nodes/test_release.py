@@ -51,6 +51,21 @@ def test_it_opens_then_draws_back_against_its_approach(toy):
     assert np.allclose(tools[-1][:3] - first[:3], 0.12 * back, atol=1e-3)
 
 
+def test_fingers_that_something_stops_as_they_open_are_drawn_back_from_it(toy):
+    stage = start(toy, Release("cup"))
+    first, step = stage.world.now.tool_pose.copy(), stage.world.step
+
+    def stopped(command):
+        step(command)
+        if np.linalg.norm(stage.world.now.tool_pose[:3] - first[:3]) < 0.01:
+            closure = max(float(stage.world.now.closure), 0.43)
+            stage.world.put(closure=np.array(closure), contacts=np.ones(2, bool))
+        return stage.world.now
+
+    stage.world.step = stopped
+    assert stage.tick(160) == Status.SUCCESS
+
+
 def test_afterwards_nothing_is_held(toy):
     stage = start(toy, Release("cup"))
     stage.tick(200)

@@ -77,3 +77,15 @@ def test_fingertips_so_far_apart_have_their_middle_there(robot, closing, closure
 
 def test_a_leaned_hand_reaches_equally_deep_with_both_sides(closing):
     assert 0.05 < closing.lean < 0.2, "the thumb reaches deeper, and is raised"
+
+
+@pytest.mark.parametrize("width", [0.02, 0.05])
+def test_a_hand_closed_about_something_leaves_it_between_its_sides(robot, closing, width):
+    closure = float(closing.about(width))
+
+    def gap(closure):
+        tips = tips_in_tool(robot, robot.hand_position(np.array([closure])))
+        return float(tips[1:, 1].mean() - tips[0, 1])
+
+    assert gap(closure) >= width > gap(closure + 0.05)
+    assert closing.about(1.0) == 0.0
