@@ -292,7 +292,7 @@ class Bring(Carry):
         return np.concatenate([nearest_first(options, now) for options in heights])
 
     def _emptier(self, view: WorldView, goals: _Goals) -> _Goals:
-        """Over the emptiest part of a container that has something in it, rather than over its middle."""
+        """Low over the emptiest part of a container with something in it: what falls far bounces off."""
         place = None if self.to is None else view.world.places.get(self.to)
         if goals.options is None or place is None or place.kind != "bin":
             return goals
@@ -300,7 +300,8 @@ class Bring(Carry):
         if np.linalg.norm(goals.options[0, :2] - middle) < 1e-6:
             return goals
         grip = poses.relative(view.objects[self.target], view.tool)
-        return goals._replace(first=poses.multiply(goals.options[0], grip))
+        lowest = goals.options[np.argsort(np.round(goals.options[:, 2], 6), kind="stable")]
+        return goals._replace(first=poses.multiply(lowest[0], grip), options=lowest)
 
     def _goal(self, seen: Seen, now: Array) -> tuple[Array, Array]:
         """Poses ``(N, 7)`` of the object at the end, and the destination's origin that ``via`` refers to."""

@@ -254,3 +254,5 @@ def test_over_a_container_that_has_something_in_it_it_ends_beside_that(toy):
         assert np.array_equal(goals.first, view.tool) is empty
         ends = poses.multiply(goals.first, poses.inverse(poses.relative(now.objects["cup"], now.tool)))
         assert empty or 0.05 < abs(ends[:2] - middle[:2]).max() < 0.15
+        heights = goals.options[:, 2] - min(goals.options[:, 2])
+        assert empty or (abs(heights[0]) < 1e-9 and np.all(np.diff(heights) > -1e-9)), "the lowest first"
