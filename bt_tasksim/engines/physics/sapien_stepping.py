@@ -128,9 +128,9 @@ class SapienWorld:
         self._last_dt = self._dt / shorter
         if shorter > 1:
             self.world.scene.set_timestep(self._last_dt)
+        if watched or self._rolling:
+            self._look_down()
         for _ in range(shorter):
-            if watched or self._rolling:
-                self._look_down()
             self._step(self._last_dt)
             if shorter > 1:
                 self._feel_wrist()
