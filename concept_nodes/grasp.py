@@ -345,6 +345,7 @@ class Grasp(ConceptModel[GraspMemory]):
             if usual is not None and not asked.failed:
                 return usual
             others = candidates(view, self.target, asked.approach, asked.neutral)
+            _, firmly, _ = room
             swings = firmly and standing_side(view.robot) is not None
             others = others.keeping(~others.poor) if swings else others
             return chooser.other(self._as_given(others, view), asked.failed, usual)
