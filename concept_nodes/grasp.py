@@ -96,8 +96,9 @@ PUSHED = 0.06
 TIPPED = math.radians(10.0)
 """Radians by which a grasp may tip the object over, as it is seen, before it holds it."""
 TURNED = math.radians(25.0)
-"""The same for an object that the hand holds by then: it does not fall, and is set upright where it is put
-down."""
+"""The same for an object that fingers of both sides have touched: it turns in the hand and does not fall, and
+is set upright where it is put down. The Ability hand's fingers roll what is low up between them, while now
+one and now another one of them has contact."""
 SEARCHING = 0.2
 """Share of the largest action with which it then goes aside, 1 mm in a control period, as it goes back: any
 faster, the finger takes the object's rim with it and tips it over."""
@@ -509,7 +510,7 @@ class Grasp(ConceptModel[GraspMemory]):
         now, names = seen.observed(self.target), {"object": self.target}
         pushed = poses.norm(now[:, :3] - memory.start[:, :3])
         tipped = poses.tilt(now[:, 3:], memory.start[:, 3:])
-        xp, held = array_namespace(tipped), seen.opposed()
+        xp, held = array_namespace(tipped), self._gripped(seen, memory)
         most = xp.where(held, xp.full_like(tipped, TURNED), xp.full_like(tipped, TIPPED))
         return (
             Limit(CLOSED_ON_NOTHING, seen.closure, EMPTY * self.grip, counts=memory.closing > 0.8),
@@ -517,6 +518,12 @@ class Grasp(ConceptModel[GraspMemory]):
             Limit(PUSHED_AWAY, pushed, PUSHED, names),
             Limit(TIPPED_OVER, tipped, most, names),
         )
+
+    def _gripped(self, seen: Seen, memory: GraspMemory) -> Array:
+        """Whether ``(N,)`` fingers of both sides touch, or have touched since they came: contacts flicker."""
+        xp = array_namespace(memory.touched)
+        sides = [xp.any(memory.touched[:, list(tips)] > 0.0, axis=-1) for tips in seen.robot.opposition]
+        return seen.opposed() | (xp.all(xp.stack(sides, axis=-1), axis=-1) & (memory.closing >= 0.0))
 
     def necessary_cost(self, seen: Seen, memory: GraspMemory) -> Array:
         """How far the hand is from holding the object where it stands, from 0 on.

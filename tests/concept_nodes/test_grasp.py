@@ -183,6 +183,34 @@ def test_what_is_held_may_turn_farther_in_the_hand_than_what_would_fall(toy, tur
     assert stage.tick() == status
 
 
+@pytest.mark.parametrize(
+    ("touched", "status"), [(([1, 0], [0, 1]), Status.RUNNING), (([1, 0], [1, 0]), Status.FAILURE)]
+)
+def test_what_both_sides_have_touched_may_turn_while_contacts_flicker(toy, touched, status):
+    stage = toy(Grasp("cup"))
+    step, ticks = stage.world.step, []
+
+    def turning(command):
+        step(command)
+        if stage.world.now.closure > 0.3 and len(ticks) < 3:
+            ticks.append(None)
+            contacts = np.array((*touched, [0, 0])[len(ticks) - 1], bool)
+            changes = {"contacts": contacts, "closure": np.float64(0.31)}
+            if len(ticks) == 3:
+                objects, i = stage.world.now.objects.copy(), stage.world.model.object_index("cup")
+                turned = np.array([math.cos(0.15), math.sin(0.15), 0.0, 0.0])
+                changes["objects"] = np.array(objects)
+                changes["objects"][i, 3:] = poses.quat_multiply(turned, objects[i, 3:])
+            stage.world.put(**changes)
+        return stage.world.now
+
+    stage.world.step = turning
+    while len(ticks) < 3:
+        assert stage.tick() == Status.RUNNING
+    stage.look()
+    assert stage.tick() == status
+
+
 @pytest.mark.parametrize("approach", [(1.0, 0.0, 0.0), (0.0, 0.0, -1.0)])
 def test_a_wrong_height_is_corrected_whichever_way_the_hand_comes(toy, approach):
     leaf = Grasp("cup", approach=approach)
