@@ -22,7 +22,7 @@ from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.poses import Array, array_namespace, constant, host, indices
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS
-from bt_tasksim.scene.spatial_laws import beyond_walls, is_beside, is_on
+from bt_tasksim.scene.spatial_laws import IsBeside, IsOn, beyond_walls, is_beside, is_on
 from bt_tasksim.scene.specs import Goal
 
 WITHIN = Form(
@@ -61,7 +61,7 @@ class Inside(Condition):
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        return beyond_walls(Estimates(seen), self.target, self.place) <= 0.0
+        return beyond_walls(Estimates.of(seen), self.target, self.place) <= 0.0
 
     def explain(self, seen: Seen) -> Statement:
         """Where it is."""
@@ -101,11 +101,11 @@ class StandsOn(Condition):
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        return is_on(Estimates(seen), self.target, self.place).holds(self.tolerance, self.angle)
+        return self._found(seen).holds(self.tolerance, self.angle)
 
     def explain(self, seen: Seen) -> Statement:
         """Where it is."""
-        found = is_on(Estimates(seen), self.target, self.place)
+        found = self._found(seen)
         upon = tuple(UPON if there else "" for there in host(found.elsewhere).tolist())
         return STANDS(
             object=self.target,
@@ -115,6 +115,10 @@ class StandsOn(Condition):
             angle=found.lean,
             upon=upon,
         )
+
+    def _found(self, seen: Seen) -> IsOn:
+        key = ("is on", self.target, self.place)
+        return seen.once(key, lambda: is_on(Estimates.of(seen), self.target, self.place))
 
 
 @register("concept")
@@ -145,14 +149,18 @@ class Beside(Condition):
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        found = is_beside(Estimates(seen), self.target, self.other)
+        found = self._found(seen)
         return found.holds(self.gap, self.tolerance, self.angle)
 
     def explain(self, seen: Seen) -> Statement:
         """How far apart they are, and how far tilted."""
-        found = is_beside(Estimates(seen), self.target, self.other)
+        found = self._found(seen)
         angle = array_namespace(found.lean).maximum(found.lean, found.other_lean)
         return BESIDE(object=self.target, gap=found.gap, other=self.other, height=found.height, angle=angle)
+
+    def _found(self, seen: Seen) -> IsBeside:
+        key = ("is beside", self.target, self.other)
+        return seen.once(key, lambda: is_beside(Estimates.of(seen), self.target, self.other))
 
 
 @register("concept")
@@ -199,7 +207,8 @@ class Clear(Condition):
 
     def _rooms(self, seen: Seen, target: str) -> list[bool]:
         """Of each world, whether there is room for the target: a search, one world after the other."""
-        return [has_room(view, target, self.place, self.margin) for view in views(seen)]
+        key = ("has room", self.place, target, self.margin)
+        return seen.once(key, lambda: [has_room(v, target, self.place, self.margin) for v in views(seen)])
 
     def _occupied(self, seen: Seen) -> dict[str, Array]:
         """By object, booleans ``(N,)``: it is in the way."""

@@ -252,6 +252,10 @@ class Place(ConceptModel[PlaceMemory]):
 
     def _standing(self, seen: Seen) -> Array:
         """Poses ``(N, 7)`` of the object where it should stand."""
+        key = ("standing", self.target, self.on, self.beside, self.anywhere)
+        return seen.once(key, lambda: self._stands(seen))
+
+    def _stands(self, seen: Seen) -> Array:
         now, model = seen.object(self.target), seen.model(self.target)
         if self.on is None:
             assert self.beside is not None

@@ -195,7 +195,7 @@ class Release(ConceptModel[ReleaseMemory]):
         nothing, back = xp.zeros_like(seen.tool[:, 0]), memory.opened >= memory.path.duration
         if self.into is None or self.into not in seen.world.place_columns or not bool(xp.any(back)):
             return nothing
-        where = Estimates(seen)
+        where = Estimates.of(seen)
         far = beyond_walls(where, self.target, self.into)
         told = back & xp.isfinite(far) & ~floats(where, self.target, self.into)
         return xp.where(told, xp.maximum(far, nothing), nothing)

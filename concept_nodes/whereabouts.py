@@ -24,6 +24,11 @@ class Estimates(Whereabouts):
     def __init__(self, seen: Seen) -> None:
         self._seen = seen
 
+    @classmethod
+    def of(cls, seen: Seen) -> Estimates:
+        """Those of a view, the same for all who ask."""
+        return seen.once("estimates", lambda: cls(seen))
+
     @property
     def bodies(self) -> Collection[str]:
         """See `Whereabouts.bodies`."""
@@ -63,6 +68,9 @@ class Estimates(Whereabouts):
             of: What is asked for ``(k, ...)``.
             nothing: A row for worlds that lack the object, and where there is none.
         """
+        return self._seen.once(("known", name, of), lambda: self._looked_up(name, of, nothing))
+
+    def _looked_up(self, name: str, of: Callable[[ObjectModel], Array], nothing: tuple[float, ...]) -> Array:
         world, found = self._seen.world, []
         for k in range(world.worlds):
             model = world.model_of(k)

@@ -5,8 +5,8 @@ They resolve names to columns. All arrays have a leading axis of worlds ``(N, ..
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import Hidden, Observation
 from bt_tasksim.robot.description import RobotDescription
+
+Made = TypeVar("Made")
 
 
 class Seen:
@@ -36,7 +38,17 @@ class Seen:
             are as they were observed.
     """
 
-    __slots__ = ("_believed", "_derived", "elapsed", "failures", "later", "observation", "robot", "world")
+    __slots__ = (
+        "_believed",
+        "_derived",
+        "_made",
+        "elapsed",
+        "failures",
+        "later",
+        "observation",
+        "robot",
+        "world",
+    )
 
     def __init__(
         self,
@@ -56,6 +68,7 @@ class Seen:
         self.failures = failures
         self._believed = believed
         self._derived: dict[str, Array] | None = None
+        self._made: dict[Hashable, Any] | None = None
 
     def at(self, rows: Array) -> Seen:
         """The view of some of these worlds.
@@ -86,6 +99,20 @@ class Seen:
         if name not in self._derived:
             self._derived[name] = observable(name).read(self.observation, self.world)
         return self._derived[name]
+
+    def once(self, key: Hashable, make: Callable[[], Made]) -> Made:
+        """What is made of this view, when it is first asked for; nobody writes to it.
+
+        Args:
+            key: Says what it is, with all that it is made of beside the view.
+            make: Makes it.
+        """
+        if self._made is None:
+            self._made = {}
+        if key not in self._made:
+            self._made[key] = make()
+        found: Made = self._made[key]
+        return found
 
     @property
     def tool(self) -> Array:

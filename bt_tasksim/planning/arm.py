@@ -82,6 +82,7 @@ class Arm:
         self._scratch = _Scratch()  # the arm of a robot is made once for all threads
         self._frame = self._model.getFrameId("tool")
         self._rows = np.flatnonzero(robot.task_mask > 0.0)
+        self._all = len(self._rows) == len(robot.task_mask)
         weights = robot.task_mask * ([1.0] * 3 + [_LENGTH] * 3)
         self._weights = weights[self._rows]
         self._posture = _PULL * robot.posture
@@ -133,14 +134,18 @@ class Arm:
         for k in range(_ITERATIONS + 1):
             pin.computeJointJacobians(self._model, data, q)
             here = pin.updateFramePlacement(self._model, data, self._frame)
-            error = pin.log6(here.actInv(target)).vector[self._rows]
-            if pull is None and float(np.abs(error).max()) <= _TOLERANCE:
-                return q
+            error = pin.log6(here.actInv(target)).vector
+            if not self._all:
+                error = error[self._rows]
             left = float(np.abs(error).max())
+            if pull is None and left <= _TOLERANCE:
+                return q
             if k == _ITERATIONS or (k >= _PATIENCE and left > _PROGRESS * before[k - _PATIENCE]):
                 break
             before.append(left)
-            jacobian = pin.getFrameJacobian(self._model, data, self._frame, pin.LOCAL)[self._rows]
+            jacobian = pin.getFrameJacobian(self._model, data, self._frame, pin.LOCAL)
+            if not self._all:
+                jacobian = jacobian[self._rows]
             q = self._moved(q, error, jacobian, pull)
             pull = None
         return None
@@ -184,21 +189,22 @@ class Arm:
 
     def _moved(self, q: Array, error: Array, jacobian: Array, pull: Array | None) -> Array:
         e, j = error * self._weights, jacobian * self._weights[:, None]
-        damping = (0.5 * float(e @ e) + _DAMPING) * np.eye(len(e))
-        free = np.ones(len(q))
+        damping, free = 0.5 * float(e @ e) + _DAMPING, None
         for _ in range(2):
-            jf = j * free
-            if pull is None:
-                step = jf.T @ np.linalg.solve(jf @ jf.T + damping, e)
+            jf, z = (j, pull) if free is None else (j * free, None if pull is None else pull * free)
+            square = jf @ jf.T
+            square.ravel()[:: len(e) + 1] += damping
+            if z is None:
+                step = jf.T @ np.linalg.solve(square, e)
             else:
-                z = pull * free
-                step = z + jf.T @ np.linalg.solve(jf @ jf.T + damping, e - jf @ z)
+                step = z + jf.T @ np.linalg.solve(square, e - jf @ z)
             step *= _LONGEST / max(float(np.abs(step).max()), _LONGEST)
-            past = (q + step < self._lower) | (q + step > self._upper)
+            after: Array = q + step
+            past = (after < self._lower) | (after > self._upper)
             if not past.any():
-                break
-            free = np.where(past, 0.0, free)
-        return np.clip(q + step, self._lower, self._upper)
+                return after
+            free = np.where(past, 0.0, 1.0 if free is None else free)
+        return np.minimum(np.maximum(after, self._lower), self._upper)
 
     def along(self, start: Array, tools: Array, leans: float = LEANS) -> Array | None:
         """Joints ``(n, n_arm)`` that lead the tool through poses ``(n, 7)`` without a jump.

@@ -159,14 +159,16 @@ def crossings(corners: Array, starts: Array, ways: Array) -> Iterator[tuple[Arra
 
 def _patch(points: Array, normals: Array, patch: Samples, density: float) -> Array:
     """Shares ``(g,)`` of a fingertip's pad about each point that meet the surface, by samples of it."""
-    shares = []
-    for point, normal in zip(points, normals, strict=True):
-        gap = patch.points - point
-        height = gap @ normal
-        near = np.sum(gap * gap, axis=1) - height * height <= PAD * PAD
-        facing = (np.abs(height) < _FLAT) & (patch.normals @ normal > 0.7)
-        shares.append(np.sum(near & facing) * density / (math.pi * PAD * PAD))
-    return np.minimum(np.array(shares), 1.0)
+    samples, size = patch.points, max(1, _CHUNK // len(patch.points))
+    square, met = np.sum(samples * samples, axis=1), np.empty(len(points))
+    for begin in range(0, len(points), size):
+        point, normal = points[begin : begin + size], normals[begin : begin + size]
+        height = normal @ samples.T - np.sum(normal * point, axis=1)[:, None]
+        far = square - 2.0 * (point @ samples.T) + np.sum(point * point, axis=1)[:, None]
+        there = far - height * height <= PAD * PAD
+        there &= (np.abs(height) < _FLAT) & (normal @ patch.normals.T > 0.7)
+        met[begin : begin + size] = np.count_nonzero(there, axis=1)
+    return np.minimum(met * density / (math.pi * PAD * PAD), 1.0)
 
 
 def _spread(points: Array, closing: Array, firm: Array) -> Array:
