@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bt_tasksim.concept_nodes.surface import top_frame
@@ -22,6 +24,9 @@ in a hand of fingers that swing. It stands up when it is let go. Less than `plac
 ASIDE = 0.01
 """Metres beside where something should stand at which it is put down where it cannot be put there itself:
 half of what `AtPose` tolerates; the rest is for errors of estimates and of the hand."""
+FARTHER = 0.014
+"""The same once it is held: a grasp is chosen for `ASIDE`, and what is held moves some millimetres in the
+hand as this closes."""
 
 
 def standing_options(view: WorldView, target: str, reference: str, hover: float = 0.0) -> Array:
@@ -46,17 +51,24 @@ def standing_options(view: WorldView, target: str, reference: str, hover: float 
     return np.concatenate([np.tile(positions, (few, 1)), np.repeat(turned, many, axis=0)], axis=-1)
 
 
-def aside_options(view: WorldView, reference: str, options: Array) -> Array:
-    """Poses ``(m, 7)`` `ASIDE` of some ``(k, 7)`` over a place: nearer to the arm's base, farther, across.
+def aside_options(view: WorldView, reference: str, options: Array, far: Sequence[float] = (ASIDE,)) -> Array:
+    """Poses ``(m, 7)`` aside of some ``(k, 7)`` over a place: nearer to the arm's base, farther, across.
 
     None is over another object, whose top may be small, or in a container; nor beyond the place itself.
+
+    Args:
+        view: The world.
+        reference: The place.
+        options: The poses.
+        far: How far aside, metres, one after the other.
     """
     place = view.world.places.get(reference)
     if place is None or place.kind == "bin" or not len(options):
         return np.zeros((0, 7))
     frame = np.asarray(place.pose)
     towards = frame[:2] / max(float(np.linalg.norm(frame[:2])), 1e-9)
-    steps = ASIDE * np.array([-towards, towards, (-towards[1], towards[0]), (towards[1], -towards[0])])
+    ways = np.array([-towards, towards, (-towards[1], towards[0]), (towards[1], -towards[0])])
+    steps = [metres * way for metres in far for way in ways]
     moved = np.concatenate([options + np.array([*step, 0.0, 0.0, 0.0, 0.0, 0.0]) for step in steps])
     there = abs(poses.localise(frame, moved[:, :3])[:, :2] - np.asarray(place.centre))
     found: Array = moved[(there <= np.asarray(place.extent) / 2).all(axis=-1)]

@@ -11,7 +11,7 @@ from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Bring, Place
 from bt_tasksim.concept_nodes.bring import _Goals, standing_pose
 from bt_tasksim.concept_nodes.holding import NOT_HELD
-from bt_tasksim.concept_nodes.standing import ASIDE
+from bt_tasksim.concept_nodes.standing import ASIDE, FARTHER
 from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
@@ -96,8 +96,8 @@ def test_how_far_it_goes_down_follows_from_where_the_object_is_in_the_hand(toy, 
     assert fits or (leaf.outcome.is_a(NO_WAY) and "ribs" in leaf.feedback_message)
 
 
-@pytest.mark.parametrize("overlap", [-0.01, 0.004])
-def test_what_cannot_stand_exactly_there_is_put_down_a_little_aside(toy, overlap):
+@pytest.mark.parametrize(("overlap", "aside"), [(-0.01, 0.0), (0.004, ASIDE), (0.012, FARTHER)])
+def test_what_cannot_stand_exactly_there_is_put_down_a_little_aside(toy, overlap, aside):
     """A kerb stands some millimetres into the place of a cup, on the side away from the arm."""
     bring, place = Bring("cup", to="goal"), Place("cup", on="goal")
     stage = toy(sequence("put down", bring, place))
@@ -119,7 +119,7 @@ def test_what_cannot_stand_exactly_there_is_put_down_a_little_aside(toy, overlap
     put_down = place.model.begin(stage.context.seen(ONE, np.zeros(1))).path.table[0, -1]
     for end in (brought, put_down):  # the toy holds objects at the tool's origin
         off = float((end[:2] - goal[:2]) @ away)
-        assert off == pytest.approx(-ASIDE if overlap > 0.0 else 0.0, abs=2e-3)
+        assert off == pytest.approx(-aside, abs=2e-3)
 
 
 def test_via_points_are_passed_in_order(toy):
