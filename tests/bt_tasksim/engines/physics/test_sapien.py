@@ -1,5 +1,6 @@
 """SAPIEN: what PhysX reports of a contact, and the same again bit for bit."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ from bt_tasksim.core.world import Command
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physics.sapien import SapienPhysics
 from bt_tasksim.engines.physics.sapien_stepping import CLOSING, FLYING, LIGHTEST, STRIDE
+from bt_tasksim.engines.physics.threaded import FALLING
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.trees.load import load_source
@@ -97,6 +99,27 @@ def test_what_flies_is_stepped_finely_and_what_lands_more_finely_the_faster_it_i
         flying += np.allclose(steps, 0.01 / FLYING, rtol=1e-4)
         landing += steps.min() * fast < 1.01 * STRIDE and longest > steps.min()
     assert flying > 1 and landing == 1
+
+
+def test_what_tips_over_is_stepped_finely_from_when_it_is_fast_and_not_from_the_next_period():
+    upright, tilt = scene("box", 0.18).sample(1), 0.45
+    (thing,) = upright.objects
+    _, y, z = np.array(thing.shape().extent) / 2
+    place = [*thing.pose[:2], y * np.sin(tilt) + z * np.cos(tilt) + 2e-4]  # on an edge, nearly balanced
+    pose = (*place, np.cos(tilt / 2), np.sin(tilt / 2), 0.0, 0.0)
+    world = Still(replace(upright, objects=(replace(thing, pose=pose),)))
+    system, scene_of = world.physics.simulated.world.system, world.physics.simulated.world
+    (body,), coarse = scene_of.objects, []
+
+    def step():
+        if scene_of.scene.timestep > 0.009:
+            coarse.append(np.linalg.norm(body.angular_velocity))
+        system.step()
+
+    scene_of.system = SimpleNamespace(step=step, get_contacts=system.get_contacts)
+    fastest = max(np.linalg.norm(world.step().velocities[0, 3:]) for _ in range(20))
+    assert fastest > 2.0, "it topples"
+    assert len(coarse) > 10 and max(coarse) <= FALLING[1]
 
 
 def test_steps_are_shorter_while_the_hand_closes_fast():
