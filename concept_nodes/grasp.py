@@ -522,7 +522,8 @@ class Grasp(ConceptModel[GraspMemory]):
     def _gripped(self, seen: Seen, memory: GraspMemory) -> Array:
         """Whether ``(N,)`` fingers of both sides touch, or have touched since they came: contacts flicker."""
         xp = array_namespace(memory.touched)
-        sides = [xp.any(memory.touched[:, list(tips)] > 0.0, axis=-1) for tips in seen.robot.opposition]
+        tips = [[memory.touched[:, k] > 0.0 for k in side] for side in seen.robot.opposition]
+        sides = [xp.any(xp.stack(side, axis=-1), axis=-1) for side in tips]
         return seen.opposed() | (xp.all(xp.stack(sides, axis=-1), axis=-1) & (memory.closing >= 0.0))
 
     def necessary_cost(self, seen: Seen, memory: GraspMemory) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
@@ -107,14 +108,16 @@ class SapienWorld:
 
     def advance(self) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
-        loose = self._falling or self._letting_go > 0
+        free = [force == 0.0 or self._letting_go > 0 for force in self._touch.hand_force]
+        loose = self._falling or self._rolling or self._letting_go > 0
         shorter = self._shorter if self._closing else 1
-        watched = loose or self._watch > 0
+        watched = self._falling or self._letting_go > 0 or self._watch > 0
         self._letting_go, self._closing = max(self._letting_go - 1, 0), max(self._closing - 1, 0)
         self._watch = max(self._watch - 1, 0)
         for _ in range(self._substeps):
             self._felt = []
-            moving = self._moving() if loose else []
+            # What rocks to and fro is slow where it turns, and lands before the period ends.
+            moving = self._moving(free) if loose else []
             if self._disturbs():
                 moving.append(self._pushed)
             if moving:
@@ -184,16 +187,15 @@ class SapienWorld:
         linear, angular = body.linear_velocity.tolist(), body.angular_velocity.tolist()
         return math.hypot(*linear) + math.hypot(*angular) * self.world.radius[which]
 
-    def _moving(self) -> list[int]:
-        """The objects that move so fast that steps have to be finer."""
-        speeds = (
-            (body.linear_velocity.tolist(), body.angular_velocity.tolist()) for body in self.world.objects
-        )
-        return [
-            k
-            for k, (linear, angular) in enumerate(speeds)
-            if math.hypot(*linear) > FALLING[0] or math.hypot(*angular) > FALLING[1]
-        ]
+    def _moving(self, free: Sequence[bool]) -> list[int]:
+        """Those objects of free ones that move so fast that steps have to be finer."""
+        found = []
+        for k, body in enumerate(self.world.objects):
+            if free[k]:
+                linear, angular = body.linear_velocity.tolist(), body.angular_velocity.tolist()
+                if math.hypot(*linear) > FALLING[0] or math.hypot(*angular) > FALLING[1]:
+                    found.append(k)
+        return found
 
     # ---- reading ----------------------------------------------------------------------------------------
 

@@ -1,5 +1,6 @@
 """SAPIEN: what PhysX reports of a contact, and the same again bit for bit."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ from bt_tasksim.core.world import Command
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physics.sapien import SapienPhysics
 from bt_tasksim.engines.physics.sapien_stepping import CLOSING, FLYING, LIGHTEST, STRIDE
+from bt_tasksim.engines.physics.threaded import FALLING
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.trees.load import load_source
@@ -99,6 +101,27 @@ def test_what_flies_is_stepped_finely_and_what_lands_more_finely_the_faster_it_i
     assert flying > 1 and landing == 1
 
 
+def test_what_tips_over_is_stepped_finely_from_when_it_is_fast_and_not_from_the_next_period():
+    upright, tilt = scene("box", 0.18).sample(1), 0.45
+    (thing,) = upright.objects
+    _, y, z = np.array(thing.shape().extent) / 2
+    place = [*thing.pose[:2], y * np.sin(tilt) + z * np.cos(tilt) + 2e-4]  # on an edge, nearly balanced
+    pose = (*place, np.cos(tilt / 2), np.sin(tilt / 2), 0.0, 0.0)
+    world = Still(replace(upright, objects=(replace(thing, pose=pose),)))
+    system, scene_of = world.physics.simulated.world.system, world.physics.simulated.world
+    (body,), coarse = scene_of.objects, []
+
+    def step():
+        if scene_of.scene.timestep > 0.009:
+            coarse.append(np.linalg.norm(body.angular_velocity))
+        system.step()
+
+    scene_of.system = SimpleNamespace(step=step, get_contacts=system.get_contacts)
+    fastest = max(np.linalg.norm(world.step().velocities[0, 3:]) for _ in range(20))
+    assert fastest > 2.0, "it topples"
+    assert len(coarse) > 10 and max(coarse) <= FALLING[1]
+
+
 def test_steps_are_shorter_while_the_hand_closes_fast():
     runner = holding("box", 0.2, robot="xarm7_ability")
     for _ in range(10):
@@ -137,8 +160,10 @@ def test_the_wrist_feels_the_mean_of_a_usual_step_however_finely_it_is_stepped(m
     world.system = SimpleNamespace(step=step, get_contacts=system.get_contacts)
     runner.pipeline.step(Command(hand=np.array([closure])))
     world.system = system
-    last = round(0.01 / felt[-1][0])
-    mean = np.mean([forces for _, forces in felt[-last:]], axis=0)
+    steps = np.cumsum([dt for dt, _ in felt[::-1]])
+    last = int(np.argmin(abs(steps - 0.01))) + 1  # short ones, and not all alike, that make up a usual one
+    assert steps[last - 1] == pytest.approx(0.01)
+    mean = sum(dt * forces for dt, forces in felt[-last:]) / 0.01
     assert last > 1 and not np.allclose(mean, felt[-1][1], atol=1e-6)
     assert np.allclose(simulated._readings.incoming[0], mean, atol=1e-6)
 
