@@ -41,5 +41,8 @@ def tree_of(steps: Sequence[Step], goals: Sequence[Any], kind: str, grasp: str |
 def _leaves(step: Step, grasp: str | None) -> list[Behaviour]:
     policy = {} if grasp is None else {"policy": grasp}
     name, to = step.target, step.place
-    taken: list[Behaviour] = [Grasp(name, **policy), Pick(name), Bring(name, to=to)]
-    return [*taken, Release(name, into=to)] if step.drop else [*taken, Place(name, on=to), Release(name)]
+    where = {"anywhere": True} if step.goal.relation == "anywhere" else {}
+    taken: list[Behaviour] = [Grasp(name, **policy), Pick(name), Bring(name, to=to, **where)]
+    if step.drop:
+        return [*taken, Release(name, into=to)]
+    return [*taken, Place(name, on=to, **where), Release(name)]

@@ -157,15 +157,18 @@ def test_the_wrist_feels_the_mean_of_a_usual_step_however_finely_it_is_stepped(m
         system.step()
         felt.append((world.scene.timestep, simulated.robot.articulation.get_link_incoming_joint_forces()))
 
-    world.system = SimpleNamespace(step=step, get_contacts=system.get_contacts)
-    runner.pipeline.step(Command(hand=np.array([closure])))
+    world.system, shorter = SimpleNamespace(step=step, get_contacts=system.get_contacts), 0
+    for _ in range(6):
+        felt.clear()
+        runner.pipeline.step(Command(hand=np.array([closure])))
+        steps = np.cumsum([dt for dt, _ in felt[::-1]])
+        last = int(np.argmin(abs(steps - 0.01))) + 1  # those that make up the last usual one, not all alike
+        assert steps[last - 1] == pytest.approx(0.01)
+        mean = sum(dt * forces for dt, forces in felt[-last:]) / 0.01
+        shorter += last > 1 and not np.allclose(mean, felt[-1][1], atol=1e-6)
+        assert np.allclose(simulated._readings.incoming[0], mean, atol=1e-6)
     world.system = system
-    steps = np.cumsum([dt for dt, _ in felt[::-1]])
-    last = int(np.argmin(abs(steps - 0.01))) + 1  # short ones, and not all alike, that make up a usual one
-    assert steps[last - 1] == pytest.approx(0.01)
-    mean = sum(dt * forces for dt, forces in felt[-last:]) / 0.01
-    assert last > 1 and not np.allclose(mean, felt[-1][1], atol=1e-6)
-    assert np.allclose(simulated._readings.incoming[0], mean, atol=1e-6)
+    assert shorter
 
 
 @pytest.mark.parametrize("height", [0.1, 0.25, 0.45])
