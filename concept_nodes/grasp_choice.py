@@ -70,6 +70,8 @@ LONGER = 4
 use up all that are asked, before one that comes level has its turn."""
 ABOUT = 12
 """Poses in what follows by which it is judged whether the arm comes near them."""
+LIKELIEST = 4000
+"""Grasps that are looked at then; of some meshes there are 11,000."""
 USUAL, FAR = 0.3, 3.0
 """What a grasp costs then of what it costs otherwise, and for each radian that the arm is from it, or from
 what follows."""
@@ -257,7 +259,8 @@ class Chooser:
         """Those first to which the arm comes easily, and with which it does what follows."""
         tools = candidates.tools
         far = reach_of(self._view.robot).far(tools) + sum(aim.far(tools) for aim in self._aims[:1])
-        return candidates.costing(USUAL * candidates.costs + FAR * far)
+        found = candidates.costing(USUAL * candidates.costs + FAR * far)
+        return found.keeping(np.arange(len(tools)) < LIKELIEST)  # they are in order
 
     def _with_room(self, tool: Array, width: float) -> Opening | None:
         """The hand that has room at a grasp ``(7,)`` of what is ``width`` metres wide, if any."""
