@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -82,11 +84,23 @@ def retry(attempts: int, child: Behaviour, *, name: str = "RetryUntilSuccessful"
     return Retry(name, free_children(name, (child,))[0], attempts)
 
 
-@register("tree node", "RetryUntilSuccessful")
-class RetryUntilSuccessfulKind(NodeKind[Retry]):
-    """See `Retry`."""
+RetryT = TypeVar("RetryT", bound=Retry)
+
+
+class AttemptsKind(NodeKind[RetryT], abc.ABC):
+    """A kind of node whose port says how often its child is tried."""
 
     category = "Decorator"
+
+    def read(self, node: RetryT) -> dict[str, int]:
+        """See `NodeKind.read`."""
+        return {"num_attempts": node.attempts}
+
+
+@register("tree node", "RetryUntilSuccessful")
+class RetryUntilSuccessfulKind(AttemptsKind[Retry]):
+    """See `Retry`."""
+
     behaviour = Retry
     symbol = "↺"
     label = "retry"
@@ -96,10 +110,6 @@ class RetryUntilSuccessfulKind(NodeKind[Retry]):
     def make(self, name: str, children: list[Behaviour], ports: Mapping[str, int]) -> Retry:
         """See `NodeKind.make`."""
         return retry(ports["num_attempts"], children[0], name=name)
-
-    def read(self, node: Retry) -> dict[str, int]:
-        """See `NodeKind.read`."""
-        return {"num_attempts": node.attempts}
 
     def describe(self, node: Retry) -> str:
         """See `NodeKind.describe`."""

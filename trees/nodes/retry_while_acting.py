@@ -12,10 +12,10 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT
 from bt_tasksim.trees.nodes.acting import acts
-from bt_tasksim.trees.nodes.base import NodeKind, Port, free_children
+from bt_tasksim.trees.nodes.base import Port, free_children
 from bt_tasksim.trees.nodes.batch import FAILURE, RUNNING, NodePlace
 from bt_tasksim.trees.nodes.causes import Cause, summary
-from bt_tasksim.trees.nodes.retry import BatchRetry, Retry
+from bt_tasksim.trees.nodes.retry import AttemptsKind, BatchRetry, Retry
 
 NOTHING_DONE = register_reason(
     "nothing_done",
@@ -75,10 +75,9 @@ def retry_while_acting(
 
 
 @register("tree node", "RetryWhileActing")
-class RetryWhileActingKind(NodeKind[RetryWhileActing]):
+class RetryWhileActingKind(AttemptsKind[RetryWhileActing]):
     """See `RetryWhileActing`."""
 
-    category = "Decorator"
     behaviour = RetryWhileActing
     symbol = "↺ᴬ"
     label = "retry while it acts"
@@ -89,10 +88,6 @@ class RetryWhileActingKind(NodeKind[RetryWhileActing]):
     def make(self, name: str, children: list[Behaviour], ports: Mapping[str, int]) -> RetryWhileActing:
         """See `NodeKind.make`."""
         return retry_while_acting(ports["num_attempts"], children[0], name=name)
-
-    def read(self, node: RetryWhileActing) -> dict[str, int]:
-        """See `NodeKind.read`."""
-        return {"num_attempts": node.attempts}
 
     def describe(self, node: RetryWhileActing) -> str:
         """See `NodeKind.describe`."""
