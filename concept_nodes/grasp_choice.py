@@ -524,7 +524,7 @@ class _Served:
         return any(reached(tool) and turned(tool) for tool in tools)
 
     def far(self, tools: Array) -> Array:
-        """How far ``(k,)`` the arm is from being there with grasps ``(k, 7)``, see `Reach.far`."""
+        """How far ``(k,)`` the arm is from being there with grasps ``(k, 7)``, see `ReachMap.far`."""
         grips = poses.relative(self._around.now[None], tools)
         some = self._possible[:: max(1, len(self._possible) // ABOUT)]
         reach = reach_of(self._around.view.robot)

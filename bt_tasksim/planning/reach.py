@@ -23,7 +23,7 @@ _METRES = 0.25
 """Metres aside of a pose that count like one radian beside it."""
 
 
-class Reach:
+class ReachMap:
     """Where the tool of one arm can be.
 
     Args:
@@ -45,9 +45,9 @@ class Reach:
         return found
 
 
-def reach_of(robot: RobotDescription) -> Reach:
+def reach_of(robot: RobotDescription) -> ReachMap:
     """The map of a robot's arm, made once."""
-    found: Reach = robot.derived("reach", Reach)
+    found: ReachMap = robot.derived("reach", ReachMap)
     return found
 
 
