@@ -138,7 +138,7 @@ def _shuffled(rng: np.random.Generator, taken: dict[str, Any]) -> ExitStack:
         (grasp_choice.Chooser, "usual", lambda self, goal, way: None),
         (grasp_choice.Chooser, "_free", free),
         (grasp_choice.Chooser, "other", other),
-        (grasp, "rooms", lambda robot: [(1.0, False)]),
+        (grasp, "rooms", lambda robot, aside=False: [(1.0, False, False)]),
     ):
         stack.enter_context(mock.patch.object(where, name, what))
     return stack
