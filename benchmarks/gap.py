@@ -26,7 +26,6 @@ from bt_tasksim.core.world import Hidden
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import QUIET, SETTLE, Runner
 from bt_tasksim.hardware.twin.evaluation import EvaluationClient
-from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.success import at_rest, evaluate_success
 from bt_tasksim.training.evaluation import Job, evaluate
 from bt_tasksim.training.evaluation_outcomes import wilson
@@ -61,35 +60,53 @@ def on_the_twin(
 ) -> list[Episode]:
     """Episodes over ROS, judged by the twin's own truth."""
     source = load_source(scenario, policies=GRASPS[grasp])
-    robot = load_robot(source.scene.robot)
     with bench_of(domain, camera=camera) as bench:
         perception = "camera" if camera else "state"
         options = EngineOptions(engines=f"ros:127.0.0.1:{bench.twin.port}", perception=perception)
         runner = Runner(source.build(), source.scene, options)
         try:
-            return [_one(runner, robot, bench.evaluation, seed) for seed in seeds]
+            return [_one(runner, bench.evaluation, seed) for seed in seeds]
         finally:
             runner.close()
 
 
-def _one(runner: Runner, robot: Any, evaluation: EvaluationClient, seed: int) -> Episode:
-    configuration = runner.scene.sample(seed)
+def _one(runner: Runner, evaluation: EvaluationClient, seed: int) -> Episode:
+    found = judged_by_truth(runner, evaluation, seed)
+    return Episode(seed, found.success, found.reason, found.why)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A run on the twin: its status, the leaf that failed, and what its own hidden state says of it."""
+
+    success: bool
+    status: str
+    leaf: str
+    reason: str
+    why: str
+
+
+def judged_by_truth(
+    runner: Runner, evaluation: EvaluationClient, seed: int, stream: str = "evaluation"
+) -> Judged:
+    """One run on the twin, in the world that this seed draws."""
+    configuration, robot = runner.scene.sample(seed, stream), runner.robot
     evaluation.load(configuration, seed)
     try:
-        result = runner.run(seed)
-        ended, reason, why = result.status.name == "SUCCESS", result.reason, result.why
+        result = runner.run(seed, stream)
+        status, leaf, reason, why = result.status.name, result.leaf, result.reason, result.why
     except BtTasksimError as error:
         outcome = outcome_of_error(error)
-        ended, reason, why = False, outcome.cause.reason.name, outcome.sentence
-    truth = settled_truth(evaluation)
+        status, leaf, reason, why = "INVALID", "", outcome.cause.reason.name, outcome.sentence
+    truth = _settled(evaluation)
     model = configuration.world_model([tip.name for tip in robot.tips], robot.opening)
     verdict = evaluate_success(configuration, model, truth)
-    if ended:
+    if status == "SUCCESS":
         reason, why = verdict.reason, verdict.why
-    return Episode(seed, ended and verdict.success, reason, why)
+    return Judged(status == "SUCCESS" and verdict.success, status, leaf, reason, why)
 
 
-def settled_truth(evaluation: EvaluationClient) -> Hidden:
+def _settled(evaluation: EvaluationClient) -> Hidden:
     """The truth once things have come to rest, or have not for as long as a simulation would wait."""
     end, quiet = time.monotonic() + SETTLE, 0
     while True:

@@ -33,8 +33,6 @@ from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, r
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.spots import GAP, Spots, spots_beside, spots_on
 from bt_tasksim.concept_nodes.standing import (
-    ASIDE,
-    FARTHER,
     aside_options,
     nearest_first,
     standing_options,
@@ -211,7 +209,7 @@ class Bring(Carry):
                 options = self._options(view)
                 aside = None
                 if self.to is not None and options is not None and put_down:
-                    aside = aside_options(view, self.to, options, (ASIDE, FARTHER))
+                    aside = aside_options(view, self.to, options, held=True)
                 ends = self._emptier(view, _Goals(goals[k], options, floor, supports, aside))
             turn = middles[k] if bool(turned[k]) else None
             way, route = _found(

@@ -21,7 +21,15 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes import grasp_features
 from bt_tasksim.concept_nodes.closer import with_room
 from bt_tasksim.concept_nodes.grasp_candidates import Candidates, candidates, narrowest_grip
-from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, goes_aside, rooms, thorough
+from bt_tasksim.concept_nodes.grasp_choice import (
+    GENTLE,
+    Choice,
+    Chooser,
+    aims_of,
+    goes_aside,
+    rooms,
+    thorough,
+)
 from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, CLOSE, EAGER, HASTE, SCALE
 from bt_tasksim.concept_nodes.grasp_firmness import SLANTED
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
@@ -338,10 +346,11 @@ class Grasp(ConceptModel[GraspMemory]):
 
     def _choice(self, view: WorldView, asked: _Asked, later: Sequence[Any]) -> Choice:
         """The grasp in one world, see `_chosen`."""
+        aims = aims_of(view, self.target, later)
 
         def find(room: tuple[float, bool, bool], thoroughly: bool = False) -> Choice:
             pace = Pace(self.speed)
-            chooser = Chooser(view, self.target, self.standoff, pace, later, *room, thoroughly)
+            chooser = Chooser(view, self.target, self.standoff, pace, aims, *room, thoroughly)
             usual = chooser.usual(asked.usual, asked.way)
             if usual is not None and not asked.failed:
                 return usual
@@ -351,7 +360,7 @@ class Grasp(ConceptModel[GraspMemory]):
             others = others.keeping(~others.poor) if swings else others
             return chooser.other(self._as_given(others, view), asked.failed, usual)
 
-        tried = rooms(view.robot, goes_aside(view, self.target, later))
+        tried = rooms(view.robot, goes_aside(aims))
         try:
             return with_room(tried, find)
         except NoWayError as error:

@@ -134,7 +134,7 @@ class Chooser:
         target: The object.
         standoff: Metres before the grasp from which the hand comes straight on.
         pace: How fast the tool may go.
-        later: The concepts that come after the grasp.
+        aims: What is done with the target until it is let go, see `aims_of`.
         closer: How much closer than usual what follows may come to things.
         firmly: Grasps that the fingers would hardly hold do not count.
         aside: It may be put down a little aside of where it should stand, see `Aim.aside`.
@@ -148,7 +148,7 @@ class Chooser:
         target: str,
         standoff: float,
         pace: Pace,
-        later: Sequence[Any],
+        aims: Sequence[Aim],
         closer: float,
         firmly: bool = False,
         aside: bool = False,
@@ -162,7 +162,8 @@ class Chooser:
         self._openings: dict[float, Opening] = {}
         if close:
             self._pace = pace = Pace(SLOWER * pace.speed, acceleration=SLOWER**2 * pace.acceleration)
-        self._aims = _aims(view, target, later, closer, aside)
+        around = _Around(view, target, closer)
+        self._aims = [_Served(around, aim, aside) for aim in reversed(aims)]  # the last one is the hardest
         self._why: Counter[str] = Counter()
         self._gently = pace._replace(acceleration=GENTLE)
 
@@ -445,9 +446,9 @@ def rooms(robot: RobotDescription, aside: bool = False) -> list[tuple[float, boo
     return [(closer, firm, beside) for firm in firmly for closer, beside in tried]
 
 
-def goes_aside(view: WorldView, target: str, later: Sequence[Any]) -> bool:
+def goes_aside(aims: Sequence[Aim]) -> bool:
     """Whether a target may be put down a little aside of where it should stand, see `Aim.aside`."""
-    return any(aim.aside is not None and len(aim.aside) > 0 for aim in _aims_of(view, target, later))
+    return any(aim.aside is not None and len(aim.aside) > 0 for aim in aims)
 
 
 def thorough(robot: RobotDescription) -> bool:
@@ -542,22 +543,24 @@ class _Served:
         return np.array([pose for pose in self._poses if object_.free(pose)]).reshape(-1, 7)
 
 
-def _aims(view: WorldView, target: str, later: Sequence[Any], closer: float, aside: bool) -> list[_Served]:
-    """What is done with the target until it is let go, the last thing first: it is the hardest."""
-    around = _Around(view, target, closer)
-    return [_Served(around, aim, aside) for aim in _aims_of(view, target, later)][::-1]
+def aims_of(view: WorldView, target: str, later: Sequence[Any]) -> list[Aim]:
+    """What is done with the target until it is let go.
 
-
-def _aims_of(view: WorldView, target: str, later: Sequence[Any]) -> Iterator[Aim]:
-    """What is done with the target until it is let go."""
+    Args:
+        view: The world.
+        target: The object.
+        later: The concepts that come after the grasp.
+    """
+    found: list[Aim] = []
     for model in later:
         if getattr(model, "actor", None) != target:
             continue
         aim = model.aim(view)
         if aim is not None:
-            yield aim
+            found.append(aim)
         if HOLDING in model.ends:
             break
+    return found
 
 
 def _straight(way: Sequence[Array], coming: WayFinder, at: WayFinder) -> tuple[Array, Array] | None:

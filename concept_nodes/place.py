@@ -33,8 +33,6 @@ from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
 from bt_tasksim.concept_nodes.standing import (
-    ASIDE,
-    FARTHER,
     aside_options,
     nearest_first,
     standing_options,
@@ -294,7 +292,7 @@ class Place(ConceptModel[PlaceMemory]):
         grip = poses.relative(now, view.tool)
         options = nearest_first(standing_options(view, self.target, self.on), now[3:])
         leaning = tipped(options[:1], grip) if len(view.arm) >= FULL else options[:0]
-        aside = aside_options(view, self.on, options[:1], (ASIDE, FARTHER))
+        aside = aside_options(view, self.on, options[:1], held=True)
         nearest = np.argsort(np.linalg.norm(aside[:, :2] - now[:2], axis=-1), kind="stable")
         tried = np.concatenate([options[1 : 1 + OTHERS], aside[nearest], leaning])
         return poses.multiply(tried, grip[None]) + self.overshoot * self._along

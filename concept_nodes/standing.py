@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from bt_tasksim.concept_nodes.surface import top_frame
@@ -51,7 +49,7 @@ def standing_options(view: WorldView, target: str, reference: str, hover: float 
     return np.concatenate([np.tile(positions, (few, 1)), np.repeat(turned, many, axis=0)], axis=-1)
 
 
-def aside_options(view: WorldView, reference: str, options: Array, far: Sequence[float] = (ASIDE,)) -> Array:
+def aside_options(view: WorldView, reference: str, options: Array, held: bool = False) -> Array:
     """Poses ``(m, 7)`` aside of some ``(k, 7)`` over a place: nearer to the arm's base, farther, across.
 
     None is over another object, whose top may be small, or in a container; nor beyond the place itself.
@@ -60,7 +58,7 @@ def aside_options(view: WorldView, reference: str, options: Array, far: Sequence
         view: The world.
         reference: The place.
         options: The poses.
-        far: How far aside, metres, one after the other.
+        held: They are for what is in the hand; else for the choice of a grasp.
     """
     place = view.world.places.get(reference)
     if place is None or place.kind == "bin" or not len(options):
@@ -68,7 +66,7 @@ def aside_options(view: WorldView, reference: str, options: Array, far: Sequence
     frame = np.asarray(place.pose)
     towards = frame[:2] / max(float(np.linalg.norm(frame[:2])), 1e-9)
     ways = np.array([-towards, towards, (-towards[1], towards[0]), (towards[1], -towards[0])])
-    steps = [metres * way for metres in far for way in ways]
+    steps = [far * way for far in ((ASIDE, FARTHER) if held else (ASIDE,)) for way in ways]
     moved = np.concatenate([options + np.array([*step, 0.0, 0.0, 0.0, 0.0, 0.0]) for step in steps])
     there = abs(poses.localise(frame, moved[:, :3])[:, :2] - np.asarray(place.centre))
     found: Array = moved[(there <= np.asarray(place.extent) / 2).all(axis=-1)]

@@ -158,13 +158,4 @@ def put_down(seen: Seen) -> Seen:
         world = seen.world.model_of(k)
         own = [columns[model.name] for model in world.objects]
         corrected[k, own] = at_rest(world, corrected[k, own])
-    there = constant(corrected, seen.objects)
-    return Seen(
-        seen.observation,
-        seen.world,
-        seen.robot,
-        seen.elapsed,
-        seen.later,
-        seen.failures,
-        believed=lambda: there,
-    )
+    return seen.believing(constant(corrected, seen.objects))

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks.any_tree.fine_grips import fine_grips
+from bt_tasksim.concept_nodes.grasp_firmness import TWO
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import WorldModel
@@ -58,8 +59,6 @@ WAYS = (1, 2, 3, 4)
 """Seeds of the search for a way."""
 LEANS = float(np.deg2rad(9.0))
 """Radians by which an object may lean in the end: an arm of five joints leans a little."""
-TWO = 2
-"""Fingertips of a hand that meets whatever is between its pads."""
 DEEPEST = (
     "no grip fits the hand",
     "every grasp is out of reach",
@@ -193,7 +192,7 @@ class Mover:
 
         Held back from a grip, the curled fingers of a hand of many may close before the object.
         """
-        if len(self._robot.tips) <= TWO:
+        if len(self._robot.tips) <= TWO:  # it meets whatever is between its pads
             return True
         closing = closing_of(self._robot)
         return closing.squeeze(closing.met(grip, self._pieces)) is not None

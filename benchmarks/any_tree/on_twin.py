@@ -7,17 +7,14 @@ draw; what it knows of them has the errors that its own file states.
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from benchmarks.any_tree.episodes import Conditions, Player, longest
 from benchmarks.any_tree.tasks import Task
 from benchmarks.faults import Bench, bench_of
-from benchmarks.gap import settled_truth
-from bt_tasksim import Runner, load_robot
-from bt_tasksim.core.errors import BtTasksimError
-from bt_tasksim.core.outcomes import outcome_of_error
-from bt_tasksim.scene.success import evaluate_success
+from benchmarks.gap import judged_by_truth
+from bt_tasksim import Runner
 
 DOMAIN = 47
 """ROS domain."""
@@ -49,30 +46,7 @@ class TwinPlayer(Player):
         tree = drawn.tree(self._conditions.tree, self._conditions.grasp)
         runner = Runner(tree, drawn.scene, options, longest=longest(drawn))
         try:
-            return self._judged(runner, drawn)
+            found = judged_by_truth(runner, self._bench.evaluation, drawn.seed, drawn.stream)
+            return {**asdict(found), "concept": self.concept_of(runner, found.leaf)}
         finally:
             runner.close()
-
-    def _judged(self, runner: Runner, drawn: Task) -> dict[str, Any]:
-        assert self._bench is not None
-        configuration, robot = drawn.sample(), load_robot(drawn.robot)
-        self._bench.evaluation.load(configuration, drawn.seed)
-        try:
-            result = runner.run(drawn.seed, drawn.stream)
-            status, leaf, reason, why = result.status.name, result.leaf, result.reason, result.why
-        except BtTasksimError as error:
-            outcome = outcome_of_error(error)
-            status, leaf, reason, why = "INVALID", "", outcome.cause.reason.name, outcome.sentence
-        truth = settled_truth(self._bench.evaluation)
-        model = configuration.world_model([tip.name for tip in robot.tips], robot.opening)
-        verdict = evaluate_success(configuration, model, truth)
-        if status == "SUCCESS":
-            reason, why = verdict.reason, verdict.why
-        return {
-            "success": status == "SUCCESS" and verdict.success,
-            "status": status,
-            "leaf": leaf,
-            "concept": self.concept_of(runner, leaf),
-            "reason": reason,
-            "why": why,
-        }

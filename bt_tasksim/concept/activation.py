@@ -277,8 +277,7 @@ class Activation:
             self._no_way(statuses, position, row, error)
             return
         if plan.outdated(seen):
-            self._plans[row] = planner.begin(self._model.begin, seen)
-            self._plans[row].anew = plan.anew + 1
+            self._plans[row] = planner.begin(self._model.begin, seen, plan.anew + 1)
             return
         self._started[row] = now
         self._remember(np.array([row]), memory, "begin")

@@ -38,24 +38,16 @@ class Planner:
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(THREADS, thread_name_prefix="planning")
 
-    def begin(self, plan: Callable[[Seen], Any], seen: Seen) -> Plan:
+    def begin(self, plan: Callable[[Seen], Any], seen: Seen, anew: int = 0) -> Plan:
         """Have a plan made.
 
         Args:
             plan: Makes it from what is seen in one world.
             seen: That.
+            anew: How often it was begun before, since the arm still moved.
         """
-        objects = seen.objects  # asked for here, where nobody goes on to the next tick
-        still = Seen(
-            seen.observation,
-            seen.world,
-            seen.robot,
-            seen.elapsed,
-            seen.later,
-            seen.failures,
-            believed=lambda: objects,
-        )
-        return Plan(self._pool.submit(plan, still), _joints(seen))
+        still = seen.believing(seen.objects)  # asked for here, where nobody goes on to the next tick
+        return Plan(self._pool.submit(plan, still), _joints(seen), anew)
 
     def close(self) -> None:
         """Begin no other plan; what is under way ends by itself."""
@@ -71,8 +63,8 @@ class Plan:
         anew: How often it was begun before, since the arm still moved.
     """
 
-    def __init__(self, future: Future[Any], joints: Array) -> None:
-        self._future, self._joints, self.anew = future, joints, 0
+    def __init__(self, future: Future[Any], joints: Array, anew: int) -> None:
+        self._future, self._joints, self.anew = future, joints, anew
 
     def ready(self, wait: float) -> bool:
         """Whether it is there, at the latest after so many seconds."""

@@ -88,6 +88,18 @@ class Seen:
             lambda: index.of(self.objects),
         )
 
+    def believing(self, objects: Array) -> Seen:
+        """The same view with the objects taken to be at other poses ``(N, n_objects, 7)``."""
+        return Seen(
+            self.observation,
+            self.world,
+            self.robot,
+            self.elapsed,
+            self.later,
+            self.failures,
+            believed=lambda: objects,
+        )
+
     def observable(self, name: str) -> Array:
         """An observable by its name, computed when it is first asked for.
 

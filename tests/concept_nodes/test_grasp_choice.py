@@ -11,7 +11,7 @@ from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.concept_nodes.closer import CLOSER, ROOMS
 from bt_tasksim.concept_nodes.grasp_candidates import candidates
-from bt_tasksim.concept_nodes.grasp_choice import FARTHEST, Chooser, _straight, goes_aside, rooms
+from bt_tasksim.concept_nodes.grasp_choice import FARTHEST, Chooser, _straight, aims_of, goes_aside, rooms
 from bt_tasksim.concept_nodes.grasp_firmness import HARDLY
 from bt_tasksim.concept_nodes.grasp_opening import Opening
 from bt_tasksim.concept_nodes.holding import HOLDING
@@ -34,7 +34,7 @@ def view(toy):
 
 
 def chosen(view, name="box", later=()):
-    chooser = Chooser(view, name, 0.1, Pace(0.5), later, CLOSER)
+    chooser = Chooser(view, name, 0.1, Pace(0.5), aims_of(view, name, later), CLOSER)
     return chooser.other(candidates(view, name, DOWN, view.tool[3:]))
 
 
@@ -121,13 +121,14 @@ def test_where_no_grasp_serves_exactly_it_may_be_put_down_a_little_aside(view):
     away, aside = (now + np.array([x, -0.1, 0.1, 0, 0, 0, 0]) for x in (2.0, 0.0))
     aim = Aim(away[None], "be put down there", aside=aside[None])
     after = [later("box", aim)]
-    assert goes_aside(view, "box", after) and not goes_aside(view, "cup", after)
-    assert not goes_aside(view, "box", [later("box", aim._replace(aside=None))])
+    aims = aims_of(view, "box", after)
+    assert goes_aside(aims) and not goes_aside(aims_of(view, "cup", after))
+    assert not goes_aside(aims_of(view, "box", [later("box", aim._replace(aside=None))]))
     tools = candidates(view, "box", DOWN, view.tool[3:])
-    exactly = Chooser(view, "box", 0.1, Pace(0.5), after, CLOSER)
+    exactly = Chooser(view, "box", 0.1, Pace(0.5), aims, CLOSER)
     with pytest.raises(NoWayError, match="that cannot also be put down there"):
         exactly.other(tools)
-    chooser = Chooser(view, "box", 0.1, Pace(0.5), after, CLOSER, aside=True)
+    chooser = Chooser(view, "box", 0.1, Pace(0.5), aims, CLOSER, aside=True)
     assert np.isfinite(chooser.other(candidates(view, "box", DOWN, view.tool[3:])).goal).all()
 
 
@@ -251,6 +252,6 @@ def test_grasps_with_which_the_arm_comes_to_what_follows_have_their_turn_where_n
     neutral = poses.frame_from_axes(DOWN, np.array([0.0, 1.0, 0.0]))
     found = candidates(view, "bar", DOWN, neutral)
     high = Aim(poses.pose([0.5, -0.45, 0.78])[None], "be put down on a tower")
-    chooser = Chooser(view, "bar", 0.1, Pace(0.5), [later("bar", high)], ROOMS[-1], thoroughly=True)
+    chooser = Chooser(view, "bar", 0.1, Pace(0.5), [high], ROOMS[-1], thoroughly=True)
     level = abs(poses.z_axis(chooser._in_reach(found).tools[:100, 3:])[:, 2]) < 0.6
     assert level.mean() > 0.5 > (abs(poses.z_axis(found.tools[:100, 3:])[:, 2]) < 0.6).mean()

@@ -9,7 +9,6 @@ from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.concept_nodes.standing import (
     ASIDE,
-    FARTHER,
     HEADINGS,
     TIPPED,
     aside_options,
@@ -60,7 +59,7 @@ def test_a_little_aside_it_stands_nearer_to_the_arm_farther_or_to_either_side(vi
     far = np.linalg.norm(found[:, :2], axis=-1) - np.linalg.norm(options[0, :2])
     assert far.min() == pytest.approx(-ASIDE) and far.max() == pytest.approx(ASIDE)
     assert {tuple(r) for r in np.round(found[:, 3:], 6)} == {tuple(r) for r in np.round(options[:, 3:], 6)}
-    both = aside_options(view, "goal", options, (ASIDE, FARTHER))
+    both = aside_options(view, "goal", options, held=True)
     assert np.array_equal(both[: len(found)], found) and len(both) == 2 * len(found)
     small = dataclasses.replace(place, extent=(1.5 * ASIDE, 1.5 * ASIDE))
     container = dataclasses.replace(place, kind="bin")

@@ -119,15 +119,16 @@ def _near(points: ModelPoints, view: DepthView, start: Array, free: Sequence[int
 
 def _below(target: Target, pose: Array, places: Sequence[PlaceModel]) -> PlaceModel | None:
     """The place on which an object at a pose nearly stands, or None."""
-    foot = float(pose[2]) - target.model.extent[2] / 2
+    level = (place for place in places if poses.z_axis(place.pose[3:])[2] > 0.999)
+    return _surface(pose, float(pose[2]) - target.model.extent[2] / 2, level)
+
+
+def _surface(pose: Array, lowest: float, places: Iterable[PlaceModel]) -> PlaceModel | None:
+    """The first place that a pose ``(7,)`` is over, with a surface near a height in metres; or None."""
     for place in places:
         local = poses.transform(poses.inverse(place.pose), pose[:3])
         inside = all(abs(local[i] - place.centre[i]) < place.extent[i] / 2 for i in range(2))
-        if (
-            inside
-            and abs(foot - float(place.pose[2])) < NEAR_SURFACE
-            and poses.z_axis(place.pose[3:])[2] > 0.999
-        ):
+        if inside and abs(lowest - float(place.pose[2])) < NEAR_SURFACE:
             return place
     return None
 
@@ -255,10 +256,7 @@ def _turning(a: Array, b: Array) -> Array:
 def _settled(pose: Array, target: Target, places: Sequence[PlaceModel]) -> Array:
     """The same pose, moved up or down to touch the surface below where it nearly does."""
     lowest = float(np.min(poses.transform(pose, target.shape.visual.vertices)[:, 2]))
-    for place in places:
-        local = poses.transform(poses.inverse(place.pose), pose[:3])
-        inside = all(abs(local[i] - place.centre[i]) < place.extent[i] / 2 for i in range(2))
-        gap = lowest - float(place.pose[2])
-        if inside and abs(gap) < NEAR_SURFACE:
-            return pose - np.array([0.0, 0.0, gap, 0.0, 0.0, 0.0, 0.0])
-    return pose
+    surface = _surface(pose, lowest, places)
+    if surface is None:
+        return pose
+    return pose - np.array([0.0, 0.0, lowest - float(surface.pose[2]), 0.0, 0.0, 0.0, 0.0])

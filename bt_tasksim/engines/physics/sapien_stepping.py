@@ -114,20 +114,21 @@ class SapienWorld:
         watched = self._falling or self._letting_go > 0 or self._watch > 0
         self._letting_go, self._closing = max(self._letting_go - 1, 0), max(self._closing - 1, 0)
         self._watch = max(self._watch - 1, 0)
-        for _ in range(self._substeps):
-            self._felt = []
+        self._felt = []
+        for k in range(self._substeps):
+            last = k + 1 == self._substeps
             # What rocks to and fro is slow where it turns, and lands before the period ends.
             moving = self._moving(free) if loose else []
             if self._disturbs():
                 moving.append(self._pushed)
             if moving:
-                self._fine_steps(moving)
+                self._fine_steps(moving, last)
             else:
-                self._usual_steps(shorter, watched)
+                self._usual_steps(shorter, watched, last)
         self._time += self._dt * self._substeps
 
-    def _usual_steps(self, shorter: int, watched: bool) -> None:
-        """One of the scene's steps, in so many equal ones."""
+    def _usual_steps(self, shorter: int, watched: bool, last: bool) -> None:
+        """One of the scene's steps, in so many equal ones; in the last one of a period the wrist feels."""
         self._last_dt = self._dt / shorter
         if shorter > 1:
             self.world.scene.set_timestep(self._last_dt)
@@ -135,7 +136,7 @@ class SapienWorld:
             self._look_down()
         for _ in range(shorter):
             self._step(self._last_dt)
-            if shorter > 1:
+            if shorter > 1 and last:
                 self._feel_wrist()
         if shorter > 1:
             self.world.scene.set_timestep(self._dt)
@@ -159,8 +160,8 @@ class SapienWorld:
             self.robot.twist.resist(seconds)
         self.world.system.step()
 
-    def _fine_steps(self, moving: list[int]) -> None:
-        """One of the scene's steps, in shorter ones while these objects move."""
+    def _fine_steps(self, moving: list[int], last: bool) -> None:
+        """One of the scene's steps, in shorter ones while these objects move; see `_usual_steps`."""
         world, reader = self.world, self._reader
         for body in world.objects:
             body.set_max_depenetration_velocity(PARTING_FINELY)
@@ -176,7 +177,8 @@ class SapienWorld:
                 if self._disturbance.pushing:
                     self._push()
                 self._step(self._last_dt)
-                self._feel_wrist()
+                if last:
+                    self._feel_wrist()
         for body in world.objects:
             body.set_max_depenetration_velocity(PARTING)
         world.scene.set_timestep(self._dt)
