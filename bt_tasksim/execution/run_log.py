@@ -33,6 +33,7 @@ from py_trees.common import Status
 from bt_tasksim.concept.leaf import ONE, ConceptNode
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.identity import package_versions
+from bt_tasksim.core.outcomes import CANNOT_START
 from bt_tasksim.core.world import Observation, WorldModel
 from bt_tasksim.demos_decomp.log import Demonstration, Log, Surface, Track, Video
 from bt_tasksim.demos_decomp.log_file import write_log
@@ -120,7 +121,7 @@ class RunRecorder:
         self._status.append(now)
         costs = [math.nan] * len(self.nodes)
         for i, leaf in self._concepts:
-            if now[i] == 1 or (before[i] == 1 and now[i] != 0):
+            if (now[i] == 1 or (before[i] == 1 and now[i] != 0)) and _began(leaf):
                 costs[i] = _necessary_cost(leaf)
         self._costs.append(costs)
         for i, node in enumerate(self.nodes):
@@ -302,6 +303,11 @@ def hand_opening(tips: NDArray[np.float64], robot: RobotDescription) -> NDArray[
     distances = np.array([np.linalg.norm(tips[:, i] - tips[:, j], axis=-1) for i, j in pairs])
     smallest: NDArray[np.float64] = distances.min(axis=0)
     return smallest
+
+
+def _began(leaf: ConceptNode) -> bool:
+    """It remembers something of this time: on a robot it plans first, and may find that it cannot start."""
+    return not leaf.plans and (leaf.outcome is None or not leaf.outcome.is_a(CANNOT_START))
 
 
 def _necessary_cost(leaf: ConceptNode) -> float:

@@ -1,14 +1,16 @@
 """A run's log holds what happened, in the format of demonstrations."""
 
 import json
+import time
 
 import numpy as np
 import pytest
 from py_trees.common import Status
 
+from bt_tasksim.concept.planner import Planner
 from bt_tasksim.concept_nodes import Grasp, Pick, Release
-from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.outcomes import INTERRUPTED, TIME_OVER
+from bt_tasksim.core.errors import InputError, NoWayError
+from bt_tasksim.core.outcomes import INTERRUPTED, NO_WAY, TIME_OVER
 from bt_tasksim.demos_decomp.decompose import decompose
 from bt_tasksim.demos_decomp.log_file import read_log
 from bt_tasksim.execution.pipelines import EngineOptions
@@ -167,3 +169,38 @@ def test_a_scene_without_objects_has_no_log(tmp_path):
     with pytest.raises(InputError, match="no objects"):
         recorder.write(tmp_path / "run.h5", result)
     assert not (tmp_path / "run.h5").exists()
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_what_plans_beside_the_loop_has_no_cost_before_it_begins(monkeypatch, fails):
+    """As on a robot; for the second attempt, too, there is nothing but what the first one remembered."""
+    begin, asked = Grasp.begin, []
+
+    def slowly(model, seen):
+        asked.append(seen)
+        time.sleep(0.2)
+        if fails and len(asked) > 1:
+            raise NoWayError("a wall is there")
+        return begin(model, seen)
+
+    tree = retry(2, sequence("twice", Grasp("target", timeout=0.5), Pick("target", distance=0.1)))
+    runner, costs = Runner(tree, pick_and_place.scene()), []
+    grasp = next(node for node in tree.iterate() if node.name == "grasp target")
+    monkeypatch.setattr(Grasp, "begin", slowly)
+    runner.context.planner = Planner()
+    recorder = RunRecorder(runner, "planned")
+
+    def record(step):
+        recorder(step)
+        time.sleep(0.01)
+        costs.append((grasp.plans, np.array(recorder._costs[-1])))
+
+    result = runner.run(3, record=record)
+    runner.context.planner.close()
+    assert len(asked) == 2 and result.status == Status.FAILURE
+    assert result.outcome.is_a(NO_WAY) == fails
+    waiting = [cost for plans, cost in costs if plans]
+    assert len(waiting) > 4 and np.isnan(waiting).all()
+    assert np.isfinite(next(cost for plans, cost in costs if not plans)).sum() == 1
+    last = max(k for k, (plans, _) in enumerate(costs) if plans)
+    assert np.isnan(costs[last + 1][1]).all() == fails
