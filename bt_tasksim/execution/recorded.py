@@ -44,7 +44,8 @@ from bt_tasksim.trees.walk import nodes_of
 ROLES = {"engines": "physics", "perception": "postprocess", "kinematics": "kinematics"}
 """Options that name an engine, and its role."""
 LATER = 5.0
-"""Seconds for which a repetition may go on when the recorded run has ended."""
+"""Seconds for which a repetition may go on when the recorded run has ended, or as long again if that is more:
+concepts may be slower by now."""
 MOST_PHYSICS = 2_000
 """Hz of physics."""
 
@@ -107,7 +108,8 @@ def recorded_run(demonstration: Demonstration, given: Given, where: str) -> Reco
     for key in about:
         if key not in ABOUT:
             raise InputError(f"{where}: run/about has an unknown key {shown(key)}{nearest(key, ABOUT)}")
-    duration = float(demonstration.time[-1]) + LATER
+    recorded = float(demonstration.time[-1])
+    duration = recorded + max(recorded, LATER)
     longest = from_plain(float, about.get("longest", LONGEST), f"{where}: longest")
     versions = {
         **_words(about.get("versions", {}), f"{where}: versions"),

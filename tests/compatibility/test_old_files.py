@@ -19,7 +19,6 @@ from bt_tasksim.cli.main import main
 from bt_tasksim.core.renamed import former_names
 from bt_tasksim.demos_decomp import decompose_log, open_log
 from bt_tasksim.engines.remote.keys import load_key
-from bt_tasksim.execution import recorded
 from bt_tasksim.execution.replay import replay
 from bt_tasksim.hardware.ros.setting import load_setting
 from bt_tasksim.hardware.twin.gap import load_gap
@@ -187,9 +186,7 @@ def test_a_log_shows_the_same_tasks(files: Path):
 
 
 @pytest.mark.parametrize("name", EXPECTED["runs"])
-def test_a_run_is_replayed_and_judged_the_same(files: Path, name: str, monkeypatch: pytest.MonkeyPatch):
-    """How much longer than recorded it may take is asked in test_replay.py: concepts go slower by now."""
-    monkeypatch.setattr(recorded, "LATER", 20.0)
+def test_a_run_is_replayed_and_judged_the_same(files: Path, name: str):
     before = json.loads((files / "runs" / name / "result.json").read_text())
     found = replay(files / "runs" / name)
     assert found.result.success == before["success"] and found.result.status.name == before["status"]

@@ -253,7 +253,7 @@ def test_a_world_that_cannot_be_is_one_sentence(folder, tampered, name):
         replay(tampered(**changed(folder, "configuration", WORLDS[name])))
 
 
-def test_a_repetition_ends_soon_after_the_recorded_run(folder, tampered):
+def test_a_repetition_ends_at_twice_the_recorded_time_or_5_s_later(folder, tampered):
     tree = '<root BTCPP_format="4"><BehaviorTree ID="wait"><Wait duration="1000"/></BehaviorTree></root>'
     path = tampered(
         **{"run/tree": np.array(tree.encode()), "run/policies": np.array(b"[]")},
@@ -261,7 +261,7 @@ def test_a_repetition_ends_soon_after_the_recorded_run(folder, tampered):
     )
     found = replay(path)
     recorded = read_log(path).demonstrations[0].time[-1]
-    assert not found.identical and found.result.sim_time < recorded + 6.0
+    assert not found.identical and found.result.sim_time < recorded + max(recorded, 5.0) + 1.0
 
 
 def test_a_tree_that_xml_cannot_hold_is_given(tmp_path):
