@@ -76,13 +76,15 @@ def aside_options(view: WorldView, reference: str, options: Array, held: bool = 
 def emptiest(view: WorldView, target: str, container: str) -> Array:
     """Where something may fall into a container ``(k, 2)``, in its frame: the emptiest places first.
 
-    Its middle, where nothing is in it yet.
+    Its middle, where nothing is in it yet. A spot that is marked in it counts as taken: something else is to
+    stand there.
     """
     place, model = view.world.places[container], view.model(target)
     middle, half = np.asarray(place.centre), np.asarray(place.extent) / 2
     room = np.maximum(half - ROUND * max(model.extent[:2]), 0.0)
     offsets = middle + room * np.array([(0.0, 0.0), *((x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0))])
     others = [pose for name, pose in view.objects.items() if name != target and np.isfinite(pose).all()]
+    others += [spot.pose for spot in view.world.places.values() if spot.kind == "spot"]
     there = poses.localise(np.asarray(place.pose), np.array(others).reshape(-1, 7)[:, :3])
     inside = there[(abs(there[:, :2] - middle) < half).all(axis=-1), :2]
     if not len(inside):

@@ -123,7 +123,7 @@ def test_into_a_container_things_fall_where_least_is_in_it(view):
     place = dataclasses.replace(
         view.world.place("goal"), name="bin", kind="bin", extent=size, centre=tuple(middle)
     )
-    world = dataclasses.replace(view.world, places={**view.world.places, "bin": place})
+    world = dataclasses.replace(view.world, places={"bin": place})
     empty = view._replace(world=world, objects={"box": view.objects["box"]})
     found = emptiest(empty, "box", "bin")
     assert np.allclose(found[0], middle), "over the middle of an empty one"
@@ -135,3 +135,12 @@ def test_into_a_container_things_fall_where_least_is_in_it(view):
     assert sorted(map(tuple, there.round(9))) == sorted(map(tuple, found.round(9)))
     options = standing_options(full, "box", "bin", 0.05)
     assert len(options) == len(found) * HEADINGS
+
+
+def test_into_a_container_things_fall_beside_the_spots_that_are_marked_in_it(view):
+    spot = dataclasses.replace(view.world.place("goal"), kind="spot")
+    place = dataclasses.replace(spot, name="bin", kind="bin", extent=(0.3, 0.24), centre=(0.0, 0.0))
+    at = poses.pose(poses.transform(np.asarray(place.pose), np.array([0.06, -0.05, 0.0])))
+    places = {"bin": place, "goal": dataclasses.replace(spot, pose=at)}
+    marked = view._replace(world=dataclasses.replace(view.world, places=places), objects={})
+    assert emptiest(marked, "box", "bin")[0] @ [1.0, -1.0] < 0.0, "on the other side"
