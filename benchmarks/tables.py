@@ -15,6 +15,8 @@ number is typed by hand. Results are what the measurements write:
 - ``planning.json`` by ``python -m benchmarks.planning``, which stands in docs/planning.md;
 - ``gap-<scenario>-<grasp>-<engines>.json`` by ``python -m benchmarks.gap``, ``faults.json`` by
   ``python -m benchmarks.faults``, ``loop.json`` by ``python -m benchmarks.loop``;
+- ``any_tree-<robot>[-...].json`` by ``python -m benchmarks.any_tree``, ``five-<tree>-<robot>.json`` by
+  ``python -m benchmarks.any_tree.five``;
 - ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
 
 ``--check`` changes nothing and fails when a table is not up to date.
@@ -29,7 +31,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from benchmarks import learned_tables, robot_tables
+from benchmarks import any_tree_tables, learned_tables, robot_tables
 from benchmarks.experiments import pages as experiment_tables
 from benchmarks.speed import CASES, described
 from benchmarks.success import RESULTS, SCENARIOS
@@ -49,8 +51,12 @@ ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
 KINDS = ("camera", "fromlogs")
 OTHER = ("speed", "decomposition", "learning", "remote", "faults", "loop", "planning")
-APART = ("oracle-", "grasp-", "experiment-", "training-", "gap-", "logs-", "decomposition-")
-"""How results begin whose tables are made in `learned_tables`, `robot_tables` and `experiments.pages`."""
+APART = (
+    *("oracle-", "grasp-", "experiment-", "training-", "gap-", "logs-", "decomposition-"),
+    *("any_tree-", "five-"),
+)
+"""How results begin whose tables are made in `learned_tables`, `robot_tables`, `any_tree_tables` and
+`experiments.pages`."""
 NOT_YET = "not measured yet"
 SPENT = 50_000
 """First seed of results that do not say it: measured again and again, see ``docs/evaluation.md``."""
@@ -223,6 +229,7 @@ TABLES = {
     "remote": remote,
     **learned_tables.TABLES,
     **robot_tables.TABLES,
+    **any_tree_tables.TABLES,
     **experiment_tables.TABLES,
 }
 MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end of table -->)", re.DOTALL)

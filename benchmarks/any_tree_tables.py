@@ -1,0 +1,119 @@
+"""Tables of any tree, made from ``benchmarks/results``; see `benchmarks.tables` and `benchmarks.any_tree`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from benchmarks.paired import Paired, mcnemar
+
+NOT_YET = "not measured yet"
+ROWS = {
+    "any_tree-panda": "Panda",
+    "any_tree-xarm7_ability": "xArm7 with the Ability hand",
+    "any_tree-so100": "SO-100",
+    "any_tree-panda-camera": "Panda, camera",
+    "any_tree-panda-original": "Panda, noise `original`",
+    "any_tree-panda-recovering": "Panda, `recovering`",
+    "any_tree-panda-mujoco": "Panda, MuJoCo",
+    "any_tree-panda-twin": "Panda, twin over ROS",
+}
+"""What results are called, and how a row says it."""
+PAIRS = ("any_tree-panda-recovering", "any_tree-panda-mujoco", "any_tree-panda-twin")
+"""Rows on the draws of the first one, in other circumstances."""
+FIVE = {
+    "two_spots": "two objects to two spots",
+    "three_spots": "three objects to three spots",
+    "bin_then_spot": "a can into the bin, then a box onto a spot",
+    "shelf": "a cup from the table onto the shelf's lower board",
+    "tower": "a tower of three cubes",
+}
+SHOWN = 4
+"""Seeds that a row of failures names."""
+Results = dict[str, Any]
+
+
+def any_tree(results: Results) -> str:
+    """Successes of the draws that are possible, and what trees said that was not so."""
+    lines = [
+        "| with | draws | succeeded | impossible | of the possible (95 % interval) | SUCCESS, goals missed "
+        "| bodies overlapped |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name, label in _shown(results):
+        found = results.get(name)
+        if found is None:
+            lines.append(f"| {label} | {NOT_YET} | | | | | |")
+            continue
+        low, high = found["confidence_interval"]
+        rate = f"{100 * found['possible_rate']:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+        impossible = found["episodes"] - found["possible"]
+        lines.append(
+            f"| {label} | {found['episodes']} | {found['successes']} | {impossible} | {rate} "
+            f"| {found['lies']} | {found['overlaps']} |"
+        )
+    return "\n".join(lines)
+
+
+def any_tree_failures(results: Results) -> str:
+    """Leaves and reasons of all that failed and is possible."""
+    lines = ["| with | leaf | reason | how often | seeds |", "|---|---|---|---|---|"]
+    for name, label in _shown(results):
+        for failure in (results.get(name) or {"failures": []})["failures"]:
+            seeds = ", ".join(str(seed) for seed in failure["seeds"][:SHOWN])
+            more = ", ..." if failure["count"] > SHOWN else ""
+            said = f"{failure['concept']} | {failure['reason']} | {failure['count']} | {seeds}{more}"
+            lines.append(f"| {label} | {said} |")
+    return "\n".join(lines)
+
+
+def any_tree_pairs(results: Results) -> str:
+    """The same draws in other circumstances."""
+    lines = [
+        "| with | draws | Panda, SAPIEN | this | only SAPIEN | only this | p |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    usual = _outcomes(results.get("any_tree-panda"))
+    for name in PAIRS:
+        other = _outcomes(results.get(name))
+        if not usual or not other:
+            lines.append(f"| {ROWS[name]} | {NOT_YET} | | | | | |")
+            continue
+        pair = Paired("any_tree", name, usual, other)
+        lost, won = len(pair.only_old), len(pair.only_new)
+        lines.append(
+            f"| {ROWS[name]} | {pair.draws} | {pair.successes('old')} | {pair.successes('new')} "
+            f"| {lost} | {won} | {mcnemar(lost, won):.3g} |"
+        )
+    return "\n".join(lines)
+
+
+def five(results: Results) -> str:
+    """Five trees that anybody tries first."""
+    lines = ["| tree | succeeded (95 % interval) | failures |", "|---|---|---|"]
+    for name, label in FIVE.items():
+        found = results.get(f"five-{name}-panda")
+        if found is None:
+            lines.append(f"| {label} | {NOT_YET} | |")
+            continue
+        low, high = found["confidence_interval"]
+        said = f"{found['successes']} of {found['episodes']} ({100 * low:.1f} to {100 * high:.1f} %)"
+        failures = ", ".join(f"{count} x {reason}" for reason, count in found["failures"].items()) or "none"
+        lines.append(f"| {label} | {said} | {failures} |")
+    return "\n".join(lines)
+
+
+def _shown(results: Results) -> list[tuple[str, str]]:
+    others = sorted(n for n in results if n.startswith("any_tree-") and n not in ROWS)
+    return [*ROWS.items(), *((name, f"`{name.removeprefix('any_tree-')}`") for name in others)]
+
+
+def _outcomes(found: dict[str, Any] | None) -> dict[str, bool]:
+    return {str(draw["seed"]): bool(draw["success"]) for draw in (found or {"draws": []})["draws"]}
+
+
+TABLES = {
+    "any_tree": any_tree,
+    "any_tree_failures": any_tree_failures,
+    "any_tree_pairs": any_tree_pairs,
+    "five": five,
+}

@@ -1,0 +1,51 @@
+"""Tables of any tree say what results hold, and that others are not there yet."""
+
+import pytest
+
+from benchmarks import any_tree_tables
+from benchmarks.any_tree.five import FIVE
+from benchmarks.any_tree.report import summary
+from bt_tasksim.training.evaluation_outcomes import wilson
+
+FAILED = {"concept": "pick", "leaf": "pick cup", "reason": "goal_lost", "status": "FAILURE"}
+
+
+def result(good, bad, impossible=0):
+    """Results of draws, as the benchmark writes them."""
+    draws = [{"seed": k, "success": True} for k in range(good)]
+    draws += [{**FAILED, "seed": 100 + k, "success": False} for k in range(bad)]
+    gone = {"oracle": {"possible": False, "reason": "no grasp"}}
+    draws += [{**FAILED, **gone, "seed": 200 + k, "success": False} for k in range(impossible)]
+    return {**summary(draws), "draws": draws}
+
+
+@pytest.mark.parametrize("name", any_tree_tables.TABLES)
+def test_without_results_every_row_says_so(name):
+    rows = any_tree_tables.TABLES[name]({}).splitlines()[2:]
+    assert all("not measured yet" in row for row in rows)
+
+
+def test_rates_are_those_of_what_is_possible():
+    found = {"any_tree-so100": result(18, 2, 4), "any_tree-panda-2_colours": result(3, 0)}
+    lines = any_tree_tables.any_tree(found).splitlines()
+    line = next(line for line in lines if "SO-100" in line)
+    assert "| 24 | 18 | 4 | 90.0 %" in line
+    assert any("`panda-2_colours` | 3 | 3 | 0 |" in line for line in lines), "whatever else was measured"
+    failures = any_tree_tables.any_tree_failures(found)
+    assert "| SO-100 | pick | goal_lost | 2 | 100, 101 |" in failures
+
+
+def test_pairs_are_of_the_draws_that_both_had():
+    usual, other = result(10, 2), result(4, 0)
+    other["draws"][3]["success"] = False
+    lines = any_tree_tables.any_tree_pairs({"any_tree-panda": usual, "any_tree-panda-mujoco": other})
+    assert "| Panda, MuJoCo | 4 | 4 | 3 | 1 | 0 | 1 |" in lines
+
+
+def test_all_of_the_five_trees_have_a_row():
+    assert list(any_tree_tables.FIVE) == list(FIVE)
+    found = {
+        "successes": 97, "episodes": 100, "confidence_interval": wilson(97, 100), "failures": {"no_way": 3}
+    }  # fmt: skip
+    line = any_tree_tables.five({"five-tower-panda": found}).splitlines()[-1]
+    assert "97 of 100" in line and "3 x no_way" in line
