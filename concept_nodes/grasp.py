@@ -501,7 +501,9 @@ class Grasp(ConceptModel[GraspMemory]):
         share = gentler(seen.tool)
         feeling = FEELING * xp.where(near, share, xp.ones_like(share))
         share = poses.clip(feeling * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), SLOWEST, 1.0)
-        pace = xp.where(xp.any(seen.contacts, axis=-1), xp.zeros_like(share), (share - CAREFUL) / EAGER)
+        pace = (share - CAREFUL) / EAGER
+        slower = xp.minimum(pace, xp.zeros_like(pace))
+        pace = xp.where(xp.any(seen.contacts, axis=-1), slower, pace)
         aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)
         return xp.concat([aside + self._yielding(seen, memory), pace[:, None]], axis=-1)
 

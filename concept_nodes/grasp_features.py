@@ -36,6 +36,9 @@ WITHDRAWS = 0.02
 OBSTRUCTED = 0.0015
 """Metres by which a hand that touches something is held up along the approach: it stands on it. Measured:
 -2 to 1 mm at the instant of a first contact at `CAREFUL` speed, 2 to 6 mm one control period later."""
+RESISTED = 5.0
+"""Newtons against the approach with which a hand that has a jaw that swings stands on what it touches: its arm
+may be so stiff that it presses 100 N before it is held up by `OBSTRUCTED`."""
 SCALE = (0.015, 0.025, 0.035, 0.25, 0.5)
 """Largest offsets: metres along the tool's x (aside), y (the fingers' closing axis) and z (the approach),
 radians about z, and of the hand's closure. Source of their order: the released original's grasp training,
@@ -119,7 +122,7 @@ class Met(NamedTuple):
     """What a motion that takes care has met; booleans ``(N,)``.
 
     Attributes:
-        stands: A finger of the open hand stands on something: it touches, and is held up.
+        stands: A finger of the open hand stands on something: it touches, and is held up or pressed back.
         searches: It does, or a finger touches alone while the hand closes.
     """
 
@@ -134,7 +137,10 @@ def met(action: Array, seen: Seen, memory: GraspMemory) -> Met:
     feels = begun & touching & (action[:, TIME_SCALING] < HASTE)
     ahead = poses.localise(memory.target, seen.tool[:, :3])[:, 2]
     closing = memory.closing >= 0.0
-    stands = feels & ~closing & (ahead < -OBSTRUCTED)
+    held_up = ahead < -OBSTRUCTED
+    if standing_side(seen.robot) is not None:
+        held_up = held_up | (seen.wrench[:, 2] < -RESISTED)
+    stands = feels & ~closing & held_up
     return Met(stands, stands | (feels & closing & ~seen.opposed()))
 
 
