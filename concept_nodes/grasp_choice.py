@@ -48,6 +48,9 @@ REACH = 0.008
 much."""
 SPARE = 0.008
 """Metres beside what it takes, on either side, that a partly closed hand is open at least."""
+NARROWER = (0.018, 0.013)
+"""Metres by which a jaw that swings is wider open than what it takes where it has no room for its usual
+`bt_tasksim.robot.kinematics.hand.SPARE`: in the hole of a ring it would meet the far side."""
 SLIDES = (1.0, 0.7, 0.4)
 """Shares of the way up to the object that a finger which stands still goes, as far as there is room."""
 ENOUGH = 3
@@ -271,6 +274,11 @@ class Chooser:
             less = self._opened(robot.hand_position(closing_of(robot).about(width + 2 * SPARE)[None]))
             if less.closure > hand.closure and less.free(tool):
                 return less
+        if self._slide and self._close and not hand.free(tool):
+            for spare in NARROWER:
+                less = self._opened(opened_about(self._view.robot, width, spare))
+                if less.closure > hand.closure and less.free(tool):
+                    return less
         return hand if self._has_room(tool, hand) else None
 
     def _free(self, candidates: Candidates) -> Iterator[tuple[Array, Opening]]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import ObjectModel, WorldModel
+from bt_tasksim.core.world import ObjectModel, Obstacle, WorldModel
 
 LEANS = math.radians(8.0)
 """Tilt up to which an object is taken to stand upright; estimates are wrong by some degrees."""
@@ -21,8 +21,9 @@ _UP = np.array([0.0, 0.0, 1.0])
 def at_rest(world: WorldModel, estimates: Array) -> Array:
     """Poses of a world's objects with those that seem to stand upright right on a surface.
 
-    An object stands on the highest place within `OFF` that its middle is above; on another object, where the
-    top of that is nearer. Those that lean, and those below which there is nothing, are left as they are.
+    An object stands on the highest place within `OFF` that its middle is above, or on furniture beside all
+    places, as long as it has room there; on another object, where the top of that is nearer. Those that lean,
+    and those below which there is nothing, are left as they are.
 
     Args:
         world: The world.
@@ -30,15 +31,18 @@ def at_rest(world: WorldModel, estimates: Array) -> Array:
     """
     found = np.array(estimates, float)
     tops: dict[int, float] = {}
+    furniture = [box for box in world.obstacles if _level(box)]
     for k in np.argsort(found[:, 2], kind="stable").tolist():
         model, pose = world.objects[k], found[k]
         upright = _upright(pose, model)
         if upright is None:
             continue
         bottom = float(pose[2]) - model.extent[2] / 2
-        below = [p for p in world.places.values() if _above(pose, p.pose, p.centre, p.extent)]
-        places = [p for p in below if p.fixture]  # a goal in the air carries nothing
-        level = max((z for p in places if abs(bottom - (z := float(p.pose[2]))) <= OFF), default=math.inf)
+        # A goal in the air carries nothing.
+        places = [p for p in world.places.values() if p.fixture and _above(pose, p.pose, p.centre, p.extent)]
+        levels = [float(p.pose[2]) for p in places]
+        levels += [_top(box) for box in furniture if _bears(box, pose, model)]
+        level = max((z for z in levels if abs(bottom - z) <= OFF), default=math.inf)
         for other, top in tops.items():
             on = _above(pose, found[other], (0.0, 0.0), world.objects[other].extent[:2])
             if on and abs(bottom - top) <= min(OFF, abs(bottom - level)):
@@ -67,6 +71,22 @@ def _upright(pose: Array, model: ObjectModel) -> Array | None:
     turn = poses.from_rotation_vector(axis * (angle / length if length > 1e-9 else 0.0))
     upright: Array = poses.quat_multiply(turn, pose[3:])
     return upright
+
+
+def _level(box: Obstacle) -> bool:
+    """Whether the top of a box is level."""
+    return float(poses.z_axis(np.asarray(box.pose)[3:])[2]) > 1.0 - 1e-9
+
+
+def _top(box: Obstacle) -> float:
+    """Height of a box's top, metres."""
+    return float(box.pose[2]) + box.size[2] / 2
+
+
+def _bears(box: Obstacle, pose: Array, model: ObjectModel) -> bool:
+    """Whether the middle of an object is above a box on which it has room: a wall has none."""
+    wide = min(box.size[:2]) >= max(model.extent[:2])
+    return wide and _above(pose, np.asarray(box.pose), (0.0, 0.0), box.size[:2])
 
 
 def _above(pose: Array, surface: Array, centre: tuple[float, float], size: tuple[float, float]) -> bool:

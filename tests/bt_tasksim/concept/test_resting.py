@@ -80,3 +80,18 @@ def test_what_does_not_stand_is_left_as_it_is_seen(change):
     world, seen = world_of(1)
     seen[2] = change(seen[2])
     assert np.array_equal(at_rest(world, seen)[2], seen[2], equal_nan=True)
+
+
+def test_furniture_carries_beside_its_places_too_where_there_is_room():
+    """The table's top is larger than the region of it that is named; the rim of a tray is no place to stand."""
+    world, true = world_of(3)
+    box, tray = world.object_index("box"), world.places["tray"]
+    seen = true.copy()
+    seen[box, :3] = [-0.1, 0.2, true[box, 2] + 0.004]
+    place = world.places["table"]
+    assert seen[box, 0] < place.pose[0] - place.extent[0] / 2, "it is beside the place"
+    assert at_rest(world, seen)[box, 2] == pytest.approx(true[box, 2], abs=1e-6)
+    walls = [b for b in world.obstacles if b.fixture == tray.fixture and min(b.size[:2]) < 0.02]
+    half = walls[0].size[2] / 2 + world.object("box").extent[2] / 2
+    seen[box, :3] = walls[0].pose[:3] + [0.0, 0.0, half + 0.004]
+    assert at_rest(world, seen)[box, 2] == seen[box, 2]
