@@ -42,6 +42,7 @@ from bt_tasksim.concept_nodes.standing import (
 from bt_tasksim.concept_nodes.surface import (
     NEAR,
     apart,
+    carrying,
     edges,
     level_of,
     straight_down,
@@ -53,6 +54,7 @@ from bt_tasksim.core.errors import InputError, NoWayError
 from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
+from bt_tasksim.core.transfer import fetched
 from bt_tasksim.core.units import METRES, NEWTONS, RADIANS
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.arm import FULL, LEANS, SET_DOWN
@@ -63,6 +65,7 @@ from bt_tasksim.planning.things import Leave
 from bt_tasksim.scene.spatial_laws import beyond_edges
 
 NOT_ABOVE = register_reason("not_above", "{object} is {aside} beyond the edge of {place}", aside=METRES)
+NOTHING_BELOW = register_reason("nothing_below", "nothing that carries is known below {object}")
 NOT_BESIDE = register_reason(
     "not_beside", "{object} is {gap} from {other}, more than {limit}", gap=METRES, limit=METRES
 )
@@ -136,12 +139,13 @@ class Place(ConceptModel[PlaceMemory]):
 
     The object goes over the place's origin and down along ``direction``, slowly, and stops when the wrist
     feels the support, or ``overshoot`` below where the support should be. With ``anywhere`` or ``beside`` it
-    goes straight down from where it is.
+    goes straight down from where it is; ``anywhere`` alone means the place that is below it then. Where there
+    is something else right below, it goes ``anywhere`` to a free spot of the place.
 
     Args:
         target: The held object.
         on: The place, or the object to put it on.
-        anywhere: Anywhere on the place will do.
+        anywhere: Anywhere on the place will do; without one, on whichever is below.
         beside: The object next to which it is put, on what that stands on; instead of ``on``.
         direction: Direction in which it is put down, robot base frame.
         distance: How far it is put down at most; by default to where the support should be.
@@ -208,19 +212,20 @@ class Place(ConceptModel[PlaceMemory]):
 
     def contradiction(self) -> str:
         """One place, neither none nor two."""
-        if (self.on is None) == (self.beside is None):
-            return "give either 'on' or 'beside'"
-        return "'anywhere' goes with 'on', a place" if self.anywhere and self.on is None else ""
+        if self.anywhere:
+            return "" if self.beside is None else "'anywhere' goes with 'on', a place, or stands alone"
+        return "give either 'on' or 'beside'" if (self.on is None) == (self.beside is None) else ""
 
     def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
         """The object must be in the hand, and above where it is to be put."""
         held = not_held(seen, self.target)
         now = seen.object(self.target)
-        if self.on is None:
-            assert self.beside is not None
+        if self.beside is not None:
             gap, _ = apart(seen, self.target, self.beside)
             far = NOT_BESIDE.where(gap > NEAR, object=self.target, other=self.beside, gap=gap, limit=NEAR)
             return held, far
+        if self.on is None:
+            return held, NOTHING_BELOW.where(~carrying(seen, self.target).found, object=self.target)
         if not self.anywhere:
             return (held,)
         aside = beyond_edges(destination(seen, self.on)[0], *edges(seen, self.on), now)
@@ -241,7 +246,10 @@ class Place(ConceptModel[PlaceMemory]):
             goal = poses.shifted(goal, beyond[:, None] * d)
         tool_goal = poses.multiply(goal, poses.relative(now, seen.tool))
         (goals,) = host_numbers([tool_goal])
-        found = [self._found(view, goals[k]) for k, view in enumerate(views(seen))]
+        found = [
+            place._found(view, goals[k])
+            for k, (place, view) in enumerate(zip(self._by_world(seen), views(seen), strict=True))
+        ]
         routes = {k: [route] for k, (_, route) in enumerate(found)}
         tool_goal = poses.constant(np.array([goal for goal, _ in found]), now)
         path = plan([seen.tool, tool_goal], self.speed, samples=SAMPLES)
@@ -250,6 +258,14 @@ class Place(ConceptModel[PlaceMemory]):
         felt = xp.astype(nothing, xp.int64)
         return PlaceMemory(path, self._force(seen), felt, nothing - seen.world.control_period)
 
+    def _by_world(self, seen: Seen) -> list[Place]:
+        """The same in each world, with the place that is below named."""
+        if self.on is not None or self.beside is not None:
+            return [self] * len(seen.tool)
+        (ranks,) = fetched([carrying(seen, self.target).place.rank])
+        below = (list(seen.world.model_of(k).places)[int(rank)] for k, rank in enumerate(ranks))
+        return [type(self).value(**{**self.arguments(), "on": name}) for name in below]
+
     def _standing(self, seen: Seen) -> Array:
         """Poses ``(N, 7)`` of the object where it should stand."""
         key = ("standing", self.target, self.on, self.beside, self.anywhere)
@@ -257,9 +273,10 @@ class Place(ConceptModel[PlaceMemory]):
 
     def _stands(self, seen: Seen) -> Array:
         now, model = seen.object(self.target), seen.model(self.target)
-        if self.on is None:
-            assert self.beside is not None
+        if self.beside is not None:
             return straight_down(level_of(seen, self.beside), now, model)
+        if self.on is None:
+            return straight_down(carrying(seen, self.target).place.pose, now, model)
         frame, _ = destination(seen, self.on)
         if self.anywhere:
             return straight_down(frame, now, model, edges(seen, self.on))
@@ -283,13 +300,17 @@ class Place(ConceptModel[PlaceMemory]):
         """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first.
 
         After them those a little aside of there, and last those in which it leans there; an arm of few joints
-        leans it by itself.
+        leans it by itself. Where anywhere will do, those on free spots, the nearest first.
         """
         here = self.on in view.world.places or self.on in view.objects
-        if self.on is None or not here or self.anywhere or self.distance is not None:
+        if self.on is None or not here or self.distance is not None:
             return np.zeros((0, 7))
         now = view.objects[self.target]
         grip = poses.relative(now, view.tool)
+        if self.anywhere:
+            spots = spots_on(view, self.target, self.on).poses
+            nearest = np.argsort(np.linalg.norm(spots[:, :2] - now[:2], axis=-1), kind="stable")
+            return poses.multiply(spots[nearest[:OTHERS]], grip[None]) + self.overshoot * self._along
         options = nearest_first(standing_options(view, self.target, self.on), now[3:])
         leaning = tipped(options[:1], grip) if len(view.arm) >= FULL else options[:0]
         aside = aside_options(view, self.on, options[:1], held=True)
@@ -359,7 +380,9 @@ class Place(ConceptModel[PlaceMemory]):
         return supports_beside(view, self.target, self.beside)
 
     def aim(self, view: WorldView) -> Aim | None:
-        """Where it is put down."""
+        """Where it is put down; None where only what is below it then says so."""
+        if self.on is None and self.beside is None:
+            return None
         if self.on is not None and not self.anywhere:
             options = standing_options(view, self.target, self.on)
             options = nearest_first(options, view.objects[self.target][3:])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.concept_nodes.grasp_pose import half_extent
+from bt_tasksim.concept_nodes.grasp_pose import FoundPlace, half_extent, nearest_place
 from bt_tasksim.core import poses
 from bt_tasksim.core.fact_arrays import ObjectFacts, take_rows
 from bt_tasksim.core.poses import Array, array_namespace, constant
@@ -21,6 +21,16 @@ def edges(seen: Seen, name: str) -> tuple[Array, Array]:
         return place.centre, place.extent / 2
     half = seen.model(name).extent[:, :2] / 2
     return array_namespace(half).zeros_like(half), half
+
+
+def carrying(seen: Seen, target: str) -> FoundPlace:
+    """The highest place below an object's middle of which something would carry it, if there is one."""
+    places, now = seen.world.place_facts, seen.object(target)
+    local = poses.localise(places.pose, now[:, None, :3])
+    over = array_namespace(now).all(abs(local[..., :2] - places.centre) <= places.extent / 2, axis=-1)
+    height = local[..., 2]
+    below = over & (height > 0.0) & (height < places.height)
+    return nearest_place(seen, below & places.present & places.carries, height)
 
 
 def straight_down(

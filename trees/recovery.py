@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import groupby
 
 from py_trees.behaviour import Behaviour
-from py_trees.composites import Sequence
 
-from bt_tasksim.concept_nodes import HandEmpty, Settle, Withdraw
+from bt_tasksim.concept_nodes import HandEmpty, Holding, Place, Release, Settle, Withdraw
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.trees.backchain import asked_by, condition_leaf
 from bt_tasksim.trees.nodes.any_order import AnyOrder, any_order
@@ -15,7 +15,18 @@ from bt_tasksim.trees.nodes.fallback import fallback
 from bt_tasksim.trees.nodes.retry import Retry
 from bt_tasksim.trees.nodes.retry_while_acting import retry_while_acting
 from bt_tasksim.trees.nodes.sequence import sequence
-from bt_tasksim.trees.stages import Stage, acting, asks_itself, cut, each_once, is_in_hand, same
+from bt_tasksim.trees.stages import (
+    Stage,
+    actors_of,
+    asks_itself,
+    cut,
+    each_once,
+    is_in_hand,
+    is_sequence,
+    opened,
+    same,
+    taken_by,
+)
 from bt_tasksim.trees.steps import Step, in_steps
 
 
@@ -25,9 +36,9 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
     The sequence is cut into stages, one for each time that something is held, by the goals that its concepts
     ``reaches`` and ``ends``. A stage is guarded by what it ``establishes``: where that holds it is skipped,
     and it is asked again after the stage, and at the end of all. Whatever fails begins another attempt. In
-    it the hand first opens and draws back, unless it is free or all is done and what it holds is to be held,
-    and waits until nothing moves; then the first stage that is not done has its turn. Each attempt plans
-    anew, from what is seen then.
+    it the hand first puts down what it holds, opens and draws back, unless it is free or all is done and what
+    it holds is to be held, and waits until nothing moves; then the first stage that is not done has its turn.
+    Each attempt plans anew, from what is seen then.
 
     A stage that cannot begin, such as one for which no grasp is found, waits until others have acted, those
     behind it that name nothing that it names, and any others of what `tidy` gives
@@ -62,24 +73,38 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
         if node.parent is not None and node is not body:
             node.parent.children.remove(node)
         node.parent = None
-    if body not in children:
-        body.children.clear()
+    for emptied in (body, *children):
+        if isinstance(emptied, AnyOrder) or (emptied is body and body not in children):
+            emptied.children.clear()
     limit = -1 if rounds < 0 else rounds + (attempts - 1) * len(stages)
     called = name or tree.name
-    free = hand_is_free(*_held_as_wanted(stages))
+    free = hand_is_free(*_held_as_wanted(stages), taken=taken_by(n for stage in stages for n in stage.nodes))
     made = [node for step in steps for node in _joined(step, called)]
     work = sequence(called, free, *made, *_checks(row))
     return retry_while_acting(limit, work, name=f"{called}, recovering")
 
 
-def hand_is_free(*unless: Behaviour) -> Behaviour:
+def hand_is_free(*unless: Behaviour, taken: Iterable[str] = ()) -> Behaviour:
     """The hand is free; else it becomes so, whichever way the arm can go, and things come to rest.
+
+    What it holds is put down where it is, or on a free spot near by; only where there is none it falls.
 
     Args:
         unless: Asked first: where it holds the hand keeps what it has.
+        taken: What it may hold.
     """
+    down = (
+        sequence(
+            f"put {name} down",
+            Holding(name),
+            Place(name, anywhere=True, name=f"{name} to what is below"),
+            Release(name, name=f"let go of {name}"),
+        )
+        for name in taken
+    )
     away = fallback(
         "open and withdraw",
+        *down,
         Withdraw(name="back"),
         Withdraw(direction=(0.0, 0.0, 1.0), name="up"),
         Withdraw(direction=(-1.0, 0.0, 0.0), name="towards the robot"),
@@ -89,13 +114,13 @@ def hand_is_free(*unless: Behaviour) -> Behaviour:
 
 
 def _children(body: Behaviour) -> list[Behaviour]:
-    """The nodes of a sequence; what stands in any order, and a stage that asks itself, are like one of one.
+    """The nodes of a sequence, see `opened`; what stands in any order, or asks itself, is like one of one.
 
     Raises:
         InputError: It is no sequence with memory.
     """
-    if type(body) is Sequence and body.memory and body.children:
-        return list(body.children)
+    if is_sequence(body):
+        return opened(body.children)
     if isinstance(body, AnyOrder) or asks_itself(body) is not None:
         return [body]
     raise InputError(
@@ -113,7 +138,7 @@ def _steps(children: list[Behaviour]) -> list[Step]:
     steps: list[Step] = []
     for free, some in groupby(children, lambda child: isinstance(child, AnyOrder)):
         if free:
-            steps += [[cut([below]) for below in child.children] for child in some]
+            steps += [[cut(opened([below])) for below in child.children] for child in some]
         else:
             steps += in_steps(cut(list(some)))
     return steps
@@ -132,15 +157,17 @@ def _made(stage: Stage) -> Behaviour:
     """The node that stands for a stage in the new tree."""
     if not stage.guards or stage.own:
         return stage.nodes[0]
-    actor = next(leaf.model.actor for node in stage.nodes for leaf in acting(node))
+    actors = actors_of(stage.nodes)
+    called = " and ".join(actors)
     asked = [asked_by(node) for node in stage.behind]
     missing = [g for g in stage.guards if not any(one is not None and same(one, g) for one in asked)]
     work = sequence(
         f"{stage.nodes[0].name} to {stage.nodes[-1].name}", *stage.nodes, *map(condition_leaf, missing)
     )
     guards = [condition_leaf(guard) for guard in stage.guards]
-    guard = guards[0] if len(guards) == 1 else sequence(f"{actor} is so", *guards)
-    return fallback(f"{actor} is done", guard, work)
+    is_so, is_done = ("is so", "is done") if len(actors) == 1 else ("are so", "are done")
+    guard = guards[0] if len(guards) == 1 else sequence(f"{called} {is_so}", *guards)
+    return fallback(f"{called} {is_done}", guard, work)
 
 
 def _held_as_wanted(stages: list[Stage]) -> list[Behaviour]:

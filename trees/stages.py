@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from py_trees import composites
 from py_trees.behaviour import Behaviour
-from py_trees.composites import Selector
 
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.trees.backchain import Wanted, act_of, after, asked_by, condition_named, goals_of
+from bt_tasksim.trees.nodes.any_order import AnyOrder
 from bt_tasksim.trees.walk import preorder
 
 Held = list[tuple[str, str]]
@@ -50,6 +51,42 @@ def cut(children: Sequence[Behaviour]) -> list[Stage]:
     Raises:
         InputError: Nothing tells whether a stage is done.
     """
+    return [_stage(row) if takes else Stage(tuple(row)) for row, takes in _rows(children)]
+
+
+def opened(children: Iterable[Behaviour]) -> list[Behaviour]:
+    """The nodes of a sequence, with those of a sequence among them in its place that has several stages.
+
+    Args:
+        children: The nodes; nothing is moved.
+    """
+    found: list[Behaviour] = []
+    for child in children:
+        inner = opened(child.children) if is_sequence(child) else []
+        acting_rows = [row for row, _ in _rows(inner) if actors_of(row)]
+        several = len(acting_rows) > 1 or any(isinstance(node, AnyOrder) for node in inner)
+        found += inner if several else [child]
+    return found
+
+
+def is_sequence(node: Behaviour) -> bool:
+    """It is a sequence with memory."""
+    return type(node) is composites.Sequence and node.memory and bool(node.children)
+
+
+def actors_of(nodes: Iterable[Behaviour]) -> list[str]:
+    """The objects that are acted on at or below nodes, each once, in order."""
+    return list(dict.fromkeys(leaf.model.actor for n in nodes for leaf in acting(n) if leaf.model.actor))
+
+
+def taken_by(nodes: Iterable[Behaviour]) -> list[str]:
+    """Those of them that are taken."""
+    leaves = (leaf for node in nodes for leaf in acting(node))
+    return list(dict.fromkeys(leaf.model.actor for leaf in leaves if leaf.model.reaches))
+
+
+def _rows(children: Iterable[Behaviour]) -> list[tuple[list[Behaviour], bool]]:
+    """Nodes in rows, see `cut`; and whether something is taken in a row."""
     rows: list[list[Behaviour]] = []
     taking: list[bool] = []
     held: Held = []
@@ -63,7 +100,7 @@ def cut(children: Sequence[Behaviour]) -> list[Stage]:
         else:
             rows.append([child])
             taking.append(takes)
-    return [_stage(row) if takes else Stage(tuple(row)) for row, takes in zip(rows, taking, strict=True)]
+    return list(zip(rows, taking, strict=True))
 
 
 def acting(root: Behaviour) -> Iterator[ConceptNode]:
@@ -80,21 +117,22 @@ def held_after(held: Held, leaves: Iterator[ConceptNode] | Sequence[ConceptNode]
     return held
 
 
-def lasting(leaves: Sequence[ConceptNode]) -> Wanted | None:
-    """The condition that tells that concepts have done their work, and still holds after the last of them.
+def lasting(leaves: Iterable[ConceptNode], actor: str) -> Wanted | None:
+    """The condition that tells that concepts have done their work with an object, and still holds at the end.
 
-    It is the strongest one about its object that the last concept establishes which establishes any. What can
+    It is the strongest one about the object that the last concept establishes which establishes any. What can
     hold only in the hand ends where the object is let go, and a concept that has the object in the hand
     afterwards has moved it from where it stood.
 
     Args:
         leaves: The concepts, in order.
+        actor: The object.
     """
     found: Wanted | None = None
     held: Held = []
-    for leaf in leaves:
+    for leaf in (leaf for leaf in leaves if leaf.model.actor == actor):
         held = held_after(held, [leaf])
-        about = [asked for asked in after(act_of(leaf)) if leaf.model.actor in asked.arguments.values()]
+        about = [asked for asked in after(act_of(leaf)) if actor in asked.arguments.values()]
         lasts = [asked for asked in about if held or not is_in_hand(asked)]
         if found is not None and is_in_hand(found) and not held:
             found = None
@@ -104,25 +142,29 @@ def lasting(leaves: Sequence[ConceptNode]) -> Wanted | None:
 
 def asks_itself(node: Behaviour) -> Wanted | None:
     """The condition with which a fallback begins: it says itself when it is done. None for other nodes."""
-    if isinstance(node, Selector) and len(node.children) > 1:
+    if isinstance(node, composites.Selector) and len(node.children) > 1:
         return asked_by(node.children[0])
     return None
 
 
 def _stage(nodes: Sequence[Behaviour]) -> Stage:
-    """A stage, with what tells that it is done.
+    """A stage, with what tells that it is done: of each object that it acts on.
 
     Raises:
-        InputError: Nothing does.
+        InputError: Of one that it takes nothing does.
     """
     own = asks_itself(nodes[0]) if len(nodes) == 1 else None
     if own is not None:
         return Stage(tuple(nodes), (own,), own=True)
     leaves = [leaf for node in nodes for leaf in acting(node)]
-    found = [lasting(leaves), *(asked_by(node) for node in nodes[_end(nodes) :])]
+    about = (lasting(leaves, actor) for actor in actors_of(nodes))
+    found = [*about, *(asked_by(node) for node in nodes[_end(nodes) :])]
     guards = each_once(guard for guard in found if guard is not None)
-    if not guards:
-        last = leaves[-1]
+    told = {value for guard in guards for value in guard.arguments.values()}
+    for actor in taken_by(nodes):
+        if actor in told:
+            continue
+        last = [leaf for leaf in leaves if leaf.model.actor == actor][-1]
         raise InputError(
             f"nothing tells whether '{last.model.actor}' is done after '{last.name}', so it cannot be "
             f"skipped then: say where it goes (as with Release's 'into'), or put a condition behind it"

@@ -21,6 +21,7 @@ from bt_tasksim.concept_nodes.place import (
     NOT_ABOVE,
     NOT_BESIDE,
     NOT_THERE,
+    NOTHING_BELOW,
     SLOWLY,
     UNSURE,
 )
@@ -254,6 +255,43 @@ def test_one_of_on_and_beside():
             Place("cup", **arguments)
     with pytest.raises(InputError, match="'anywhere' goes with 'on'"):
         Place("cup", beside="box", anywhere=True)
+
+
+def over(toy, leaf, at):
+    """The cup is held so far ``(3,)`` from the goal's middle, in metres."""
+    stage = held(toy, leaf)
+    middle = stage.world.model.place("goal").pose[:3]
+    stage.world.put(tool_pose=poses.pose(middle + np.array(at), stage.world.now.tool_pose[3:]))
+    stage.world.bend()
+    stage.world.hold("cup")
+    stage.look()
+    return stage
+
+
+def test_without_a_place_it_goes_down_to_what_is_below(toy):
+    stage = over(toy, Place("cup", anywhere=True), (-0.1, -0.05, 0.3))
+    follow(stage)
+    start = stage.world.now.tool_pose.copy()
+    assert stage.tick(400) == Status.SUCCESS
+    assert stage.world.now.tool_pose[:2] == pytest.approx(start[:2], abs=1e-3)
+    assert heights(stage)[-1] == pytest.approx(standing_height(stage), abs=0.01)
+
+
+def test_where_something_stands_below_it_goes_beside_that(toy):
+    stage = over(toy, Place("cup", anywhere=True), (-0.1, -0.05, 0.3))
+    follow(stage)
+    objects = stage.world.now.objects.copy()
+    objects[1, :2] = stage.world.now.tool_pose[:2]
+    stage.world.put(objects=objects)
+    stage.look()
+    assert stage.tick(600) == Status.SUCCESS
+    apart = np.linalg.norm(stage.world.now.tool_pose[:2] - objects[1, :2])
+    assert 0.05 < apart < 0.25
+
+
+def test_over_nothing_that_carries_it_cannot_start(toy):
+    stage = over(toy, Place("cup", anywhere=True), (0.0, 5.0, 0.3))
+    assert stage.tick() == Status.FAILURE and stage.tree.outcome.is_a(NOTHING_BELOW)
 
 
 def test_where_it_is_not_above_the_place_or_not_beside_the_other_it_cannot_start(toy):

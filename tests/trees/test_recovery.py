@@ -1,5 +1,6 @@
 """Around a sequence: which stages it has, when they are skipped, and that what is lost is taken again."""
 
+import dataclasses
 from itertools import combinations
 
 import numpy as np
@@ -28,6 +29,7 @@ from bt_tasksim.concept_nodes import (
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.runner import Runner
+from bt_tasksim.execution.session import Session
 from bt_tasksim.trees import (
     any_order,
     fallback,
@@ -43,7 +45,7 @@ from bt_tasksim.trees import (
 from bt_tasksim.trees.backchain import asked_by, condition_named
 from bt_tasksim.trees.load import load_source, scenarios
 from bt_tasksim.trees.nodes.any_order import AnyOrder
-from bt_tasksim.trees.stages import cut, lasting
+from bt_tasksim.trees.stages import cut, lasting, opened
 from bt_tasksim.trees.steps import are_tied, in_steps
 from bt_tasksim.trees.walk import nodes_of
 
@@ -71,7 +73,7 @@ def value(asked):
     ],
 )
 def test_what_lasts_is_what_was_brought_about_and_not_undone(leaves, guard):
-    found = lasting(leaves)
+    found = lasting(leaves, "cube")
     assert (None if found is None else value(found)) == guard
 
 
@@ -101,6 +103,43 @@ def test_stages_may_be_nodes_of_their_own():
         (1, True, Upright.value("b")),
         (4, False, AtPose.value("c", on="s3")),
     ]
+
+
+def test_every_object_of_a_stage_is_asked_about():
+    tried = retry(3, sequence("both", *task("a", "s1"), *task("b", "s2")))
+    (stage,) = cut([tried])
+    wanted = [AtPose.value("a", on="s1"), AtPose.value("b", on="s2")]
+    assert list(map(value, stage.guards)) == wanted
+    _, work, *_ = recovering(sequence("all", tried)).decorated.children
+    assert work.name == "a and b are done"
+    assert [guard.model for guard in work.children[0].children] == wanted
+
+
+def test_an_object_of_a_stage_of_which_nothing_tells_where_it_is_is_named():
+    thrown = sequence("both", *task("a", "s1")[:3], Release("a", name="let it fly"), *task("b", "s2"))
+    with pytest.raises(InputError, match="nothing tells whether 'a' is done after 'let it fly'"):
+        recovering(sequence("all", retry(2, thrown)))
+
+
+def test_sequences_in_sequences_are_cut_like_the_one_that_they_make():
+    rows = {"a": task("a", "s1"), "b": task("b", "s2"), "c": task("c", "s3"), "d": task("d", "s4")}
+    inner = sequence("inner", *rows["b"], *rows["c"][:2])
+    whole = sequence("carry d", *rows["d"])
+    tree = sequence("outer", sequence("first", *rows["a"], inner), *rows["c"][2:], whole)
+    assert opened(tree.children) == [*rows["a"], *rows["b"], *rows["c"], whole]
+    assert inner.children[0] is rows["b"][0] and inner.parent is not None  # nothing is moved by looking
+    _, work, *checks = recovering(tree).decorated.children
+    assert [node.name for node in work.children] == [f"{name} is done" for name in "abcd"]
+    assert not tree.children and whole.parent is not None and len(checks) == 4
+
+
+def test_what_stands_in_any_order_is_found_in_sequences_too():
+    two, one = sequence("two", *task("a", "s1"), *task("b", "s2")), sequence("one", *task("c", "s3"))
+    given = any_order("both", two, one)
+    _, work, *checks = recovering(sequence("outer", sequence("inner", given))).decorated.children
+    assert type(work) is AnyOrder and not given.children and len(checks) == 3
+    assert [node.name for node in work.children[0].children] == ["a is done", "b is done"]
+    assert work.children[1].name == "c is done"
 
 
 def test_every_stage_is_guarded_and_all_are_asked_at_the_end():
@@ -268,11 +307,11 @@ def test_what_is_to_be_held_and_is_held_is_not_dropped(toy, tree):
     assert stage.tick() == Status.SUCCESS and not stage.world.steps
 
 
-def test_what_is_held_is_let_go_while_something_else_is_to_be_done_first(toy):
+def test_what_is_held_is_put_down_while_something_else_is_to_be_done_first(toy):
     tree = recovering(tidy([Goal("box", "goal"), LIFTED]))
     stage = lifted(toy(tree))
     stage.tick()
-    assert stage.tree.tip().model == Withdraw.value()
+    assert stage.tree.tip().model == Place.value("cup", anywhere=True)
     stage = toy(tree)
     stage.world.stand("box", "goal")
     assert lifted(stage).tick() == Status.SUCCESS and not stage.world.steps
@@ -291,6 +330,22 @@ def test_what_is_knocked_out_of_the_hand_is_taken_again():
     assert all(result.status == Status.SUCCESS for result in results)
     plain = Runner(sequence("plain", *task()), scene)
     assert sum(plain.run(seed).success for seed in range(7, 12)) <= 2
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize("high", [0.2, 0.4])
+def test_what_can_be_brought_no_further_is_put_down_and_not_dropped(high):
+    scene = dataclasses.replace(load_source(KNOCKED).scene, disturbed=None)
+    carried = [Bring("cube", position=(0.45, 0.0, high)), Bring("cube", position=(0.2, 1.4, 0.3))]
+    tree = recovering(sequence("too far", *task()[:2], *carried, *task()[3:]), attempts=2)
+    falls = []
+    with Session(tree, scene, seed=7) as session:
+        while session.step() and session.tree.rounds < 1:
+            pass
+        while session.step():
+            falls.append(float(session.hidden.velocities[0, 2]))
+    assert session.result.status == Status.FAILURE and "does not reach" in session.result.why
+    assert min(falls) > -0.3  # one that is let go 10 mm above a table falls so fast
 
 
 @pytest.mark.physical
