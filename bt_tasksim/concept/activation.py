@@ -45,6 +45,8 @@ from bt_tasksim.policy.policy import Action
 PLANNED_TOO_LONG = register_reason("planned_too_long", "no plan was there after {limit}", limit=SECONDS)
 LOST_TICKS = 3
 """Ticks in a row without a maintained goal after which it counts as lost (contacts flicker)."""
+LOSS = 0.5
+"""As how many failures of what reached a goal its loss counts: once it may have been bad luck."""
 
 
 class Judged(NamedTuple):
@@ -124,7 +126,7 @@ class Activation:
         model, context = self._model, self._context
         found.failures = self._failures[rows]
         for goal in model.reaches:
-            found.failures = found.failures + context.no_ways(goal, model.actor, rows)
+            found.failures = found.failures + context.dead_ends(goal, model.actor, rows)
         return found
 
     def judge(self, rows: Array, fresh: Array) -> Judged:
@@ -186,6 +188,8 @@ class Activation:
             finished = judged.rows[done]
             self._failures[finished] = 0
             self._failures[judged.rows[late]] += 1
+            for row in judged.rows[late].tolist():
+                self._led_nowhere(row)
             for goal in model.ends:
                 context.end(goal, model.actor, finished)
             for goal in model.reaches:
@@ -256,9 +260,13 @@ class Activation:
                 self._no_way(statuses, position, row, error)
 
     def _no_way(self, statuses: Array, position: int, row: int, error: NoWayError) -> None:
-        for goal in self._model.maintains:
-            self._context.no_way_with(goal, self._model.actor, row)
+        self._led_nowhere(row)
         self._fail(statuses, position, row, CANNOT_START(NO_WAY(what=error)))
+
+    def _led_nowhere(self, row: int, counts: float = 1.0) -> None:
+        """It came to nothing in a world with the goals that it maintains, as they were reached."""
+        for goal in self._model.maintains:
+            self._context.led_nowhere(goal, self._model.actor, row, counts)
 
     def _look_at_plan(self, row: int, position: int, statuses: Array) -> None:
         """Begin with the plan that was waited for in a world, if it is there; its clock begins then."""
@@ -316,6 +324,7 @@ class Activation:
             for k in np.flatnonzero(over).tolist():
                 measured = self._measured(judged, k)
                 outcome = GOAL_LOST(measured, object=model.actor, goal=goal)
+                self._led_nowhere(int(judged.rows[k]), LOSS)
                 self._fail(judged.statuses, int(judged.going[k]), int(judged.rows[k]), outcome)
             context.end(goal, model.actor, judged.rows[over])
             lost |= over
@@ -326,6 +335,7 @@ class Activation:
                 measured = self._measured(judged, k)
                 exceeded = first_of(limits, k)
                 outcome = LIMIT_VIOLATED(measured if exceeded is None else exceeded.with_detail(measured))
+                self._led_nowhere(int(judged.rows[k]))
                 self._fail(judged.statuses, int(judged.going[k]), int(judged.rows[k]), outcome)
         failed = broken | lost
         return judged.at(np.flatnonzero(~failed)) if failed.any() else judged

@@ -101,7 +101,7 @@ class Context:
         """Seconds ``(N,)`` since each episode began."""
         self._refused: dict[int, Refusal] = {}
         self._held: dict[tuple[str, str], Array] = {}
-        self._no_ways: dict[tuple[str, str], Array] = {}
+        self._dead_ends: dict[tuple[str, str], Array] = {}
         most = {"tool": TOOL + len(robot.arm_joints), "hand": 1 + len(robot.synergies)}
         self._parts = {name: _Part(name, worlds, self.like, n) for name, n in most.items()}
         self._indices: dict[bytes, Index] = {}
@@ -195,7 +195,7 @@ class Context:
         self._observation = self._believed = None
         for held in self._held.values():
             held[rows] = False
-        for count in self._no_ways.values():
+        for count in self._dead_ends.values():
             count[rows] = 0
         for row in rows.tolist():
             self.refused.pop(row, None)
@@ -299,16 +299,23 @@ class Context:
         """Boolean ``(k,)``: an earlier concept reached this goal and none has ended it."""
         return self._goal(goal, target)[rows]
 
-    def no_way_with(self, goal: str, target: str, row: int) -> None:
-        """A concept has found no way to do its part with a goal as an earlier one has reached it."""
-        if (goal, target) not in self._no_ways:
-            self._no_ways[goal, target] = np.zeros(self.worlds, np.int64)
-        self._no_ways[goal, target][row] += 1
+    def led_nowhere(self, goal: str, target: str, row: int, counts: float = 1.0) -> None:
+        """A concept has not done its part with a goal as an earlier one has reached it.
 
-    def no_ways(self, goal: str, target: str, rows: Array) -> Array:
-        """How often ``(k,)`` that was so in the episode."""
-        counts = self._no_ways.get((goal, target))
-        return np.zeros(len(rows), np.int64) if counts is None else counts[rows]
+        Args:
+            goal: The goal.
+            target: The object that it is about.
+            row: The world.
+            counts: As how many times it counts.
+        """
+        if (goal, target) not in self._dead_ends:
+            self._dead_ends[goal, target] = np.zeros(self.worlds)
+        self._dead_ends[goal, target][row] += counts
+
+    def dead_ends(self, goal: str, target: str, rows: Array) -> Array:
+        """How often ``(k,)`` that was so in the episode, in whole times."""
+        counts = self._dead_ends.get((goal, target))
+        return np.zeros(len(rows), np.int64) if counts is None else np.floor(counts[rows]).astype(np.int64)
 
     def _goal(self, goal: str, target: str) -> Array:
         if (goal, target) not in self._held:

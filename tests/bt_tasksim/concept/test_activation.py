@@ -363,3 +363,29 @@ def test_a_task_without_a_way_counts_against_what_came_before_it_in_its_own_worl
     context.begin([world(1)], np.array([1]))
     context.advance(story.at(0, worlds))
     assert take.seen(worlds).failures.tolist() == [0, 0], "and another episode"
+
+
+@pytest.mark.parametrize(
+    ("end", "counted"),
+    [(TIMED_OUT, [1, 2, 3]), (TOO_HARD, [1, 2, 3]), (GOAL_LOST, [0, 1, 1])],
+    ids=["late", "broken", "lost"],
+)
+def test_a_task_that_fails_counts_against_what_came_before_it_and_every_second_loss_does(end, counted):
+    """What is lost once may have been knocked out of the hand."""
+    story, row, ticks = Story(1, 60), np.array([0]), iter(range(60))
+    story.contacts[:] = end is not GOAL_LOST
+    story.wrench[..., 0] = 60.0 if end is TOO_HARD else 0.0
+    context = Context(ROBOT, 1)
+    take, task = (Activation(Running("leaf"), kind.value(), context) for kind in (Take, Task))
+    context.begin([world(1)])
+    for wanted in counted:
+        fresh, ended = True, False
+        while not ended:
+            context.advance(story.at(next(ticks), row))
+            if fresh:
+                context.reach("holding", "cup", row)
+            judged = task.judge(row, np.array([fresh]))
+            ended = not len(judged.rows) or int(task.act(judged, no_action(judged, 1))[0]) != RUNNING
+            fresh = False
+        assert task.outcomes[0].is_a(end)
+        assert take.seen(row).failures.tolist() == [wanted]
