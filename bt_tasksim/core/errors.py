@@ -40,6 +40,10 @@ class NoDrawError(InputError):
     """A world that cannot be drawn with one seed: others may do, so an evaluation counts it and goes on."""
 
 
+class NotToldApartError(InputError):
+    """Objects that perception cannot tell apart as they are drawn with one seed; an evaluation goes on."""
+
+
 @contextmanager
 def within(*where: str | int) -> Iterator[None]:
     """Errors raised in here are about this field (`FieldError`)."""

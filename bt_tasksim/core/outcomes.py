@@ -31,6 +31,7 @@ from bt_tasksim.core.errors import (
     LeafError,
     MachineError,
     NoDrawError,
+    NotToldApartError,
     NoWayError,
     UnreachableError,
 )
@@ -385,6 +386,9 @@ MACHINE_FAILED = register_reason("machine_failed", "{text}")
 NO_DRAW = register_reason("no_draw", "{text}")
 """No world can be drawn with the episode's seed, so there was no episode; the sentence says why."""
 
+NOT_TOLD_APART = register_reason("not_told_apart", "{text}")
+"""Perception has refused the episode before anything moved; the sentence says of which objects."""
+
 
 def outcome_of_error(error: BtTasksimError) -> Outcome:
     """An error as the outcome of an episode."""
@@ -396,4 +400,9 @@ def outcome_of_error(error: BtTasksimError) -> Outcome:
     return reason(text=error)
 
 
-_ERRORS = ((LeafError, LEAF_RAISED), (MachineError, MACHINE_FAILED), (NoDrawError, NO_DRAW))
+_ERRORS = (
+    (LeafError, LEAF_RAISED),
+    (MachineError, MACHINE_FAILED),
+    (NoDrawError, NO_DRAW),
+    (NotToldApartError, NOT_TOLD_APART),
+)

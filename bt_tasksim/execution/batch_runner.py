@@ -18,7 +18,7 @@ from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.concept.world_context import WorldContext
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING
 from bt_tasksim.core.closing import Closing
-from bt_tasksim.core.errors import BtTasksimError, InputError, NoDrawError
+from bt_tasksim.core.errors import BtTasksimError, InputError, NoDrawError, NotToldApartError
 from bt_tasksim.core.outcomes import FAILED, TIME_OVER, Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.transfer import Index
@@ -363,7 +363,7 @@ class BatchRunner(Closing):
                     if self.batch.unknown:
                         runner.plant(self._build)
                     yield seed, runner.run(seed, stream)
-                except NoDrawError as found:
+                except (NoDrawError, NotToldApartError) as found:
                     yield seed, found
                 except InputError:
                     raise

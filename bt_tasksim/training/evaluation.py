@@ -27,6 +27,7 @@ from bt_tasksim.core.errors import (
     LostEngine,
     MachineError,
     NoDrawError,
+    NotToldApartError,
     Terminated,
 )
 from bt_tasksim.core.fleet import Fleet, Here
@@ -345,7 +346,7 @@ class Player(Closing):
             self._batch = BatchRunner(self._build, scene, job.options, worlds, job.threads)
         index_of = {seed: index for index, seed in enumerate(seeds)}
         for seed, found in self._batch.run(seeds, stream):
-            if isinstance(found, InputError) and not isinstance(found, NoDrawError):
+            if isinstance(found, InputError) and not isinstance(found, NoDrawError | NotToldApartError):
                 raise found
             outcome = unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else in_short(found)
             yield index_of[seed], outcome
@@ -359,7 +360,7 @@ def play(player: Player, seeds: Sequence[int], stream: str) -> Iterator[tuple[in
 def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOutcome:
     """One episode; an error in it is a failure with the error as its reason.
 
-    So is a world that cannot be drawn with this seed.
+    So is a world that cannot be drawn with this seed, or whose objects perception cannot tell apart.
 
     Raises:
         InputError: Tree or scene are no good.
@@ -369,7 +370,7 @@ def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOut
     started = time.perf_counter()
     try:
         return in_short(runner.run(seed, stream))
-    except NoDrawError as error:
+    except (NoDrawError, NotToldApartError) as error:
         return unfinished(seed, error, time.perf_counter() - started)
     except InputError:
         raise

@@ -1,14 +1,15 @@
 """A look: which known object is where in pictures that cameras took at one time.
 
 Each camera's picture is looked at by itself. Of what several cameras see of one object the fit counts that
-explains all their pictures best: one camera may see the handle that is hidden from the other. Nothing here
-remembers anything but the generator's state.
+explains all their pictures best: one camera may see the handle that is hidden from the other. Objects of one
+colour are looked for together (`together.py`). Nothing here remembers anything but the generator's state.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,16 +21,31 @@ from bt_tasksim.core.world import PlaceModel, WorldModel
 from bt_tasksim.engines.images import CameraModel, Image
 from bt_tasksim.engines.perception.camera_errors import CameraErrors, as_calibrated
 from bt_tasksim.engines.perception.fixture_faces import boxes_near
-from bt_tasksim.engines.perception.pose_estimation import Target, estimate_pose, follow
+from bt_tasksim.engines.perception.pose_estimation import Target, estimate_pose, follow, still_held
 from bt_tasksim.engines.perception.registration import DepthView, Fit, judge_fit, sample_surface
-from bt_tasksim.engines.perception.segmentation import NEUTRAL, SMALLEST, Segment, classify, find_segments
+from bt_tasksim.engines.perception.segmentation import (
+    NEUTRAL,
+    SMALLEST,
+    Segment,
+    classify,
+    find_segments,
+    groups_of_colour,
+)
+from bt_tasksim.engines.perception.together import (
+    STAGES,
+    STANDING,
+    Group,
+    Place,
+    Sight,
+    Stage,
+    group_of,
+    pairs_of,
+)
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.interchange import told_apart
 
 UPRIGHT = 0.99
 """Height of an object's own z axis from which it is taken to stand."""
-HELD = (0.3, 0.02, 0.35)
-"""Cost of a fit to what the hand holds, and metres and radians that it may have moved in the hand, up to
-which such a look is believed."""
 
 
 @dataclass(frozen=True)
@@ -66,17 +82,23 @@ class Sighting(NamedTuple):
 
 @dataclass(frozen=True)
 class Found:
-    """What a capture found: sightings by object, and for each object a sentence in case that it has none."""
+    """What a capture found: sightings by object, and for each object a sentence in case that it has none.
+
+    ``alike`` are pairs of objects never seen before, of which the pictures do not say which is which although
+    it matters; they have no sightings.
+    """
 
     sightings: Mapping[int, Sighting]
     notes: tuple[str, ...]
+    alike: tuple[tuple[int, int], ...] = ()
 
 
 class _Picture(NamedTuple):
-    """A picture as it is looked at: what each object's pixels may be."""
+    """A picture as it is looked at: what shows each object's colour, other colours, the object alone."""
 
     camera: CameraModel
     depth: Array
+    masks: tuple[Array, ...]
     others: tuple[Array, ...]
     segments: tuple[list[Segment], ...]
 
@@ -104,6 +126,8 @@ class Looker:
         )
         self._model, self._errors = model, errors
         self._colours = [actor.colour for actor in configuration.objects]
+        self._groups = groups_of_colour(self._colours)
+        self._told_apart = partial(told_apart, configuration)
         fixtures = {box.colour for fixture in configuration.fixtures for box in fixture.boxes}
         self._neither = np.array([NEUTRAL, *sorted(fixtures)])
         self._rng = configuration.generator("camera")
@@ -116,20 +140,82 @@ class Looker:
             MachineError: An image has no depth.
         """
         pictures = {name: self._picture(name, image) for name, image in capture.images.items()}
+        groups = [self._group(group, pictures) for group in self._groups if len(group) > 1]
         every = range(len(self.targets))
-        seen = self._sightings(pictures, capture, every)
-        found = shared_out(seen)
-        if not np.isfinite(capture.estimate).all():
+        first = not np.isfinite(capture.estimate).all()
+        found, sights = self._found(pictures, groups, capture, every, {}, STANDING if first else STAGES)
+        known = capture.estimate.copy()
+        if first:
             # At the first look it was not known yet what others stand on.
             lean = [i for i in every if i not in found or not _stands(found[i].fit.pose)]
-            known = capture.estimate.copy()
+            found = {i: sighting for i, sighting in found.items() if i not in lean}
+            sights = {i: sight for i, sight in sights.items() if i not in lean}
             for i, sighting in found.items():
-                if i not in lean:  # else what was found does not count as what was believed before
-                    known[i] = sighting.fit.pose
-            rest = [sighting for sighting in seen if sighting[0] not in lean]
-            again = self._sightings(pictures, replace(capture, estimate=known), lean)
-            found = shared_out(rest + again)
-        return Found(found, tuple(self._note(i, pictures) for i in every))
+                known[i] = sighting.fit.pose  # what leans does not count as what was believed before
+            again, more = self._found(pictures, groups, replace(capture, estimate=known), lean, sights)
+            found, sights = found | again, sights | more
+        for i, sighting in found.items():
+            known[i] = sighting.fit.pose
+        never = {i for i in every if not np.isfinite(capture.estimate[i, 0])}
+        alike = [
+            pair
+            for group in groups
+            for pair in group.alike(self._mattering(group.members, never), sights, known)
+        ]
+        unclear = {i for pair in alike for i in pair}
+        found = {i: sighting for i, sighting in found.items() if i not in unclear}
+        notes = tuple(self._note(i, pictures, alike) for i in every)
+        return Found(found, notes, tuple(alike))
+
+    def _found(
+        self,
+        pictures: Mapping[str, _Picture],
+        groups: Sequence[Group],
+        capture: Capture,
+        wanted: Collection[int],
+        given: Mapping[int, Sight],
+        stages: Sequence[Stage] = STAGES,
+    ) -> tuple[dict[int, Sighting], dict[int, Sight]]:
+        """Sightings of the wanted objects; and of those that share a colour, what is theirs of it."""
+        alone = [i for i in wanted if not any(i in group.members for group in groups)]
+        found = best_of(self._sightings(pictures, capture, alone))
+        estimate = capture.estimate.copy()
+        for i, sighting in found.items():
+            if not np.isfinite(estimate[i, 0]) and _stands(sighting.fit.pose):
+                estimate[i] = sighting.fit.pose
+        held = {i for i, (grip, _) in enumerate(capture.handled) if grip}
+        sights: dict[int, Sight] = {}
+        for group in groups:
+            own = [i for i in wanted if i in group.members]
+            there = {i: sight for i, sight in given.items() if i in group.members}
+            new = group.track(set(own) - set(there), capture.estimate, held)
+            new |= group.find(set(own) - held, estimate, there | new, stages)
+            sights |= new
+            for i, sight in new.items():
+                found[i] = self._sighting(sight, group, list(pictures))
+        return found, sights
+
+    def _group(self, members: Sequence[int], pictures: Mapping[str, _Picture]) -> Group:
+        """The objects of one colour."""
+        first = members[0]
+        shown = [Place(p.camera, p.depth, p.others[first]) for p in pictures.values()]
+        masks = [np.any([p.masks[i] for i in members], axis=0) for p in pictures.values()]
+        return group_of(self.targets, members, shown, masks, self._model.obstacles, self._places, self._rng)
+
+    def _mattering(self, members: Sequence[int], never: Collection[int]) -> list[tuple[int, int]]:
+        """Pairs of objects never seen before, for which it matters which is which."""
+        names = [target.model.name for target in self.targets]
+        pairs = pairs_of([i for i in members if i in never])
+        return [(a, b) for a, b in pairs if self._told_apart(names[a], names[b])]
+
+    def _sighting(self, sight: Sight, group: Group, names: Sequence[str]) -> Sighting:
+        """What was found together with others, as it is told of one object: the camera that shows most."""
+        cloud, own = group.cloud, sight.points
+        best = int(np.argmax(np.bincount(cloud.camera[own], minlength=len(names))))
+        here = own & (cloud.camera == best)
+        mask = np.zeros(group.pictures[best].depth.shape, bool)
+        mask[tuple(cloud.pixels[here].T)] = True
+        return Sighting(sight.fit, names[best], Segment(mask, cloud.points[here]), sight.fit.cost)
 
     def _picture(self, name: str, image: Image) -> _Picture:
         if image.depth is None:
@@ -139,20 +225,13 @@ class Looker:
         masks = classify(image.colour, self._colours, self._neither)
         segments, others = [], []
         for i, target in enumerate(self.targets):
-            alike = self._alike(i)
-            boxes, join = self._model.obstacles, len(alike) == 1
-            segments.append(
-                find_segments(camera, depth, masks[i], boxes, size=target.diameter, join=join)[
-                    : 2 + len(alike)
-                ]
-            )
+            alike = next(group for group in self._groups if i in group)
+            boxes, size = self._model.obstacles, target.diameter
+            found = find_segments(camera, depth, masks[i], boxes, size=size) if len(alike) == 1 else []
+            segments.append(found[:3])
             unlike = [mask for k, mask in enumerate(masks) if k not in alike]
             others.append(np.any(unlike or [0 * masks[i]], axis=0))
-        return _Picture(camera, depth, tuple(others), tuple(segments))
-
-    def _alike(self, i: int) -> list[int]:
-        """Objects of the colour of object ``i``, itself included."""
-        return [k for k, colour in enumerate(self._colours) if colour == self._colours[i]]
+        return _Picture(camera, depth, tuple(masks), tuple(others), tuple(segments))
 
     def _sightings(
         self, pictures: Mapping[str, _Picture], capture: Capture, wanted: Iterable[int]
@@ -194,13 +273,13 @@ class Looker:
         target, before = self.targets[i], capture.estimate[i]
         if capture.handled[i][0]:
             fit = follow(target, view, before, self._model.places.values())
-            moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
-            turned = float(poses.angle_between(fit.pose[3:], before[3:]))
-            cost, far, wide = HELD
-            return fit if fit.cost < cost and moved < far and turned < wide else None
+            return fit if still_held(fit, before) else None
         known = before if np.isfinite(before[0]) else None
-        places = [*self._model.places.values(), *self._tops(i, capture.estimate)]
-        return estimate_pose(target, view, places, known)
+        return estimate_pose(target, view, self._places(i, capture.estimate), known)
+
+    def _places(self, i: int, estimate: Array) -> list[PlaceModel]:
+        """Surfaces on which object ``i`` may stand, others' tops included."""
+        return [*self._model.places.values(), *self._tops(i, estimate)]
 
     def _tops(self, i: int, estimate: Array) -> list[PlaceModel]:
         """The tops of the other objects that stand, as places."""
@@ -216,36 +295,44 @@ class Looker:
             tops.append(replace(table, name=name, pose=top, extent=(x, y), centre=(0.0, 0.0)))
         return tops
 
-    def _note(self, i: int, pictures: Mapping[str, _Picture]) -> str:
-        most = max(
-            (segment.pixels for picture in pictures.values() for segment in picture.segments[i]), default=0
-        )
-        amount = f"{most} pixels" if most else f"fewer than {SMALLEST} pixels"
+    def _note(self, i: int, pictures: Mapping[str, _Picture], alike: Sequence[tuple[int, int]]) -> str:
         names = " and ".join(f"'{name}'" for name in pictures)
+        same = [k for pair in alike for k in pair if i in pair and k != i]
+        if same:
+            others = " and ".join(f"'{self.targets[k].model.name}'" for k in same)
+            one = "cameras" if len(pictures) > 1 else "camera"
+            return (
+                f"'{self.targets[i].model.name}' and {others} cannot be told apart: they have one colour, "
+                f"and {one} {names} would show much the same if they changed places; give them different "
+                f"colours"
+            )
+        most = max(
+            (
+                max((segment.pixels for segment in picture.segments[i]), default=0)
+                or int(np.count_nonzero(picture.masks[i]))
+                for picture in pictures.values()
+            ),
+            default=0,
+        )
+        amount = f"{most} pixels" if most >= SMALLEST else f"fewer than {SMALLEST} pixels"
         cameras = f"cameras {names} show" if len(pictures) > 1 else f"camera {names} shows"
         return (
             f"{self.targets[i].model.name} is not seen: {cameras} {amount} "
-            f"of its colour{' but not its shape' if most else ''}"
+            f"of its colour{' but not its shape' if most >= SMALLEST else ''}"
         )
 
 
-def shared_out(seen: Sequence[tuple[int, Sighting]]) -> dict[int, Sighting]:
-    """One sighting for each object: those of one colour compete for the segments of each picture."""
-    by_camera: dict[str, list[tuple[int, Sighting]]] = {}
+def best_of(seen: Sequence[tuple[int, Sighting]]) -> dict[int, Sighting]:
+    """One sighting for each object: of each camera the one that fits best, of these that of least doubt."""
+    by_camera: dict[tuple[int, str], Sighting] = {}
     for number, sighting in seen:
-        by_camera.setdefault(sighting.camera, []).append((number, sighting))
+        kept = by_camera.get((number, sighting.camera))
+        if kept is None or sighting.fit.cost < kept.fit.cost:
+            by_camera[number, sighting.camera] = sighting
     found: dict[int, Sighting] = {}
-    for own in by_camera.values():
-        taken: Array = np.zeros(own[0][1].segment.mask.shape, bool)
-        here: set[int] = set()
-        for number, sighting in sorted(own, key=lambda one: one[1].fit.cost):
-            mask = sighting.segment.mask
-            if number in here or np.count_nonzero(taken & mask) >= sighting.segment.pixels / 4:
-                continue
-            here.add(number)
-            taken |= mask
-            if number not in found or sighting.doubt < found[number].doubt:
-                found[number] = sighting
+    for (number, _), sighting in by_camera.items():
+        if number not in found or sighting.doubt < found[number].doubt:
+            found[number] = sighting
     return found
 
 

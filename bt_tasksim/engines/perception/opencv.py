@@ -18,6 +18,7 @@ from typing import Self
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NotToldApartError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Observation, WorldModel, WorldState
@@ -121,6 +122,7 @@ class CameraPostProcess(PostProcessEngine):
         self._tracks = [TrackedObject() for _ in range(n)]
         self._estimate = np.full((n, 7), np.nan)
         self._builder = ObservationBuilder(self.robot, configuration)
+        self._begun = False
         self._next, self._taken = 0.0, dict.fromkeys(self.every, -np.inf)
 
     def cameras(self, first: bool) -> tuple[str, ...]:
@@ -138,6 +140,7 @@ class CameraPostProcess(PostProcessEngine):
 
         Raises:
             MachineError: An image has no depth.
+            NotToldApartError: The first look does not say which of some objects is which, and it matters.
         """
         time = float(state.time)
         self._next = time + self._model.control_period
@@ -221,7 +224,15 @@ class CameraPostProcess(PostProcessEngine):
             self._pending = (capture, self._thread.submit(self._looker.look, capture))
 
     def _conclude(self, capture: Capture, found: Found, time: float) -> None:
-        """Believe what a capture has found, but for what the hand has taken or let go since."""
+        """Believe what a capture has found, but for what the hand has taken or let go since.
+
+        Raises:
+            NotToldApartError: It is the first one, and does not say which is which.
+        """
+        first, self._begun = not self._begun, True
+        if first and found.alike:
+            said = {found.notes[min(pair)] for pair in found.alike}
+            raise NotToldApartError("; ".join(sorted(said)))
         for i, track in enumerate(self._tracks):
             if _handled(track) != capture.handled[i]:
                 continue

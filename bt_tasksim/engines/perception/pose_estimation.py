@@ -36,6 +36,9 @@ ALIKE = 0.04
 """Difference of two fits' costs that says nothing: the usual explanation is believed then."""
 NEARLY_UPRIGHT, NEAR_SURFACE = math.radians(8.0), 0.008
 """Radians and metres within which what was believed to be aslant, or above or in a surface, stands on it."""
+HELD = (0.3, 0.02, 0.35)
+"""Cost of a fit to what the hand holds, and metres and radians that it may have moved in the hand, up to
+which such a look is believed."""
 _COARSE, _FINE = (120, 350), (700, 1600)
 """Numbers of points seen and of model points, for trying and for the last word."""
 
@@ -96,6 +99,14 @@ def follow(target: Target, view: DepthView, start: Array, places: Iterable[Place
     stands = up[2] > 0.999 and any(abs(float(foot[2] - place.pose[2])) < 0.003 for place in places)
     points = sample_surface(target.shape)
     return judge_fit(points, view, _near(points, view, start, UPRIGHT if stands else FREE))
+
+
+def still_held(fit: Fit, before: Array) -> bool:
+    """Whether a look at what the hand holds is believed, which was believed to be at ``before (7,)``."""
+    moved = float(np.linalg.norm(fit.pose[:3] - before[:3]))
+    turned = float(poses.angle_between(fit.pose[3:], before[3:]))
+    cost, far, wide = HELD
+    return fit.cost < cost and moved < far and turned < wide
 
 
 def stay(target: Target, view: DepthView, start: Array, places: Sequence[PlaceModel]) -> Fit:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import cv2
 import numpy as np
@@ -87,6 +88,19 @@ def classify(image: Array, colours: Sequence[tuple[float, float, float]], others
     return [(each[i] >= best) & (each[i] > np.cos(WIDEST_ANGLE)) for i in range(len(wanted))]
 
 
+def groups_of_colour(colours: Sequence[tuple[float, float, float]]) -> list[list[int]]:
+    """Numbers of the colours (sRGB, 0 to 1), each with those that cannot be told from it."""
+    wanted = np.asarray(colours, float).reshape(-1, 3)
+    if not len(wanted):
+        return []
+    cosine = colour_cosines(np.round(255 * wanted[None]).astype(np.uint8), wanted)[0]
+    groups: list[list[int]] = []
+    for i in range(len(wanted)):
+        near = [group for group in groups if np.any(cosine[i, group] > np.cos(TWINS))]
+        groups = [group for group in groups if group not in near] + [sorted([i, *chain(*near)])]
+    return groups
+
+
 def outside(points: Array, boxes: Sequence[Obstacle], margin: float) -> Array:
     """Boolean ``(n,)``: points ``(n, 3)`` that are farther than ``margin`` metres from every box."""
     out = np.ones(len(points), bool)
@@ -106,7 +120,6 @@ def find_segments(
     size: float,
     margin: float = 0.006,
     smallest: int = SMALLEST,
-    join: bool = True,
 ) -> list[Segment]:
     """Candidate segments of one object, largest first.
 
@@ -119,7 +132,6 @@ def find_segments(
             is seen) count as one.
         margin: Metres around a fixture that count as the fixture.
         smallest: Pixels that a segment has at least.
-        join: Pieces near each other are one object; not so where several have its colour.
     """
     rows, columns = np.nonzero(mask & (depth > 0))
     if len(rows) < smallest:
@@ -141,7 +153,7 @@ def find_segments(
         if k in used:
             continue
         near = [j for j in order if np.linalg.norm(middles[j] - middles[k]) < 0.75 * size]
-        parts = [j for j in near if j not in used] if join else [k]
+        parts = [j for j in near if j not in used]
         used.update(parts)
         gap = points - middles[k]
         chosen = np.isin(label, parts) & (np.sum(gap * gap, axis=-1) < size * size)
