@@ -9,7 +9,7 @@ from typing import NamedTuple
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Known, Seen
-from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held, tool_distance
+from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held, tool_distance
 from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.core import poses
@@ -92,8 +92,8 @@ class Carry(ConceptModel[MoveMemory]):
         return (seen.elapsed >= memory.path.duration) & (miss(seen, memory.path) < self.tolerance)
 
     def maintained(self, goal: str, seen: Seen, memory: MoveMemory) -> Array:
-        """The object is still in the hand."""
-        return holding(seen, self.target)
+        """The object may still be in the hand."""
+        return may_hold(seen, self.target)
 
     def necessary_cost(self, seen: Seen, memory: MoveMemory) -> Array:
         """Distance of the tool from the end of the path, metres."""

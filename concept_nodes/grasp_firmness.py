@@ -16,6 +16,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.closing import Squeeze, closing_of
 from bt_tasksim.planning.surroundings import pieces_of
+from bt_tasksim.planning.things import box_corners
 from bt_tasksim.scene.hulls import convex
 
 TWO = 2
@@ -49,6 +50,11 @@ NARROW = 0.03
 WIDEST = 1.2
 """Radians to which larger angles were cut."""
 
+NEAR = 0.12
+"""Metres around an object within which the fingers that close on it move."""
+BEARS = 0.005
+"""Metres above an object's lowest point up to which things bear the fingertips."""
+
 SURELY, BARELY, HARDLY = range(3)
 """How a hand holds: also where the estimate is wrong; where it is right; or probably not."""
 
@@ -64,6 +70,7 @@ class Firm:
     def __init__(self, view: WorldView, target: str) -> None:
         self._closing = closing_of(view.robot) if len(view.robot.tips) > TWO else None
         self._pose, self._pieces = view.objects[target], pieces_of(view.model(target))
+        self._others = () if self._closing is None else _beside(view, target)
         self._asked: tuple[Array, Squeeze | None] | None = None  # the last one, which is asked about again
 
     @property
@@ -127,7 +134,7 @@ class Firm:
         assert self._closing is not None
         if self._asked is None or not np.array_equal(self._asked[0], tool):
             grip = poses.relative(tool, self._pose)
-            self._asked = tool, self._closing.squeeze(self._closing.met(grip, self._pieces))
+            self._asked = tool, self._closing.squeeze(self._closing.met(grip, self._pieces, self._others))
         return self._asked[1]
 
 
@@ -140,6 +147,25 @@ def deeper(tool: Array) -> Array:
     """Where the tool ends whose usual grasp is at a pose ``(7,)``: it goes on where it comes level."""
     along = poses.z_axis(tool[3:])
     return poses.shifted(tool, SLANTED * float(np.hypot(*along[:2])) * along)
+
+
+def _beside(view: WorldView, target: str) -> list[Array]:
+    """Corners ``(n, 3)``, in an object's frame, of pieces that fingers may meet beside it.
+
+    What is no higher than what the object stands on bears the fingertips, and does not stop them.
+    """
+    pose = view.objects[target]
+    own = poses.transform(pose, np.concatenate(pieces_of(view.model(target))))
+    least, most = own.min(axis=0), own.max(axis=0)
+    found = []
+    for thing in view.things([target]):
+        pieces = thing.pieces if thing.size is None else [box_corners(thing.size)]
+        for piece in pieces:
+            corners = poses.transform(thing.pose, piece)
+            near = (corners.min(axis=0) < most + NEAR).all() and (corners.max(axis=0) > least - NEAR).all()
+            if near and float(corners[:, 2].max()) > least[2] + BEARS:
+                found.append(poses.localise(pose, corners))
+    return found
 
 
 def _pressed_well(found: Squeeze | None) -> bool:

@@ -37,13 +37,19 @@ def holding(seen: Seen, target: str, reach: float = REACH) -> Array:
     return seen.opposed() & (tool_distance(seen, target) < reach)
 
 
-def not_held(seen: Seen, target: str) -> Possible:
-    """The outcome that an object is not in the hand, where it is not.
+def may_hold(seen: Seen, target: str) -> Array:
+    """Boolean ``(N,)``: an object that was grasped may still be in the hand.
 
-    What is between the fingers and touched by one of them may be held: for an instant a finger may not be
-    felt. If it is not, the goal is lost before anything has come of it.
+    What is between the fingers and touched by one of them may be held: a finger may not be felt for an
+    instant, and a hand of many fingers may press a thing against its palm, or with a finger's side, where
+    nothing is felt. What falls is soon away from the tool.
     """
     distance = tool_distance(seen, target)
     felt = array_namespace(distance).any(seen.contacts, axis=-1)
-    held = (seen.opposed() & (distance < REACH)) | (felt & (distance < BETWEEN))
-    return NOT_HELD.where(~held, object=target, distance=distance)
+    return (seen.opposed() & (distance < REACH)) | (felt & (distance < BETWEEN))
+
+
+def not_held(seen: Seen, target: str) -> Possible:
+    """The outcome that an object is not in the hand, where it is not, see `may_hold`."""
+    held = may_hold(seen, target)
+    return NOT_HELD.where(~held, object=target, distance=tool_distance(seen, target))

@@ -29,7 +29,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.closer import DROPPED, PUT_DOWN, TOUCHING, with_room
-from bt_tasksim.concept_nodes.holding import HOLDING, holding, not_held
+from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
 from bt_tasksim.concept_nodes.standing import (
@@ -445,8 +445,8 @@ class Place(ConceptModel[PlaceMemory]):
         return (memory.felt >= self._surely(seen)) | ended
 
     def maintained(self, goal: str, seen: Seen, memory: PlaceMemory) -> Array:
-        """The object is still in the hand."""
-        return holding(seen, self.target)
+        """The object may still be in the hand."""
+        return may_hold(seen, self.target)
 
     def necessary_cost(self, seen: Seen, memory: PlaceMemory) -> Array:
         """Distance of the object from where it should stand, metres."""

@@ -9,6 +9,7 @@ two of them hold where the line between them leaves both along the object's norm
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ from typing import Any, NamedTuple
 import coal
 import numpy as np
 
+from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.hand_collision import hand_shapes
@@ -23,6 +25,9 @@ from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.hand import tips_in_tool
 from bt_tasksim.robot.kinematics.models import se3
 from bt_tasksim.scene.hulls import convex
+
+_Placed = Sequence[tuple[Any, Any]]
+"""Shapes and where they are."""
 
 _STEPS = 21
 """Closures at which it is asked whether a finger touches: between two of them one moves by 3 mm."""
@@ -37,7 +42,8 @@ class Meeting(NamedTuple):
     """What each fingertip of a hand meets first.
 
     Attributes:
-        closure: Closures ``(n_tips,)`` at which they touch; infinite where one meets nothing.
+        closure: Closures ``(n_tips,)`` at which they touch the object; infinite where one meets nothing, or
+            something else before.
         points: Points of contact ``(n_tips, 3)`` in the tool frame, metres; zero where there is none.
         normals: Unit vectors ``(n_tips, 3)`` there, into the object; zero where there is none.
     """
@@ -84,6 +90,7 @@ class HandClosing:
             [[(shape, _placed(at)) for link, at, shape in shapes if link in tip.links] for shapes in at]
             for tip in robot.tips
         ]
+        self._swept = [_bounds([placed for placed_at in tip for placed in placed_at]) for tip in self._tips]
         tips = np.array([tips_in_tool(robot, robot.hand_position(np.array([c]))) for c in self._closures])
         one, other = (tips[:, list(side)].mean(axis=1) for side in self._sides[:2])
         self._between = np.stack([one[:, 1], other[:, 1]], axis=-1)
@@ -118,15 +125,21 @@ class HandClosing:
         wide = self._between[:, 1] - self._between[:, 0] >= width
         return np.asarray(self._closures[: int(np.argmin(wide)) or len(wide)].max() if wide[0] else 0.0)
 
-    def met(self, grip: Array, pieces: Sequence[Array]) -> Meeting:
+    def met(self, grip: Array, pieces: Sequence[Array], others: Sequence[Array] = ()) -> Meeting:
         """What the fingertips meet.
 
         Args:
             grip: The object's pose ``(7,)`` in the tool frame.
             pieces: Corners ``(n, 3)`` of its convex pieces, in its own frame.
+            others: The same of what stands around it, in its frame, too: a finger that meets one of them
+                first closes on that.
         """
         solids, at = [convex(piece) for piece in pieces], _placed(se3(grip))
-        found = [self._first(tip, solids, at) for tip in self._tips]
+        boxes = [_box(poses.transform(grip, piece)) for piece in others]
+        found = []
+        for tip, swept in zip(self._tips, self._swept, strict=True):
+            beside = [convex(p) for p, box in zip(others, boxes, strict=True) if _overlap(box, swept)]
+            found.append(self._first(tip, solids, beside, at))
         closure, points, normals = zip(*found, strict=True)
         return Meeting(np.array(closure), np.array(points), np.array(normals))
 
@@ -154,16 +167,14 @@ class HandClosing:
         return _Side(first, point, normal / max(float(np.linalg.norm(normal)), 1e-9))
 
     def _first(
-        self, tip: Sequence[Sequence[tuple[Any, Any]]], solids: Sequence[Any], at: Any
+        self, tip: Sequence[_Placed], solids: Sequence[Any], beside: Sequence[Any], at: Any
     ) -> tuple[float, Array, Array]:
-        request = coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, 1)
         for closure, shapes in zip(self._closures, tip, strict=True):
-            for shape, placed in shapes:
-                for solid in solids:
-                    result = coal.CollisionResult()
-                    if coal.collide(shape, placed, solid, at, request, result):
-                        contact = result.getContact(0)
-                        return float(closure), np.array(contact.pos), np.array(contact.normal)
+            contact = _contact(shapes, solids, at)
+            if contact is not None:
+                return float(closure), np.array(contact.pos), np.array(contact.normal)
+            if beside and _contact(shapes, beside, at) is not None:
+                break
         return np.inf, np.zeros(3), np.zeros(3)
 
 
@@ -171,6 +182,36 @@ def closing_of(robot: RobotDescription) -> HandClosing:
     """The closing of a robot's hand, made once."""
     found: HandClosing = robot.derived("closing", HandClosing)
     return found
+
+
+def _contact(shapes: _Placed, solids: Sequence[Any], at: Any) -> Any:
+    """The first contact between placed shapes and solids; None where they do not touch."""
+    request = coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, 1)
+    for shape, placed in shapes:
+        for solid in solids:
+            result = coal.CollisionResult()
+            if coal.collide(shape, placed, solid, at, request, result):
+                return result.getContact(0)
+    return None
+
+
+def _bounds(placed: _Placed) -> tuple[Array, Array]:
+    """Least and largest coordinates ``(3,)`` of placed shapes, by the boxes about them."""
+    corners = []
+    for shape, at in placed:
+        shape.computeLocalAABB()
+        box = shape.aabb_local
+        own = np.array(list(itertools.product(*zip(box.min_, box.max_, strict=True))))
+        corners.append(own @ np.array(at.getRotation()).T + np.array(at.getTranslation()))
+    return _box(np.concatenate(corners))
+
+
+def _box(points: Array) -> tuple[Array, Array]:
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _overlap(one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:
+    return bool(np.all(one[0] <= other[1]) and np.all(other[0] <= one[1]))
 
 
 def _depth(shape: Any, at: Any) -> float:

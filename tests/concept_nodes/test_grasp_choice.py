@@ -200,7 +200,9 @@ def test_a_hand_of_many_fingers_takes_a_round_thing_about_its_middle_from_the_si
     level, side = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
     neutral = poses.frame_from_axes(level, side)
     robot = load_robot("xarm7_ability")
-    world = SimpleNamespace(robot=robot, objects={"cup": cup}, model=lambda name: found)
+    world = SimpleNamespace(
+        robot=robot, objects={"cup": cup}, model=lambda name: found, things=lambda without: ()
+    )
     tools = candidates(world, "cup", level, neutral).tools
     firm = Firm(world, "cup")
     from_side = tools[np.abs(poses.z_axis(tools[:, 3:])[:, 2]) < 0.1]

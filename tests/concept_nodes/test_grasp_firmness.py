@@ -8,15 +8,19 @@ import pytest
 from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, Firm, deeper
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.things import Thing
 from bt_tasksim.robot.description import load_robot
 
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 
 
-def firm(robot="xarm7_ability", size=(0.08, 0.045, 0.06)):
+def firm(robot="xarm7_ability", size=(0.08, 0.045, 0.06), things=()):
     model = SimpleNamespace(solid=None, extent=np.array(size))
     objects = {"box": poses.pose([0.0, 0.0, 0.03])}
-    return Firm(SimpleNamespace(robot=load_robot(robot), objects=objects, model=lambda name: model), "box")
+    view = SimpleNamespace(
+        robot=load_robot(robot), objects=objects, model=lambda name: model, things=lambda without: things
+    )
+    return Firm(view, "box")
 
 
 def above(z, x=0.0, y=0.0):
@@ -36,6 +40,17 @@ def test_a_grasp_beside_the_middle_is_moved_until_both_sides_meet_at_once():
     moved = found.centred(tool)
     assert abs(moved[1]) < 0.006 and found.holds(moved) == SURELY
     assert moved[[0, 2]] == pytest.approx(tool[[0, 2]])
+
+
+def test_fingers_that_would_close_on_a_wall_beside_it_do_not_hold_it():
+    def wall(y, height):
+        return Thing("wall", poses.pose([0.0, y, height / 2]), (0.3, 0.004, height))
+
+    tool = above(0.04)
+    assert firm(things=[wall(0.03, 0.06)]).holds(tool) == HARDLY
+    assert firm(things=[wall(-0.03, 0.06)]).holds(tool) == HARDLY
+    assert firm(things=[wall(0.09, 0.06)]).holds(tool) == SURELY, "they do not come there"
+    assert firm(things=[wall(0.03, 0.004)]).holds(tool) == SURELY, "what bears the box bears the fingers, too"
 
 
 def test_where_nothing_is_met_nothing_is_moved():

@@ -7,8 +7,8 @@ import pytest
 
 from bt_tasksim.checking.situations import whole
 from bt_tasksim.concept.leaf import ONE
-from bt_tasksim.concept_nodes import Pick
-from bt_tasksim.concept_nodes.holding import NOT_HELD, holding, not_held, tool_distance
+from bt_tasksim.concept_nodes import Pick, Place
+from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, holding, not_held, tool_distance
 from bt_tasksim.core import poses
 from bt_tasksim.core.world import Observation
 
@@ -84,3 +84,6 @@ def test_what_one_finger_touches_between_the_others_may_be_held(seen, contacts, 
     seen.observation = dataclasses.replace(seen.observation, contacts=np.array([contacts], bool))
     assert not holding(seen, "box")[0]
     assert not_held(seen, "box").applies.tolist() == [not may_be]
+    for leaf in (Pick("box"), Place("box", on="goal")):
+        kept = leaf.model.maintained(HOLDING, seen, None)
+        assert kept.tolist() == [may_be], "what a concept begins with it does not lose at once"

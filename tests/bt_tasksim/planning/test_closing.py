@@ -51,6 +51,17 @@ def test_what_is_narrow_is_missed_by_the_outer_fingers(closing):
     assert np.isfinite(met.closure).tolist() == [True, False, True, False, False]
 
 
+def test_a_finger_that_meets_a_wall_first_does_not_press_on_what_is_behind_it(closing):
+    thing = box(0.08, 0.03, 0.04)
+    for side, fingers in ((1.0, [1, 2, 3, 4]), (-1.0, [THUMB])):
+        wall = box_corners((0.2, 0.004, 0.04)) + np.array([0.0, 0.022 * side, 0.0])
+        met = closing.met(at(), thing, [wall])
+        assert np.flatnonzero(np.isinf(met.closure)).tolist() == fingers
+        assert closing.squeeze(met) is None
+    behind = box_corners((0.2, 0.004, 0.04)) + np.array([0.0, 0.0, 0.06])
+    assert np.isfinite(closing.met(at(), thing, [behind]).closure).all()
+
+
 def test_one_that_stands_aside_is_met_by_one_side_first(closing):
     for aside in (0.012, -0.012):
         squeeze = closing.squeeze(closing.met(at(y=aside), box(0.08, 0.04, 0.04)))
