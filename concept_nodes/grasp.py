@@ -52,6 +52,7 @@ from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.arm import arm_of
+from bt_tasksim.planning.hand_collision import beyond
 from bt_tasksim.planning.reference_motion import (
     Path,
     minimum_jerk_time,
@@ -131,6 +132,8 @@ FEELING = 0.05
 edge at 0.18 m/s presses 78 N before it can be stopped."""
 DEEP = 0.04
 """Metres before the grasp from which on fingers may meet an edge."""
+SURELY_ABOVE = 0.008
+"""The same above an object's top, for the ends of a jaw that swings: they go far down beside what is tall."""
 SLOWEST = 0.05
 """The least share of the reference motion's own speed at which it does so."""
 YIELDS = 15.0
@@ -497,7 +500,7 @@ class Grasp(ConceptModel[GraspMemory]):
         outwards = poses.clip(xp.sum(touching * constant(_sides(seen.robot), touching), axis=-1), -1.0, 1.0)
         now, period = seen.elapsed - memory.delay, seen.world.control_period
         ahead = sample(memory.path, now + period)[:, :3] - sample(memory.path, now)[:, :3]
-        near = poses.norm(seen.tool[:, :3] - memory.goal[:, :3]) < DEEP
+        near = (poses.norm(seen.tool[:, :3] - memory.goal[:, :3]) < DEEP) | self._among(seen, memory)
         share = gentler(seen.tool)
         feeling = FEELING * xp.where(near, share, xp.ones_like(share))
         share = poses.clip(feeling * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), SLOWEST, 1.0)
@@ -506,6 +509,15 @@ class Grasp(ConceptModel[GraspMemory]):
         pace = xp.where(xp.any(seen.contacts, axis=-1), slower, pace)
         aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)
         return xp.concat([aside + self._yielding(seen, memory), pace[:, None]], axis=-1)
+
+    def _among(self, seen: Seen, memory: GraspMemory) -> Array:
+        """Whether ``(N,)`` the ends of a hand with a jaw that swings may meet the object as it is seen."""
+        xp, along = array_namespace(memory.goal), poses.z_axis(memory.goal[:, 3:])
+        if standing_side(seen.robot) is None:
+            return xp.zeros(along.shape[:1], dtype=xp.bool, device=along.device)
+        here = seen.object(self.target)
+        top = half_extent(here, seen.model(self.target), along) + SURELY_ABOVE
+        return poses.dot(seen.tool[:, :3] - here[:, :3], along) + beyond(seen.robot) > -top
 
     def done(self, seen: Seen, memory: GraspMemory) -> Array:
         """Opposing contacts and a still hand, some ticks long, that presses as hard as it is to."""

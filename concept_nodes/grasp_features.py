@@ -37,7 +37,7 @@ OBSTRUCTED = 0.0015
 """Metres by which a hand that touches something is held up along the approach: it stands on it. Measured:
 -2 to 1 mm at the instant of a first contact at `CAREFUL` speed, 2 to 6 mm one control period later."""
 RESISTED = 5.0
-"""Newtons against the approach with which a hand that has a jaw that swings stands on what it touches: its arm
+"""Newtons against the approach from which a hand with a jaw that swings stands on what it touches: its arm
 may be so stiff that it presses 100 N before it is held up by `OBSTRUCTED`."""
 SCALE = (0.015, 0.025, 0.035, 0.25, 0.5)
 """Largest offsets: metres along the tool's x (aside), y (the fingers' closing axis) and z (the approach),

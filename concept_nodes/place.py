@@ -105,6 +105,9 @@ OTHERS = 8
 SLOWLY, GENTLY = 0.02, 0.4
 """Metres above where the object should stand below which it goes slower, and the least share of the path's
 speed: what meets its support at 80 mm/s in the hand of a stiff arm strains the wrist with 60 to 80 N."""
+SLOWEST = 0.003
+"""Metres per second that it goes at least: where the way itself is slow, as where the tool turns more than it
+comes down, a small share of its speed would not arrive in time."""
 UNSURE = 0.005
 """Metres by which something may stand higher than it is seen to: twice the error of a good estimate. An arm
 near its base, which is stiff, goes as slowly as it can from there on."""
@@ -476,8 +479,12 @@ class Place(ConceptModel[PlaceMemory]):
         share = gentler(seen.tool)
         gently, unsure = GENTLY * share, UNSURE * (1.0 - share)
         pace = xp.minimum(xp.maximum((self._above(seen) - unsure) / SLOWLY, gently), xp.ones_like(gently))
+        period = seen.world.control_period
+        here, ahead = (sample(memory.path, memory.progress + later)[:, :3] for later in (0.0, period))
+        least = SLOWEST * period / poses.clip(poses.norm(ahead - here), SLOWEST * period, math.inf)
+        pace = xp.maximum(pace, least)
         pace = xp.where(memory.progress >= memory.path.duration, xp.ones_like(pace), pace)
-        on = memory.progress + seen.world.control_period * pace
+        on = memory.progress + period * pace
         return xp.where(self._supported(seen, memory), memory.progress, on)
 
     def _supported(self, seen: Seen, memory: PlaceMemory) -> Array:

@@ -83,7 +83,7 @@ def test_what_does_not_stand_is_left_as_it_is_seen(change):
 
 
 def test_furniture_carries_beside_its_places_too_where_there_is_room():
-    """The table's top is larger than the region of it that is named; the rim of a tray is no place to stand."""
+    """The table's top is larger than its named region; the rim of a tray is no place to stand."""
     world, true = world_of(3)
     box, tray = world.object_index("box"), world.places["tray"]
     seen = true.copy()
@@ -93,5 +93,5 @@ def test_furniture_carries_beside_its_places_too_where_there_is_room():
     assert at_rest(world, seen)[box, 2] == pytest.approx(true[box, 2], abs=1e-6)
     walls = [b for b in world.obstacles if b.fixture == tray.fixture and min(b.size[:2]) < 0.02]
     half = walls[0].size[2] / 2 + world.object("box").extent[2] / 2
-    seen[box, :3] = walls[0].pose[:3] + [0.0, 0.0, half + 0.004]
+    seen[box, :3] = walls[0].pose[:3] + np.eye(3)[2] * (half + 0.004)
     assert at_rest(world, seen)[box, 2] == seen[box, 2]
