@@ -25,7 +25,6 @@ from bt_tasksim.engines.images import CameraModel
 from bt_tasksim.engines.perception.coloured_cloud import ColouredCloud, coloured_cloud
 from bt_tasksim.engines.perception.fixture_faces import boxes_near
 from bt_tasksim.engines.perception.pose_estimation import (
-    GOOD,
     POOR,
     Target,
     follow,
@@ -46,6 +45,11 @@ SMALL = 0.4
 """Part of an object's diagonal that what is seen of it spans at least: less is but a piece of something."""
 MARGIN = 0.02
 """Metres that it may span more than an object does: what is seen has errors."""
+FAIR = 0.35
+"""Cost of a fit in several pictures up to which others need not be looked for: the errors of the cameras'
+calibrations come on top of what one picture costs."""
+AGREE = 0.2
+"""Radians between two cameras' fits up to which the pose between them is tried."""
 SIMILAR = 0.015
 """Metres by which two objects' extents differ at most, that might be taken for each other."""
 SURE = 0.03
@@ -75,8 +79,8 @@ class Stage(NamedTuple):
     limit: float
 
 
-STANDING = (Stage(False, False, GOOD), Stage(False, True, GOOD))
-STAGES = (*STANDING, Stage(True, False, GOOD), Stage(True, True, GOOD), Stage(True, False, POOR))
+STANDING = (Stage(False, False, FAIR), Stage(False, True, FAIR))
+STAGES = (*STANDING, Stage(True, False, FAIR), Stage(True, True, FAIR), Stage(True, False, POOR))
 """The usual first: what stands alone, then what touches others, then what lies."""
 
 
@@ -122,7 +126,7 @@ class Group:
             best = self._best(i, fits, views)
             if best is None:
                 continue
-            if still_held(best, believed[i]) if i in held else best.cost < GOOD:
+            if still_held(best, believed[i]) if i in held else best.cost < FAIR:
                 found[i] = Sight(best, own)
         return found
 
@@ -222,7 +226,7 @@ class Group:
         points = sample_surface(target.shape)
         fits = [stand_on(target, view, places, points, before) for view in views]
         best = self._best(i, fits, views)
-        if stage.free and (best is None or best.cost >= GOOD):
+        if stage.free and (best is None or best.cost >= FAIR):
             lying = self._best(i, [lie_about(target, v, places, points, before) for v in views], views)
             best = min(filter(None, (best, lying)), key=lambda fit: fit.cost, default=None)
         if before is None:
@@ -238,11 +242,10 @@ class Group:
     def _best(self, i: int, fits: Iterable[Fit | None], views: Sequence[DepthView]) -> Fit | None:
         """The fit that explains all views best, judged in all."""
         points = sample_surface(self.targets[i].shape)
-        judged = [
-            joint([judge_fit(points, view, fit.pose) for view in views], [len(view.points) for view in views])
-            for fit in fits
-            if fit is not None
-        ]
+        tried = [fit.pose for fit in fits if fit is not None]
+        tried += [mean for a, b in combinations(tried, 2) if (mean := between(a, b)) is not None]
+        weights = [len(view.points) for view in views]
+        judged = [joint([judge_fit(points, view, pose) for view in views], weights) for pose in tried]
         return min(judged, key=lambda fit: fit.cost, default=None)
 
     def _views(self, i: int, part: Array) -> list[DepthView]:
@@ -274,6 +277,14 @@ def joint(fits: Sequence[Fit], weights: Sequence[float]) -> Fit:
     """How well one pose explains several pictures, each by its weight."""
     values = np.average([fit[1:] for fit in map(_numbers, fits)], axis=0, weights=weights)
     return Fit(fits[0].pose, *map(float, values))
+
+
+def between(a: Array, b: Array) -> Array | None:
+    """The pose ``(7,)`` half-way between two that agree; None where they do not."""
+    if float(poses.angle_between(a[3:], b[3:])) > AGREE:
+        return None
+    same = b[3:] if float(a[3:] @ b[3:]) > 0.0 else -b[3:]
+    return np.concatenate([(a[:3] + b[:3]) / 2, poses.normalise(a[3:] + same)])
 
 
 def matched(worth: Array) -> list[tuple[int, int]]:

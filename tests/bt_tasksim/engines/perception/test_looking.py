@@ -1,4 +1,4 @@
-"""A look: the best of several sightings, one segment for each object, and what stands on what is seen."""
+"""A look: the best of several sightings, and what stands on what is seen."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,7 @@ from raycast import CAMERA, box, cloud, image
 
 from bt_tasksim.core import poses
 from bt_tasksim.engines.perception.camera_errors import PERFECT
-from bt_tasksim.engines.perception.looking import Capture, Looker, Sighting, shared_out
+from bt_tasksim.engines.perception.looking import Capture, Looker, Sighting, best_of
 from bt_tasksim.engines.perception.registration import DepthView, Fit
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import ObjectSpec
@@ -25,8 +25,8 @@ def sighting(camera, pixels, cost, rows=slice(0, 10), doubt=0.1):
 
 def test_the_sighting_that_explains_all_pictures_best_counts():
     seen = [(0, sighting("left", 400, 0.1, doubt=0.2)), (0, sighting("right", 50, 0.12, doubt=0.15))]
-    assert shared_out(seen)[0].camera == "right"
-    assert shared_out(seen[::-1])[0].camera == "right"
+    assert best_of(seen)[0].camera == "right"
+    assert best_of(seen[::-1])[0].camera == "right"
 
 
 def test_what_one_camera_sees_counts_against_what_fits_in_the_others_picture():
@@ -44,17 +44,6 @@ def test_what_one_camera_sees_counts_against_what_fits_in_the_others_picture():
     )
     assert right_doubt < 0.1 < wrong_doubt - 0.05
     assert looker._doubt(0, Fit(wrong, 0.001, 0.0), part, []) == pytest.approx(0.1)
-
-
-def test_objects_of_one_colour_do_not_have_the_same_pixels():
-    same, other = slice(0, 10), slice(20, 30)
-    seen = [
-        (0, sighting("left", 400, 0.12, same)),
-        (1, sighting("left", 400, 0.10, same)),
-        (0, sighting("left", 400, 0.15, other)),
-    ]
-    found = shared_out(seen)
-    assert found[1].fit.cost == 0.10 and found[0].fit.cost == 0.15
 
 
 def test_what_stands_on_something_is_found_upright_at_the_first_look():
