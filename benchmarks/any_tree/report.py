@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bt_tasksim.core.outcomes import NOT_TOLD_APART
 from bt_tasksim.training.evaluation_outcomes import wilson
 
 Draw = Mapping[str, Any]
@@ -34,6 +35,7 @@ def summary(draws: Sequence[Draw]) -> dict[str, Any]:
         "lies": sum(bool(draw.get("lie")) for draw in draws),
         "lying_seeds": [draw["seed"] for draw in draws if draw.get("lie")],
         "overlaps": sum(bool(draw.get("overlap")) for draw in draws),
+        "refused": [draw["seed"] for draw in draws if draw["reason"] == NOT_TOLD_APART.name],
         "asked_oracle": sum("oracle" in draw for draw in draws),
         "impossible": dict(Counter(draw["oracle"]["reason"] for draw in draws if impossible(draw))),
         "failures": [
@@ -77,6 +79,8 @@ def lines(draws: Sequence[Draw], title: str) -> list[str]:
         f"  {said['lies']} said SUCCESS while goals were missed, and {said['overlaps']} more in which "
         f"all goals were reached and bodies overlapped"
     )
+    if said["refused"]:
+        out.append(f"  {len(said['refused'])} refused by name: objects that cameras cannot tell apart")
     for (concept, reason), group in grouped([d for d in draws if not d["success"] and not impossible(d)]):
         seeds = " ".join(str(draw["seed"]) for draw in group[:SHOWN])
         out.append(f"  {len(group):4d} x {concept}: {reason}, seeds {seeds}: {group[0]['why']}")

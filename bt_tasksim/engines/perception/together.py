@@ -176,7 +176,7 @@ class Group:
         """Cost by which the pictures are explained worse with two objects exchanged."""
         extents = [sorted(self.targets[i].model.extent) for i in (a, b)]
         seen = [(i, k) for i, k in ((a, b), (b, a)) if i in found]
-        if not seen or np.max(np.abs(np.subtract(*extents))) > SIMILAR:
+        if not seen or max(abs(x - y) for x, y in zip(*extents, strict=True)) > SIMILAR:
             return np.inf
         more = pixels = 0.0
         for i, instead in seen:

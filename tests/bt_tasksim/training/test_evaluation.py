@@ -330,6 +330,17 @@ def test_the_largest_seed_is_kept(tmp_path):
     assert read_log(tmp_path / "one" / "run.h5").demonstrations[0].seed == result.seed == 2**64 - 1
 
 
+TWINS = """
+from bt_tasksim import ObjectSpec, Scene
+from bt_tasksim.concept_nodes import Wait
+
+def scene():
+    cube = ObjectSpec("cube", on="table", size=(0.05, 0.05, 0.05), colour=(0.86, 0.16, 0.15))
+    return Scene(objects={"a": cube, "b": cube})
+
+def build():
+    return Wait(duration=0.1)
+"""
 CROWD = """
 from bt_tasksim import ObjectSpec, Scene
 from bt_tasksim.concept_nodes import Wait
@@ -365,6 +376,14 @@ def test_where_no_seed_has_a_world_that_is_an_error_which_names_one(tmp_path):
     with pytest.raises(NoDrawError, match=r"with seed \d+, object 'box .' finds no free spot") as error:
         evaluate(Job(str(tmp_path / "crowd.py"), batch=1), [5, 6])
     assert "\n" not in str(error.value)
+
+
+def test_a_draw_whose_objects_look_alike_is_a_failure_with_its_own_reason(tmp_path):
+    (tmp_path / "twins.py").write_text(TWINS)
+    job = Job(str(tmp_path / "twins.py"), options=EngineOptions(perception="camera"), batch=1)
+    (found,) = evaluate(job, [5]).outcomes
+    assert found.reason == "not_told_apart" and found.status == "INVALID" and not found.success
+    assert "'a' and 'b' cannot be told apart" in found.why and found.control_steps == 0
 
 
 @pytest.mark.parametrize("batch", [1, 2])
