@@ -32,8 +32,8 @@ class Seen:
         elapsed: ``(N,)`` seconds since the concept became active.
         later: The concepts that come after this one in its tree, in order, where they are known.
         failures: ``(N,)`` in NumPy: how often this leaf has failed in a row in the episode before it became
-            active, or one after it has failed with what this one had reached, of losses every second one; None
-            where nobody has counted.
+            active, or one after it has failed with what this one had reached, every second loss of it
+            among them; None where nobody has counted.
         believed: Gives the poses ``(N, n_objects, 7)`` at which the objects are taken to be; by default they
             are as they were observed.
     """

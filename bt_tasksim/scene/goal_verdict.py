@@ -13,6 +13,7 @@ from bt_tasksim.core.outcomes import Outcome, register_reason
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.units import METRES_PER_SECOND, RADIANS_PER_SECOND
 from bt_tasksim.scene.goal_functions import GoalFunction
+from bt_tasksim.scene.looked_at import WatchedState
 from bt_tasksim.scene.relations import FinalState, relation_named
 from bt_tasksim.scene.specs import Goal
 
@@ -45,6 +46,7 @@ class GoalVerdict:
         position_error: Metres from where the object should be; NaN where the goal does not say so.
         angle_error: Radians from how it should be; NaN likewise.
         time: Seconds at which a goal that has to be true once was seen to be; else NaN.
+        objects: The objects that it is about, which so may be moved.
     """
 
     goal: str
@@ -54,6 +56,7 @@ class GoalVerdict:
     position_error: float = math.nan
     angle_error: float = math.nan
     time: float = math.nan
+    objects: frozenset[str] = frozenset()
 
     def to_data(self) -> dict[str, Any]:
         """As plain data, for files; what is not known is None."""
@@ -86,22 +89,26 @@ def judge_goal(goal: Goal, final: FinalState) -> GoalVerdict:
         wrong or placement.outcome,
         placement.position_error,
         placement.angle_error,
+        objects=frozenset({goal.object}),
     )
 
 
 def judge_function(goal: GoalFunction, final: FinalState) -> GoalVerdict:
-    """Whether a function says that it is reached.
+    """Whether a function says that it is reached. It is about what it looks at.
 
     Raises:
         InputError: See `GoalFunction.ask`.
     """
-    answer = goal.ask(_for_reading(final))
+    watched = WatchedState.of(_for_reading(final))
+    answer = goal.ask(watched)
     if answer is None:
-        return GoalVerdict(goal.name, "end", None, FUNCTION_NOT_HERE(goal=goal.name))
+        everything = frozenset(final.world.index)
+        return GoalVerdict(goal.name, "end", None, FUNCTION_NOT_HERE(goal=goal.name), objects=everything)
     reached, words = answer
     reason = FUNCTION_TRUE if reached else FUNCTION_FALSE
     said = words or ("it is reached" if reached else "it is not reached")
-    return GoalVerdict(goal.name, "end", reached, reason(goal=goal.name, words=said))
+    outcome = reason(goal=goal.name, words=said)
+    return GoalVerdict(goal.name, "end", reached, outcome, objects=frozenset(watched.names))
 
 
 def _for_reading(final: FinalState) -> FinalState:

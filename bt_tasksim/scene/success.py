@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,7 +31,7 @@ from bt_tasksim.scene.goal_verdict import (
     judge_goal,
 )
 from bt_tasksim.scene.moments import Moments
-from bt_tasksim.scene.relations import FinalState, relation_named
+from bt_tasksim.scene.relations import FinalState
 
 __all__ = [
     "AT_REST",
@@ -195,9 +195,7 @@ def _wrong(
         more = [f"and {len(missed) - NAMED} more"] if len(missed) > NAMED else []
         named = ", ".join([*(placement.goal for placement in missed[:NAMED]), *more])
         yield GOALS_MISSED(missed[0].outcome, missed=len(missed), count=len(placements), goals=named)
-    goals = final.configuration.goals
-    if any(not relation_named(goal.relation).in_hand for goal in goals):
-        yield from _knocked_over({goal.object for goal in goals}, final)
+    yield from _knocked_over(frozenset().union(*(placement.objects for placement in placements)), final)
     if float(final.hidden.penetration) > DEEPEST:
         yield penetration(final.hidden.penetration, overlap)
 
@@ -215,8 +213,8 @@ def penetration(depth: Array | float, overlap: Overlap | None = None) -> Outcome
     return PENETRATION(bodies=f"{one} and {two}", depth=depth, moment=f" at {time:.2f} s")
 
 
-def _knocked_over(meant: set[str], final: FinalState) -> Iterator[Outcome]:
-    """Objects that were moved, though no goal says that they should be.
+def _knocked_over(meant: Collection[str], final: FinalState) -> Iterator[Outcome]:
+    """Objects that were moved, though no goal is about them.
 
     What stood on an object, or in it, is carried along: it is looked at from there.
     """
@@ -230,8 +228,8 @@ def _knocked_over(meant: set[str], final: FinalState) -> Iterator[Outcome]:
                 for base, pose in ((final.start(actor.base), before), (final.pose(actor.base), now))
             )
         shift = float(np.linalg.norm(now[:3] - before[:3]))
-        tilted = float(poses.tilt(now[3:]) - poses.tilt(before[3:]))
-        if shift > KNOCKED[0] or tilted > KNOCKED[1]:
+        tilted = abs(float(poses.tilt(now[3:]) - poses.tilt(before[3:])))
+        if not (shift <= KNOCKED[0] and tilted <= KNOCKED[1]):
             yield KNOCKED_OVER(object=actor.name, shift=shift, tilt=tilted)
 
 

@@ -104,6 +104,20 @@ class FinalState:
         """An object touches something besides the hand."""
         return bool(np.any(self.hidden.support[self.world.object_index(name)]))
 
+    def borne(self, name: str) -> bool:
+        """Something besides the hand bears an object: not what the object itself bears, on it or in it."""
+        me, count = self.world.object_index(name), len(self.world.index)
+        touch: Array = np.array(self.hidden.support, bool)
+        others: Array = touch[:count, :count] | touch[:count, :count].T
+        grounded = touch[:count, count:].any(axis=1)
+        if grounded[me]:
+            return True
+        near = others[me].copy()
+        others[me] = others[:, me] = False
+        for _ in range(count):  # from what touches furniture on to what touches that
+            grounded = grounded | others[:, grounded].any(axis=1)
+        return bool((near & grounded).any())
+
 
 class _Truth(Whereabouts):
     """Where everything truly is, in one world: arrays ``(1, ...)``."""
@@ -171,7 +185,7 @@ class GoalRelation(abc.ABC):
     """
 
     in_hand: ClassVar[bool] = False
-    """The object is to be held at the end; else it must be let go and at rest, and nothing knocked over."""
+    """The object is to be held at the end; else it must be let go and at rest."""
     needs_place: ClassVar[bool] = True
     """A goal names a place or an object besides."""
 

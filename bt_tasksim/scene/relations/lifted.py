@@ -1,4 +1,7 @@
-"""Lifted: the object hangs in the hand alone, as high as it should, and as upright as it stood."""
+"""Lifted: the object hangs in the hand alone, as high as it should, and as upright as it stood.
+
+What stands on it, or lies in it, may come along.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,7 @@ class Lifted(GoalRelation):
         missing = goal.height - float(now[2] - start[2])
         angle = float(poses.tilt(now[3:], start[3:]))
         reason = HELD_UP
-        if final.supported(goal.object) or not final.touched(goal.object):
+        if final.borne(goal.object) or not final.touched(goal.object):
             reason = NOT_LIFTED
         elif abs(missing) > goal.position_tolerance:
             reason = SLIPPED

@@ -1,6 +1,7 @@
 """On: the object stands upright on the origin of a place, with its heading up to the object's symmetry.
 
-Or on another object: on the middle of its top, wherever that is, with any heading.
+Or on another object: on the middle of its top, wherever that is, with any heading. Of small things one that
+stands next to another one, or on a third one, may be within the tolerance: it does not stand on it.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ import numpy as np
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS
+from bt_tasksim.scene.relations.anywhere import ON_SOMETHING_ELSE
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, lean, turn
+from bt_tasksim.scene.spatial_laws import is_on
 from bt_tasksim.scene.specs import Goal
 
 STANDS = register_reason(
@@ -39,9 +42,13 @@ class On(GoalRelation):
         local, model = final.in_place(goal), final.model(goal.object)
         distance = float(np.linalg.norm(local[:3] - [0.0, 0.0, model.extent[2] / 2]))
         angle = lean(local[3:], model) if final.is_object(goal.place) else turn(local[3:], model)
-        reason = STANDS
-        if distance > goal.position_tolerance:
+        reason, stands = STANDS, is_on(final.whereabouts, goal.object, goal.place)
+        beside = final.is_object(goal.place) and float(stands.aside[0]) > 0.0
+        if distance > goal.position_tolerance or beside:
             reason = NOT_IN_PLACE
+        elif bool(stands.elsewhere[0]):
+            names = {"object": goal.object, "place": goal.place}
+            return Placement(False, ON_SOMETHING_ELSE(**names), distance, angle)
         elif angle > goal.angle_tolerance:
             reason = TILTED_OR_TURNED
         outcome = reason(object=goal.object, place=goal.place, distance=distance, angle=angle)

@@ -146,6 +146,52 @@ def test_only_what_no_goal_names_and_nobody_may_move_is_knocked_over():
     assert evaluate_success(configuration, world, state(configuration, away)).success
 
 
+AWAY = {"green": poses.pose([0.35, 0.25, 0.025])}
+OVER = {"green": poses.pose([0.5, 0.25, 0.025], tilted(20))}
+
+
+def red_is_there(final):
+    return bool(final.pose("red")[0] > 0.0)
+
+
+def red_is_there_by_the_arrays(final):
+    return bool(final.hidden.objects[0, 0] > 0.0)
+
+
+@pytest.mark.parametrize("moved", [AWAY, OVER])
+def test_what_no_function_looks_at_is_knocked_over(moved):
+    assert verdict([red_is_there], {}).success
+    assert verdict([red_is_there], {"red": poses.pose([0.7, 0.1, 0.025])}).success
+    assert verdict([red_is_there], moved).reason == "knocked_over"
+    assert verdict([red_is_there, lambda final: final.touched("green") or True], moved).success
+    assert verdict([red_is_there, Goal("green", "table", position_tolerance=1.0)], AWAY).success
+    assert verdict([red_is_there_by_the_arrays], moved).success  # nobody knows what it looks at
+
+
+@pytest.mark.parametrize("moved", [AWAY, OVER])
+def test_what_nothing_lifts_is_knocked_over(moved):
+    held = {"hand_distance": np.array([0.0, np.inf, np.inf])}
+    up = {"red": poses.pose([0.5, -0.1, 0.325])}
+    goals = [Goal("red", relation="lifted")]
+    assert verdict(goals, up, **held).success
+    assert verdict(goals, {**up, **moved}, **held).reason == "knocked_over"
+
+
+def test_what_lay_and_was_set_upright_was_moved():
+    lying = {**OBJECTS, "green": cube(0.25)}
+    configuration, world = drawn(Scene(objects=lying, goals=[Goal("red", on="blue")]))
+    poses_now = [list(actor.pose) for actor in configuration.objects]
+    poses_now[2][3:] = tilted(60).tolist()
+    actors = tuple(
+        dataclasses.replace(actor, pose=tuple(pose))
+        for actor, pose in zip(configuration.objects, poses_now, strict=True)
+    )
+    began = dataclasses.replace(configuration, objects=actors)
+    assert evaluate_success(began, world, state(began, STACKED)).success
+    upright = {**STACKED, "green": poses.pose(poses_now[2][:3])}
+    assert evaluate_success(began, world, state(began, upright)).reason == "knocked_over"
+
+
 def test_what_stands_on_a_moved_object_is_carried_and_not_knocked_over():
     objects = {
         "red": cube(-0.1),
@@ -159,6 +205,23 @@ def test_what_stands_on_a_moved_object_is_carried_and_not_knocked_over():
     assert evaluate_success(configuration, world, state(configuration, carried)).success
     fallen = {**carried, "pea": poses.pose([0.7, 0.1, 0.015])}
     assert evaluate_success(configuration, world, state(configuration, fallen)).reason == "knocked_over"
+
+
+def test_what_stands_on_what_is_carried_is_carried_too():
+    small = {"size": ((0.03,) * 3,) * 2, "area": (0, 0)}
+    objects = {
+        "red": cube(-0.1),
+        "pea": ObjectSpec(("cube",), on="red", **small),
+        "crumb": ObjectSpec(("cube",), on="pea", **small),
+    }
+    goal = Goal("red", on="table", position_tolerance=0.5, angle_tolerance=3.0)
+    configuration, world = drawn(Scene(objects=objects, goals=[goal]))
+    carried = poses.multiply(poses.pose([0.6, 0.3, 0.0], tilted(80, axis=2)), poses.pose([-0.5, 0.1, 0.0]))
+    at = {actor.name: poses.multiply(carried, np.array(actor.pose)) for actor in configuration.objects}
+    assert evaluate_success(configuration, world, state(configuration, at)).success
+    at["crumb"] = poses.shifted(at["crumb"], np.array([0.08, 0.0, -0.03]))
+    found = evaluate_success(configuration, world, state(configuration, at))
+    assert found.reason == "knocked_over" and found.outcome.names == {"object": "crumb"}
 
 
 def test_without_goals_only_the_trees_word_is_taken():

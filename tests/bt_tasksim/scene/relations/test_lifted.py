@@ -13,6 +13,7 @@ from bt_tasksim.scene.relations.lifted import HELD_UP, NOT_LIFTED, SLIPPED, TILT
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import Goal, ObjectSpec
 from bt_tasksim.scene.success import PENETRATION, evaluate_success
+from tests.bt_tasksim.scene.states import drawn, state
 
 SCENE = Scene(
     objects={"cup": ObjectSpec(("cup",), on="table")},
@@ -59,7 +60,7 @@ def tilted(hidden, degrees):
         (lambda h: tilted(h, 9), HELD_UP),
         (lambda h: lower(h, 0.04), SLIPPED),
         (lambda h: tilted(h, 11), TILTED),
-        (lambda h: {"support": np.array([[True, False]])}, NOT_LIFTED),
+        (lambda h: {"support": np.array([[False, True]])}, NOT_LIFTED),
         (lambda h: {"hand_distance": np.array([0.01])}, NOT_LIFTED),
         (lambda h: {"penetration": np.float64(0.003)}, PENETRATION),
     ],
@@ -69,6 +70,32 @@ def test_each_reason_and_nothing_else_wrong(held, change, reason):
     found = evaluate_success(configuration, world, dataclasses.replace(hidden, **change(hidden)))
     assert found.outcome.is_a(reason) and found.success is (reason is HELD_UP)
     assert found.reason == ("" if found.success else reason.name)
+
+
+@pytest.mark.parametrize(
+    ("touching", "success"),
+    [
+        ([("pea", "cup")], True),  # it lies in the cup
+        ([("pea", "cup"), ("crumb", "pea")], True),  # and one on it
+        ([("cup", "table")], False),
+        ([("pea", "cup"), ("pea", "table")], False),  # the cup stands on it, or leans on it
+        ([("cup", "pea"), ("crumb", "pea"), ("crumb", "table")], False),
+        ([("pea", "cup"), ("crumb", "table")], True),
+    ],
+)
+def test_what_it_holds_comes_along_and_what_bears_it_does_not(touching, success):
+    small = ObjectSpec(("cube",), on="cup", size=((0.02,) * 3,) * 2, area=(0, 0))
+    objects = {**SCENE.objects, "pea": small, "crumb": dataclasses.replace(small, on="pea")}
+    configuration, world = drawn(dataclasses.replace(SCENE, objects=objects, goals=SCENE.goals))
+    up = [poses.shifted(np.array(a.pose), np.array([0.0, 0.0, 0.3])) for a in configuration.objects]
+    names = [*world.index, "table"]
+    support = np.zeros((3, 4), bool)
+    for one, other in touching:
+        support[names.index(one), names.index(other)] = True
+    at = dict(zip(world.index, up, strict=True))
+    hidden = state(configuration, at, hand_distance=np.array([0.0, np.inf, np.inf]), support=support)
+    found = evaluate_success(configuration, world, hidden)
+    assert (found.success, found.reason) == (success, "" if success else "not_lifted")
 
 
 @pytest.mark.parametrize(

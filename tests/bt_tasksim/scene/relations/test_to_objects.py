@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bt_tasksim.core import poses
 from bt_tasksim.scene.scene import Scene
-from bt_tasksim.scene.specs import Goal, ObjectSpec
+from bt_tasksim.scene.specs import Goal, ObjectSpec, SpotSpec
 from bt_tasksim.scene.success import evaluate_success
 from tests.bt_tasksim.scene.states import drawn, state, tilted
 
@@ -55,6 +55,40 @@ def test_on_an_object_where_it_is_then(aside, up, turn, reason):
     found = evaluate_success(configuration, world, state(configuration, at))
     assert (found.success, found.reason) == (reason == "", reason)
     assert found.position_error == pytest.approx(np.linalg.norm([*aside, up - SIZE]), abs=1e-9)
+
+
+def little(size, y):
+    return ObjectSpec(("box",), on="table", centre=(0.0, y), area=(0, 0), size=(size,) * 2, yaw=0.0)
+
+
+LITTLE = (0.02, 0.02, 0.016)
+
+
+def test_of_small_things_one_next_to_another_one_does_not_stand_on_it():
+    scene = Scene(objects={"a": little(LITTLE, -0.1), "b": little(LITTLE, 0.1)}, goal=Goal("a", on="b"))
+    configuration, world = drawn(scene)
+    b = np.array(configuration.objects[1].pose)
+    for aside, up, reason in (
+        (0.021, 0.0, "not_in_place"),
+        (0.009, 0.016, ""),
+        (0.011, 0.016, "not_in_place"),
+    ):
+        at = {"a": poses.shifted(b, np.array([aside, 0.0, up]))}
+        found = evaluate_success(configuration, world, state(configuration, at))
+        assert found.position_error < 0.03 and found.reason == reason
+
+
+def test_what_stands_on_something_that_lies_on_the_spot_does_not_stand_there():
+    objects = {"a": little(LITTLE, -0.1), "plate": little((0.06, 0.06, 0.012), 0.1)}
+    spot = SpotSpec("spot", on="table", centre=(0.0, 0.1), area=(0, 0))
+    configuration, world = drawn(Scene(objects=objects, spots=[spot], goal=Goal("a", on="spot")))
+    plate = np.array(configuration.objects[1].pose)
+    at = {"a": poses.shifted(plate, np.array([0.0, 0.0, 0.014]))}
+    found = evaluate_success(configuration, world, state(configuration, at))
+    assert found.reason == "on_something_else" and found.position_error < 0.03
+    at["plate"] = poses.shifted(plate, np.array([0.0, 0.04, 0.0]))
+    at["a"] = poses.shifted(plate, np.array([0.0, 0.0, 0.002]))
+    assert evaluate_success(configuration, world, state(configuration, at)).success
 
 
 @pytest.mark.parametrize(
