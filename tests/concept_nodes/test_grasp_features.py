@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.concept_nodes import Grasp, grasp_features
+from bt_tasksim.concept_nodes import Grasp, grasp, grasp_features
 from bt_tasksim.concept_nodes.grasp import FEELING, SLOWEST, YIELDING
 from bt_tasksim.concept_nodes.grasp_features import (
     ACROSS,
@@ -182,6 +182,19 @@ def test_a_hand_that_stands_on_something_goes_back(near, contact, behind, stands
     assert not grasp_features.met(paced(0.0), seen, memory._replace(closing=np.array([0.1]))).stands
 
 
+@pytest.mark.parametrize(
+    ("jaw", "newtons", "stands"), [(True, 6.0, True), (True, 4.0, False), (False, 6.0, False)]
+)
+def test_a_stiff_arm_stands_on_what_presses_it_back(near, monkeypatch, jaw, newtons, stands):
+    """It is not held up as far as others are before it strains its wrist; the hand goes back all the same."""
+    monkeypatch.setattr(grasp_features, "standing_side", lambda robot: -0.007 if jaw else None)
+    seen, memory = approaching(near, contact=1)
+    wrench = np.array([[0.0, 0.0, -newtons, 0.0, 0.0, 0.0]])
+    felt = dataclasses.replace(seen.observation, wrench=wrench)
+    pressed = Seen(felt, seen.world, near.robot, seen.elapsed)
+    assert bool(grasp_features.met(paced(0.0), pressed, memory).stands) == stands
+
+
 def across(speed):
     action = paced(0.0)
     action[:, ACROSS] = speed
@@ -297,6 +310,18 @@ def test_a_finger_that_stands_on_something_goes_outwards(near):
     for finger in range(len(open_tips)):
         action = near.model.programmed_motion(without_contacts(seen, but=finger), memory)
         assert np.sign(action[0, ACROSS]) == np.sign(open_tips[finger])
+
+
+def test_what_touches_goes_on_no_faster_than_what_feels_its_way(near, monkeypatch):
+    """Near the base of a stiff arm that is slower than the careful pace."""
+    monkeypatch.setattr(grasp, "gentler", lambda tool: np.full(len(tool), 0.02))
+    seen, memory = instant(near, near.real - 1)
+    memory = memory._replace(tight=np.array([True]), goal=seen.tool)
+    paces = [
+        near.model.programmed_motion(without_contacts(seen, but=but), memory)[0, TIME_SCALING]
+        for but in (None, 0)
+    ]
+    assert paces[0] < 0.0 and paces[1] <= paces[0]
 
 
 def without_contacts(seen, but=None):

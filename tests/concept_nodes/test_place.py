@@ -22,6 +22,7 @@ from bt_tasksim.concept_nodes.place import (
     NOT_BESIDE,
     NOT_THERE,
     NOTHING_BELOW,
+    SLOWEST,
     SLOWLY,
     UNSURE,
 )
@@ -29,6 +30,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import CANNOT_START, DONE, NO_WAY
 from bt_tasksim.core.world import Obstacle
+from bt_tasksim.planning.reference_motion import sample
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf"])
@@ -133,6 +135,11 @@ def test_what_leans_has_not_been_put_down(toy, share):
     assert numbers["value"] == pytest.approx(share * LEANING, abs=1e-3) and numbers["limit"] == LEANING
 
 
+def half_way(memory):
+    """In the middle of the way, where that is fastest."""
+    return memory._replace(progress=0.5 * memory.path.duration)
+
+
 @pytest.mark.parametrize(
     ("above", "share"), [(0.1, 1.0), (SLOWLY + UNSURE, 1.0), (0.75 * SLOWLY, 0.75), (0.0, 0.0), (-0.005, 0.0)]
 )
@@ -140,7 +147,7 @@ def test_near_its_support_it_goes_slower(toy, above, share):
     stage = held(toy, Place("cup", on="goal"))
     stage.tick(3)
     seen, model = stage.context.seen(ONE, np.zeros(1)), stage.tree.model
-    memory = model.begin(seen)
+    memory = half_way(model.begin(seen))
     objects = seen.observation.objects.copy()
     objects[0, 0, 2] = standing_height(stage) + above
     stage.world.put(objects=objects[0])
@@ -311,7 +318,7 @@ def pace(toy, far, above):
     stage = held(toy, Place("cup", on="goal"))
     stage.tick(3)
     seen, model = stage.context.seen(ONE, np.zeros(1)), stage.tree.model
-    memory = model.begin(seen)
+    memory = half_way(model.begin(seen))
     objects, tool = seen.observation.objects[0].copy(), seen.tool[0].copy()
     objects[0, 2], tool[:2] = standing_height(stage) + above, (far, 0.0)
     stage.world.put(objects=objects, tool_pose=tool)
@@ -328,6 +335,24 @@ def test_near_the_base_of_the_arm_it_goes_slower_still(toy, far, share):
 @pytest.mark.parametrize(("far", "share"), [(FAR, 0.5), (0.2 * FAR, 0.26)])
 def test_a_stiff_arm_goes_slowly_before_what_may_stand_higher_than_it_is_seen_to(toy, far, share):
     assert pace(toy, far, above=0.5 * SLOWLY) == pytest.approx(share * 0.05, rel=1e-6)
+
+
+def test_it_arrives_where_the_way_itself_is_slow(toy):
+    """Near the end of a way that is a hundred times as long, right above the support, near the arm's base."""
+    stage = held(toy, Place("cup", on="goal"))
+    stage.tick(3)
+    seen, model = stage.context.seen(ONE, np.zeros(1)), stage.tree.model
+    begun = model.begin(seen)
+    slow = begun.path._replace(duration=100.0 * begun.path.duration)
+    memory = begun._replace(path=slow, progress=0.5 * slow.duration)
+    objects, tool = seen.observation.objects[0].copy(), seen.tool[0].copy()
+    objects[0, 2], tool[:2] = standing_height(stage), (0.2 * FAR, 0.0)
+    stage.world.put(objects=objects, tool_pose=tool)
+    stage.look()
+    later = model.advance(None, stage.context.seen(ONE, np.zeros(1)), memory).progress
+    down = sample(slow, memory.progress) - sample(slow, later)
+    whole = sample(slow, memory.progress) - sample(slow, memory.progress + 0.05)
+    assert down[0, 2] == pytest.approx(min(SLOWEST * 0.05, whole[0, 2]), rel=1e-3)
 
 
 @pytest.mark.parametrize(("newtons", "ticks"), [(4.0, 1), (0.9 * HARD * 3.0, 1), (1.1 * HARD * 3.0, FELT)])
