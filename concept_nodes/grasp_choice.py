@@ -78,8 +78,9 @@ LIKELIEST = 4000
 USUAL, FAR = 0.3, 3.0
 """What a grasp costs then of what it costs otherwise, and for each radian that the arm is from it, or from
 what follows."""
-UNSURE = {SURELY: 0.0, BARELY: 0.5, HARDLY: 1.5}
-"""What a grasp costs more that the fingers would not hold surely, in radians of turn from the usual one."""
+UNSURE = {SURELY: 0.0, BARELY: 0.8, HARDLY: 1.5}
+"""What a grasp costs more that the fingers would not hold surely, in radians of turn from the usual one: of
+random grasps a fifth more of those that hold barely went wrong, which makes as much as `RISKY` says."""
 RISKY = 4.0
 """The same for one that goes wrong always, where the best hardly ever do."""
 RISKIEST = 0.25

@@ -60,10 +60,13 @@ class Squeeze(NamedTuple):
         angle: The larger angle between the line from one side to the other and the normal of either, radians.
         ahead: Metres along the tool's y axis by which the tool has to go so that both sides meet the object
             at once.
+        out: How hard all fingers push the object away from the palm, as a share of how hard they squeeze it;
+            below 0 they draw it in.
     """
 
     angle: float
     ahead: float
+    out: float
 
 
 class _Side(NamedTuple):
@@ -153,7 +156,12 @@ class HandClosing:
         cosine = min(float(one.normal @ between), float(-other.normal @ between))
         width = np.array([other.point[1] - one.point[1]])
         ahead = float((one.point[1] + other.point[1]) / 2 - self.middle(width)[0, 1])
-        return Squeeze(float(np.arccos(np.clip(cosine, -1.0, 1.0))), ahead)
+        return Squeeze(float(np.arccos(np.clip(cosine, -1.0, 1.0))), ahead, self._out(met))
+
+    def _out(self, met: Meeting) -> float:
+        """See `Squeeze.out`: those count, too, that come late and press on the object's top."""
+        weights = (1.0 + _LEAST - np.minimum(met.closure, 1.0 + _LEAST)) * self._forces
+        return float(weights @ met.normals[:, 2]) / max(float(weights @ abs(met.normals[:, 1])), 1e-9)
 
     def _side(self, met: Meeting, tips: list[int]) -> _Side | None:
         closure = met.closure[tips]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, Firm, deeper
+from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SLIPS, SURELY, Firm, deeper
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.things import Thing
@@ -32,6 +32,13 @@ def test_it_holds_about_the_middle_barely_at_the_top_and_hardly_beside_it():
     assert found.holds(above(0.04)) == SURELY
     assert BARELY in {found.holds(above(z)) for z in np.arange(0.05, 0.08, 0.001)}
     assert found.holds(above(0.12)) == HARDLY
+
+
+def test_what_is_wide_is_pressed_out_of_a_hand_whose_fingers_lie_on_its_top():
+    found = firm(size=(0.095, 0.09, 0.03))
+    shallow, deep = above(0.04), above(0.03)
+    assert found.features(shallow)[0] < SLIPS and found.holds(shallow) == HARDLY
+    assert found.holds(deep) == SURELY, "7 mm less deep they hold it, too"
 
 
 def test_a_grasp_beside_the_middle_is_moved_until_both_sides_meet_at_once():

@@ -46,6 +46,14 @@ def test_a_box_is_met_on_both_faces_at_once(closing):
     assert squeeze.angle < np.radians(12) and abs(squeeze.ahead) < 0.005
 
 
+def test_fingers_that_come_to_lie_on_the_top_push_a_thing_out(closing):
+    deep = closing.squeeze(closing.met(at(), box(0.08, 0.045, 0.04)))
+    assert abs(deep.out) < 0.02, "it is held between upright faces"
+    wide = box(0.095, 0.09, 0.03)
+    on_top = closing.squeeze(closing.met(at(z=0.022), wide))
+    assert on_top.out > 0.4 > closing.squeeze(closing.met(at(z=0.0), wide)).out > 0.05, "fingers spread out"
+
+
 def test_what_is_narrow_is_missed_by_the_outer_fingers(closing):
     met = closing.met(at(), box(0.008, 0.03, 0.04))
     assert np.isfinite(met.closure).tolist() == [True, False, True, False, False]
