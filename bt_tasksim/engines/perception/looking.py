@@ -56,11 +56,13 @@ class Capture:
         images: The pictures by camera.
         estimate: Poses ``(n, 7)`` of the objects, NaN where one was never seen.
         handled: For each object, whether the hand held it, and whether it had touched it.
+        unsettled: Numbers of those that may have moved since they were seen: the hand let them go.
     """
 
     images: Mapping[str, Image]
     estimate: Array
     handled: tuple[tuple[bool, bool], ...]
+    unsettled: frozenset[int] = frozenset()
 
 
 class Sighting(NamedTuple):
@@ -189,11 +191,20 @@ class Looker:
             own = [i for i in wanted if i in group.members]
             there = {i: sight for i, sight in given.items() if i in group.members}
             new = group.track(set(own) - set(there), capture.estimate, held)
-            new |= group.find(set(own) - held, estimate, there | new, stages)
+            lost = set(own) - set(there) - set(new) - held
+            new |= group.find(
+                [i for i in lost if not self._still_there(i, group, capture)], estimate, there | new, stages
+            )
             sights |= new
             for i, sight in new.items():
                 found[i] = self._sighting(sight, group, list(pictures))
         return found, sights
+
+    def _still_there(self, i: int, group: Group, capture: Capture) -> bool:
+        """Whether an object that nothing has moved is but hidden: then nothing else is taken for it."""
+        known = bool(np.isfinite(capture.estimate[i, 0]))
+        moved = any(capture.handled[i]) or i in capture.unsettled
+        return known and not moved and group.hidden(i, capture.estimate[i])
 
     def _group(self, members: Sequence[int], pictures: Mapping[str, _Picture]) -> Group:
         """The objects of one colour."""

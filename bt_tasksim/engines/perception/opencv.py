@@ -217,7 +217,8 @@ class CameraPostProcess(PostProcessEngine):
 
     def _look(self, images: Mapping[str, Image], time: float) -> None:
         """Have pictures looked at, and believe what was found, now or later."""
-        capture = Capture(images, self._estimate.copy(), tuple(map(_handled, self._tracks)))
+        unsettled = frozenset(i for i, track in enumerate(self._tracks) if np.isfinite(track.due))
+        capture = Capture(images, self._estimate.copy(), tuple(map(_handled, self._tracks)), unsettled)
         if self._thread is None or not np.all(np.isfinite(self._estimate)):
             self._conclude(capture, self._looker.look(capture), time)
         elif self._pending is None:

@@ -197,13 +197,18 @@ def judge_fit(model: ModelPoints, view: DepthView, pose: Array) -> Fit:
     # Beside a sample of the surface is still on the surface, as far as the next sample.
     along = np.maximum(np.sqrt(np.maximum(distance2 - across2, 0.0)) - model.spacing, 0.0)
     distance = float(np.mean(np.minimum(np.sqrt(across2 + along * along), FAR)))
-    # Near the outline a small error of the camera shows what is behind: only what faces it well is judged.
-    surface, _ = _facing(model, pose, view.camera.pose[:3], 0.35)
     overlap = 0.0
     if view.fixtures is not None:
         depth, _ = beyond_faces(view.fixtures, poses.transform(pose, model.points), pose[:3])
         overlap = float(np.mean(np.clip(depth - NEARLY, 0.0, FAR)))
-    return Fit(pose, distance, _missing(surface, view), overlap)
+    return Fit(pose, distance, seen_through(model, view, pose), overlap)
+
+
+def seen_through(model: ModelPoints, view: DepthView, pose: Array) -> float:
+    """Share of the model's facing points in whose place something behind is seen, 0 to 1."""
+    # Near the outline a small error of the camera shows what is behind: only what faces it well is judged.
+    surface, _ = _facing(model, pose, view.camera.pose[:3], 0.35)
+    return _missing(surface, view)
 
 
 def _too_deep(model: ModelPoints, pose: Array, fixtures: Boxes) -> tuple[Array, float, Array]:

@@ -33,7 +33,7 @@ from bt_tasksim.engines.perception.pose_estimation import (
     stay,
     still_held,
 )
-from bt_tasksim.engines.perception.registration import DepthView, Fit, judge_fit, sample_surface
+from bt_tasksim.engines.perception.registration import DepthView, Fit, judge_fit, sample_surface, seen_through
 from bt_tasksim.engines.perception.segmentation import SMALLEST
 from bt_tasksim.scene.shapes import Shape
 
@@ -50,6 +50,8 @@ FAIR = 0.35
 calibrations come on top of what one picture costs."""
 AGREE = 0.2
 """Radians between two cameras' fits up to which the pose between them is tried."""
+GONE = 0.5
+"""Share of an object in whose place something behind it is seen, from which it is not there any more."""
 SIMILAR = 0.015
 """Metres by which two objects' extents differ at most, that might be taken for each other."""
 SURE = 0.03
@@ -129,6 +131,13 @@ class Group:
             if still_held(best, believed[i]) if i in held else best.cost < FAIR:
                 found[i] = Sight(best, own)
         return found
+
+    def hidden(self, i: int, believed: Array) -> bool:
+        """Whether no camera sees that an object is gone from a pose ``(7,)``."""
+        points = sample_surface(self.targets[i].shape)
+        nothing = np.empty((0, 3))
+        views = [DepthView(camera, depth, nothing, others) for camera, depth, others in self.pictures]
+        return all(seen_through(points, view, believed) < GONE for view in views)
 
     def find(
         self,

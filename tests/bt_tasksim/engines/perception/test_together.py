@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from raycast import box, image
+from raycast import CAMERA, box, image
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NotToldApartError
@@ -146,6 +146,21 @@ def test_one_that_is_carried_off_leaves_the_other_alone():
     now = {0: spot(0.55, -0.15, LOW, heading=0.4), 1: before[1]}
     found = look(drawn, now, before)
     assert all(off(found, i, pose) < 0.004 for i, pose in now.items())
+
+
+@pytest.mark.parametrize("low", [0, 1])
+def test_nothing_is_taken_for_one_that_is_but_hidden(low):
+    drawn = world([LOW, LOW])
+    gone, hidden = 1 - low, low
+    before = {gone: spot(0.45, -0.1, LOW), hidden: spot(0.45, 0.1, LOW)}
+    now = spot(0.6, -0.1, LOW, heading=0.4)
+    middle = (CAMERA.pose[:3] + 3 * before[hidden][:3]) / 4
+    wall = box(poses.pose(middle, poses.yaw(0.0)), (0.1, 0.1, 0.1))
+    seen = image([(box(now, LOW), RED), (wall, (0.5, 0.5, 0.5))])[0]
+    looker = Looker(drawn, drawn.world_model(["left", "right"], 0.08), PERFECT, ["scene"])
+    known = np.stack([before[0], before[1]])
+    found = looker.look(Capture({"scene": seen}, known, ((False, False),) * 2))
+    assert set(found.sightings) == {gone} and off(found, gone, now) < 0.004
 
 
 def test_one_in_the_hand_is_followed_beside_another_of_its_shape():
