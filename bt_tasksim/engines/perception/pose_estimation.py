@@ -206,10 +206,15 @@ def _best(
     few, coarse = view.thinned(_COARSE[0]), points.thinned(_COARSE[1])
     if len(starts) > keep:
         tried = [judge_fit(coarse, few, register(coarse, few, s, free, steps=8)) for s in starts]
-        starts = _distinct(sorted(tried, key=lambda f: f.cost), keep, target.model)
+        starts = _distinct(sorted(tried, key=_unlikely), keep, target.model)
     many, fine = view.thinned(_FINE[0]), points.thinned(_FINE[1])
     found = [_settled(register(fine, many, s, free), target, places) for s in starts]
-    return min((judge_fit(points, view, pose) for pose in found), key=lambda f: f.cost)
+    return min((judge_fit(points, view, pose) for pose in found), key=_unlikely)
+
+
+def _unlikely(fit: Fit) -> float:
+    """Its cost, and a little for how far it is from upright: a box looks the same upside down."""
+    return fit.cost + ALIKE * float(poses.tilt(fit.pose[3:])) / math.pi
 
 
 def _distinct(fits: Sequence[Fit], n: int, model: ObjectModel) -> list[Array]:

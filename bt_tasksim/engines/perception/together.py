@@ -205,7 +205,7 @@ class Group:
             for column, part in enumerate(parts):
                 if not self._may_be(i, part, stage):
                     continue
-                fit = self._fit(i, part, estimate, stage)
+                fit = self._fit(i, self._lowest(i, part) if stage.pieces else part, estimate, stage)
                 if fit is None:
                     continue
                 own = part & (self._gaps(i, fit.pose) < WITHIN)
@@ -222,6 +222,12 @@ class Group:
         across = float(np.linalg.norm(np.max(points, axis=0) - np.min(points, axis=0)))
         size = self.targets[i].diameter
         return across > SMALL * size and (stage.pieces or across < 1.2 * size + MARGIN)
+
+    def _lowest(self, i: int, part: Array) -> Array:
+        """What of a part is no higher above its foot than an object: others may stand on it."""
+        height = self.cloud.smooth[:, 2]
+        lowest: Array = part & (height < np.min(height[part]) + self.targets[i].model.extent[2] + OWN)
+        return lowest
 
     def _fit(
         self, i: int, part: Array, estimate: Array, stage: Stage, before: Array | None = None

@@ -99,6 +99,17 @@ def test_one_that_stands_on_another_is_found_though_they_are_one_patch_of_colour
         assert poses.z_axis(found.sightings[i].fit.pose[3:])[2] > 0.999
 
 
+@pytest.mark.parametrize("tall", [0.04, 0.14])
+def test_of_a_stack_the_lower_one_is_found_first_and_so_the_upper_one_upright(tall):
+    low, high = (0.08, 0.07, 0.03), (0.06, 0.05, tall)
+    drawn = world([high, low])
+    where = {1: spot(0.5, 0.0, low, heading=0.3), 0: spot(0.5, 0.004, high, low[2], heading=0.5)}
+    found = look(drawn, where, errors=CameraErrors())
+    for i, pose in where.items():
+        assert off(found, i, pose) < 0.006
+        assert poses.z_axis(found.sightings[i].fit.pose[3:])[2] > 0.999
+
+
 def test_what_nobody_sees_stays_unseen_and_the_others_are_found():
     drawn = world([LOW, TALL, FLAT])
     where = {0: spot(0.45, -0.1, LOW), 2: spot(0.6, 0.0, FLAT)}
