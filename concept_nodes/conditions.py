@@ -9,15 +9,18 @@ from bt_tasksim.concept.parameters import Metres, ObjectName, PlaceName, Radians
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.holding import holding, tool_distance
+from bt_tasksim.concept_nodes.whereabouts import Estimates
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Statement
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, host
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS, SECONDS
+from bt_tasksim.scene.spatial_laws import IsOn, is_on
 from bt_tasksim.scene.specs import Goal
 
 FROM_TOOL = Form("{object} is {distance} from the tool", {"distance": METRES})
-OFF = Form("{object} is {distance} and {angle:.0f} off", {"distance": METRES, "angle": RADIANS})
+OFF = Form("{object} is {distance} and {angle:.0f} off{upon}", {"distance": METRES, "angle": RADIANS})
+UPON = ", beside what it should stand on or on something else"
 TILTED = Form("{object} is tilted by {angle:.0f}", {"angle": RADIANS})
 PASSED = Form("{time:.2f} have passed", {"time": SECONDS})
 
@@ -45,7 +48,7 @@ class Holding(Condition):
 
 @register("concept")
 class AtPose(Condition):
-    """Does the object stand where it should, as far as can be seen?
+    """Does the object stand where it should, and on nothing else, as far as can be seen?
 
     Args:
         target: The object.
@@ -75,12 +78,19 @@ class AtPose(Condition):
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
         distance, angle = self._off(seen)
-        return (distance < self.tolerance) & (angle < self.angle)
+        borne = self._found(seen).is_borne(self.on not in seen.world.place_columns)
+        return (distance < self.tolerance) & (angle < self.angle) & borne
 
     def explain(self, seen: Seen) -> Statement:
         """How far off it is."""
         distance, angle = self._off(seen)
-        return OFF(object=self.target, distance=distance, angle=angle)
+        borne = host(self._found(seen).is_borne(self.on not in seen.world.place_columns))
+        upon = tuple("" if there else UPON for there in borne.tolist())
+        return OFF(object=self.target, distance=distance, angle=angle, upon=upon)
+
+    def _found(self, seen: Seen) -> IsOn:
+        key = ("is on", self.target, self.on)
+        return seen.once(key, lambda: is_on(Estimates.of(seen), self.target, self.on))
 
     def _off(self, seen: Seen) -> tuple[Array, Array]:
         now = seen.object(self.target)

@@ -10,7 +10,7 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.bring import destination
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
 from bt_tasksim.concept_nodes.holding import holding, tool_distance
-from bt_tasksim.concept_nodes.surface import NEAR, apart, edges
+from bt_tasksim.concept_nodes.surface import NEAR, apart, carrying, edges
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.poses import Array, array_namespace
@@ -92,14 +92,10 @@ class Lifted(Condition):
         now, model = seen.object(self.target), seen.model(self.target)
         if self.above is not None:
             return height_above(seen, self.target, destination(seen, self.above)[0])
-        places = seen.world.place_facts
-        xp = array_namespace(now)
-        local = poses.localise(places.pose, now[:, None, :3])
-        beside = xp.all(xp.abs(local[..., :2] - places.centre) <= places.extent / 2, axis=-1)
-        below = beside & places.present & (local[..., 2] > 0.0)
+        found, xp = carrying(seen, self.target), array_namespace(now)
         up = poses.constant([0.0, 0.0, 1.0], now) + xp.zeros_like(now[:, :3])
-        highest = xp.where(below, local[..., 2], xp.full_like(local[..., 2], FAR))
-        return xp.min(highest, axis=-1) - half_extent(now, model, up)
+        height = poses.localise(found.place.pose, now[:, :3])[:, 2]
+        return xp.where(found.found, height, xp.full_like(height, FAR)) - half_extent(now, model, up)
 
 
 @register("concept")

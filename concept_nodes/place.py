@@ -294,12 +294,12 @@ class Place(ConceptModel[PlaceMemory]):
         try:
             return goal, self._down(view, goal)
         except NoWayError:
-            for turned in self._turned(view):
+            for other in self._other_ends(view):
                 with suppress(NoWayError):
-                    return turned, self._down(view, turned)
+                    return other, self._down(view, other)
             raise
 
-    def _turned(self, view: WorldView) -> Array:
+    def _other_ends(self, view: WorldView) -> Array:
         """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first.
 
         After them those a little aside of there, and last those in which it leans there; an arm of few joints

@@ -20,7 +20,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.room import Room
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import box_corners
-from bt_tasksim.scene.outlines import hull
+from bt_tasksim.scene.outlines import hull, rectangle
 
 STEP = 0.03
 """Metres between the points of the grid."""
@@ -379,6 +379,4 @@ def _corners(view: WorldView, name: str) -> Array:
 
 
 def _outline_of(surface: FreeSurface) -> Array:
-    signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-    flat = np.concatenate([surface.centre + signs * surface.half, np.zeros((4, 1))], axis=1)
-    return hull(poses.transform(surface.frame[None], flat)[:, :2])
+    return rectangle(surface.frame, surface.centre, 2.0 * surface.half)

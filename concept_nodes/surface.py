@@ -9,9 +9,10 @@ from bt_tasksim.concept_nodes.grasp_pose import FoundPlace, half_extent, nearest
 from bt_tasksim.core import poses
 from bt_tasksim.core.fact_arrays import ObjectFacts, take_rows
 from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.scene.specs import Goal
 
-NEAR = 0.10
-"""Metres between two objects up to which one stands beside the other, as goals have it."""
+NEAR = Goal.distance
+"""Metres between two objects up to which one stands beside the other."""
 
 
 def edges(seen: Seen, name: str) -> tuple[Array, Array]:

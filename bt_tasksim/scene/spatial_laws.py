@@ -140,6 +140,10 @@ class IsOn(NamedTuple):
     lean: Array
     elsewhere: Array
 
+    def is_borne(self, by_object: bool) -> Array:
+        """Nothing else bears it: booleans ``(N,)``; what stands on an object has its middle over that."""
+        return ~self.elsewhere & (self.aside <= 0.0) if by_object else ~self.elsewhere
+
     def holds(self, level: float, angle: float) -> Array:
         """It stands there: booleans ``(N,)``; limits in metres and radians."""
         above = (self.aside <= 0.0) & (abs(self.height) <= level)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from benchmarks.any_tree.meshes import write
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.concept_nodes import Clear
+from bt_tasksim.concept_nodes import AtPose, Clear
 from bt_tasksim.concept_nodes.spots import spots_on
 from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.concept_nodes.whereabouts import Estimates
@@ -116,6 +116,34 @@ def state_of(room, placing):
 def test_conditions_and_the_success_evaluator_agree(room, placing):
     hidden = state_of(room, placing)
     assert asked(placing[0], room[1], hidden) == judged(placing[0], *room, hidden)
+
+
+@settings(max_examples=150, deadline=None)
+@given(placings())
+def test_where_something_is_at_its_pose_the_success_evaluator_says_so(room, placing):
+    """Under limits that are tighter than the goal's what the condition lets pass is in place."""
+    goal = replace(placing[0], relation="on", distance=0.1, position_tolerance=0.03, angle_tolerance=0.25)
+    hidden = state_of(room, (goal, *placing[1:]))
+    if asked(goal, room[1], hidden):
+        assert judged(goal, *room, hidden)
+
+
+def test_what_stands_next_to_or_on_a_third_thing_is_not_at_its_pose(room):
+    drawn, world = room
+    box = np.array(next(a.pose for a in drawn.objects if a.name == "box"))
+    goal, top = Goal("pea", on="box"), box[2] + world.object("box").extent[2] / 2
+    along = box[3:]  # what stands there stands as the box does
+    middle = np.array([0.0, 0.0, top + 0.01 - box[2]])
+    assert both(room, goal, put(room, "pea", poses.transform(box, middle), along))
+    thin = world.object("box").extent[1] / 2
+    wide = Goal("pea", on="box", position_tolerance=0.5)
+    for aside, answer in ((thin - 0.001, True), (thin + 0.001, False)):
+        hidden = put(room, "pea", poses.transform(box, middle + np.array([0.0, aside, 0.0])), along)
+        seen = AtPose.value("pea", on="box", tolerance=0.5).holds(seen_exactly(world, hidden))
+        assert bool(seen[0]) is judged(wide, drawn, world, hidden) is answer
+    bowl = next(np.array(a.pose) for a in drawn.objects if a.name == "bowl")
+    inside = put(room, "pea", [*bowl[:2], 0.04])
+    assert not both(room, Goal("pea", on="table", position_tolerance=0.5), inside)
 
 
 @pytest.mark.parametrize("relation", AGREED)

@@ -42,13 +42,14 @@ class On(GoalRelation):
         local, model = final.in_place(goal), final.model(goal.object)
         distance = float(np.linalg.norm(local[:3] - [0.0, 0.0, model.extent[2] / 2]))
         angle = lean(local[3:], model) if final.is_object(goal.place) else turn(local[3:], model)
-        reason, stands = STANDS, is_on(final.whereabouts, goal.object, goal.place)
-        beside = final.is_object(goal.place) and float(stands.aside[0]) > 0.0
+        found = is_on(final.whereabouts, goal.object, goal.place)
+        beside = final.is_object(goal.place) and float(found.aside[0]) > 0.0
+        reason = STANDS
         if distance > goal.position_tolerance or beside:
             reason = NOT_IN_PLACE
-        elif bool(stands.elsewhere[0]):
-            names = {"object": goal.object, "place": goal.place}
-            return Placement(False, ON_SOMETHING_ELSE(**names), distance, angle)
+        elif not bool(found.is_borne(final.is_object(goal.place))[0]):
+            said = ON_SOMETHING_ELSE(object=goal.object, place=goal.place)
+            return Placement(False, said, distance, angle)
         elif angle > goal.angle_tolerance:
             reason = TILTED_OR_TURNED
         outcome = reason(object=goal.object, place=goal.place, distance=distance, angle=angle)
