@@ -19,7 +19,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING
 from bt_tasksim.concept_nodes.holding import HOLDING
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
-from bt_tasksim.concept_nodes.retreat import Retreat, clear_retreat, retreat_path
+from bt_tasksim.concept_nodes.retreat import Retreat, clear_retreat, let_go_aside, retreat_path
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.concept_nodes.whereabouts import Estimates
@@ -144,13 +144,12 @@ class Release(ConceptModel[ReleaseMemory]):
         return ReleaseMemory(path, start, seen.closure, ends, before, seen.object(self.target))
 
     def _clear(self, view: WorldView, hand: Array) -> Retreat:
-        """Where the open hand draws back to, touching nothing; where nothing is clear it stays."""
+        """Where the open hand draws back to, touching nothing; where nothing is clear it only lets go."""
         try:
             ways = [-poses.z_axis(view.tool[3:]), UP]
             return clear_retreat(view, hand, self.retreat, ways, {self.target})
         except NoWayError:
-            nothing = np.zeros((0, len(view.arm)))
-            return Retreat(np.zeros(3), nothing, nothing)
+            return let_go_aside(view, hand, {self.target})
 
     def command(self, action: Array, seen: Seen, memory: ReleaseMemory) -> Command:
         """Open, then draw back."""

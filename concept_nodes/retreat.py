@@ -20,8 +20,9 @@ from bt_tasksim.planning.things import Leave
 from bt_tasksim.planning.ways import WayFinder
 from bt_tasksim.robot.kinematics.hand import SLIDE, standing_side
 
-SHARES = (1.0, 0.75, 0.5, 0.25)
-"""Shares of a retreat that are tried where not all of it is clear."""
+SHARES = (1.0, 0.75, 0.5, 0.25, 0.1)
+"""Shares of a retreat that are tried where not all of it is clear, or in reach: an arm may be nearly as high
+as it comes."""
 
 
 class Retreat(NamedTuple):
@@ -68,6 +69,21 @@ def clear_retreat(
     touches = finder.touched(end)
     why = f"{touches[0][0]} would touch {touches[0][1]}" if touches else "the arm cannot follow"
     raise NoWayError(f"the hand cannot draw back by {1000 * SHARES[-1] * distance:.0f} mm: {why}")
+
+
+def let_go_aside(view: WorldView, hand: Array, let_go: Collection[str]) -> Retreat:
+    """A retreat of a hand that cannot draw back: a finger that stands still goes away from what it touches.
+
+    Any other hand stays, and so does this one where it has no room for that.
+
+    Args:
+        view: The world.
+        hand: The opened hand's joints ``(n_hand,)``.
+        let_go: Objects that it may touch.
+    """
+    finder = view.finder(hand=hand, leave=Leave(hand=let_go), closer=TOUCHING)
+    nothing = np.zeros((0, len(view.arm)))
+    return _beside(finder, view) or Retreat(np.zeros(3), nothing, nothing)
 
 
 def retreat_path(seen: Seen, found: Sequence[Retreat], speed: float) -> Path:
