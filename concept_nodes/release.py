@@ -36,7 +36,7 @@ from bt_tasksim.planning.reference_motion import Path, posture, sample
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Leave, Thing
 from bt_tasksim.robot.kinematics.hand import SPARE, opened_about, standing_side, wide_at
-from bt_tasksim.scene.spatial_laws import beyond_walls, floats
+from bt_tasksim.scene.spatial_laws import Hollow, beyond_hollow, floats
 
 OPENED = Form(
     "hand {opening} open, {contacts} fingertips in contact, {force} at the wrist{touch}",
@@ -66,6 +66,9 @@ STUCK = 1.0
 """Seconds after it should be open from which on a hand that is not draws back as it opens. Fingers that swing
 reach deepest halfway: those of the Ability hand, closed on a bowl on a table, press on the table with 33 N as
 they open, and get no farther."""
+BARELY = 0.002
+"""Metres below a container's rim at which the middle of what leans in it may be above it: estimates are as
+wrong as that."""
 AT = 0.004
 """Metres within which the hand is at a piece of what it holds."""
 UP = np.array([0.0, 0.0, 1.0])
@@ -195,7 +198,7 @@ class Release(ConceptModel[ReleaseMemory]):
         if self.into is None or self.into not in seen.world.place_columns or not bool(xp.any(back)):
             return nothing
         where = Estimates.of(seen)
-        far = beyond_walls(where, self.target, self.into)
+        far = beyond_hollow(where.body(self.target), _surely(where.hollow(self.into)))
         told = back & xp.isfinite(far) & ~floats(where, self.target, self.into)
         return xp.where(told, xp.maximum(far, nothing), nothing)
 
@@ -224,6 +227,11 @@ class Release(ConceptModel[ReleaseMemory]):
             force=force_at_wrist(seen),
             touch=touched(seen, self.target),
         )
+
+
+def _surely(hollow: Hollow) -> Hollow:
+    """A hollow in which something surely is, see `BARELY`."""
+    return hollow._replace(boxes=hollow.boxes - constant([0.0, 0.0, 0.0, 0.0, 0.0, BARELY], hollow.boxes))
 
 
 def _opened(view: WorldView, target: str) -> Array:

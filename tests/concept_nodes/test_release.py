@@ -9,8 +9,10 @@ from py_trees.common import Status
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Release, retreat
 from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import TIMED_OUT
 from bt_tasksim.robot.kinematics.hand import SLIDE
+from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject, beyond_hollow
 
 
 @pytest.mark.parametrize("scenario", ["pick_and_place", "pick_and_throw"])
@@ -100,6 +102,50 @@ def test_a_finger_that_stands_still_goes_aside_before_the_hand_draws_back(toy, m
     assert gone[-1] == pytest.approx([0.0, -SLIDE, -0.12], abs=2e-3)
     aside = gone[np.abs(gone[:, 2]) < 1e-3]
     assert aside[:, 1].min() == pytest.approx(-SLIDE, abs=1e-3), "it goes aside first"
+
+
+def test_a_finger_that_stands_still_leaves_what_it_let_go_even_where_the_hand_cannot_draw_back(
+    toy, monkeypatch
+):
+    def nowhere(*_):
+        raise NoWayError("there is no room")
+
+    module = sys.modules[Release.__module__]
+    monkeypatch.setattr(retreat, "standing_side", lambda robot: -0.007)
+    monkeypatch.setattr(module, "_opened", lambda view, target: view.robot.hand_open)
+    monkeypatch.setattr(module, "clear_retreat", nowhere)
+    stage = start(toy, Release("cup", retreat=0.12, opening=0.4))
+    first = stage.world.now.tool_pose.copy()
+    assert stage.tick(300) == Status.SUCCESS
+    gone = poses.localise(first, stage.world.now.tool_pose[:3])
+    assert gone == pytest.approx([0.0, -SLIDE, 0.0], abs=1e-3)
+
+
+def test_a_hand_with_little_room_draws_back_a_little(toy, monkeypatch):
+    straight = retreat.WayFinder.straight
+
+    def short(finder, way, *rest, **more):
+        far = np.linalg.norm(way[-1][:3] - way[0][:3])
+        return straight(finder, way, *rest, **more) if far < 0.2 * 0.12 else None
+
+    monkeypatch.setattr(retreat.WayFinder, "straight", short)
+    stage = start(toy, Release("cup", retreat=0.12, opening=0.4))
+    first = stage.world.now.tool_pose.copy()
+    assert stage.tick(300) == Status.SUCCESS
+    assert poses.localise(first, stage.world.now.tool_pose[:3])[2] == pytest.approx(-0.012, abs=1e-3)
+
+
+@pytest.mark.parametrize(("below", "inside"), [(0.001, False), (0.004, True), (-0.001, False)])
+def test_what_leans_just_below_a_rim_is_not_surely_in_there(below, inside):
+    """A stick of 6 cm, 2 cm off the floor of a bin 5 cm deep: estimates may be wrong by 2 mm."""
+    module = sys.modules[Release.__module__]
+    hollow = Hollow(
+        poses.pose([0.3, 0.0, 0.0], [1.0, 0, 0, 0])[None], np.array([[[0, 0, 0.1, 0.1, 0.0, 0.05]]])
+    )
+    middle = poses.pose([0.3, 0.0, 0.05 - below], [1.0, 0, 0, 0])[None]
+    corners = np.array([[[0.0, 0.0, -0.03], [0.0, 0.0, 0.03]]])
+    stick = PlacedObject(middle, corners, np.zeros(1, bool))
+    assert bool(beyond_hollow(stick, module._surely(hollow))[0] <= 0.0) == inside
 
 
 def test_a_hand_that_presses_on_nothing_opens_from_where_it_is(toy):
