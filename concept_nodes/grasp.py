@@ -20,7 +20,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes import grasp_features
 from bt_tasksim.concept_nodes.closer import with_room
-from bt_tasksim.concept_nodes.grasp_candidates import Candidates, candidates, narrowest_grip
+from bt_tasksim.concept_nodes.grasp_candidates import candidates, narrowest_grip
 from bt_tasksim.concept_nodes.grasp_choice import (
     GENTLE,
     Choice,
@@ -354,14 +354,18 @@ class Grasp(ConceptModel[GraspMemory]):
         def find(room: tuple[float, bool, bool], thoroughly: bool = False) -> Choice:
             pace = Pace(self.speed)
             chooser = Chooser(view, self.target, self.standoff, pace, aims, *room, thoroughly)
-            usual = chooser.usual(asked.usual, asked.way)
+            usual = None
+            if self._as_given(asked.usual[None], view)[0]:
+                usual = chooser.usual(asked.usual, asked.way)
             if usual is not None and not asked.failed:
                 return usual
             others = candidates(view, self.target, asked.approach, asked.neutral)
             _, firmly, _ = room
             swings = firmly and standing_side(view.robot) is not None
             others = others.keeping(~others.poor) if swings else others
-            return chooser.other(self._as_given(others, view), asked.failed, usual)
+            given = self._as_given(others.tools, view)
+            chooser.leave_out(int(np.sum(~given)), "that do not have the approach and the closing axis given")
+            return chooser.other(others.keeping(given), asked.failed, usual)
 
         tried = rooms(view.robot, goes_aside(aims))
         try:
@@ -373,16 +377,16 @@ class Grasp(ConceptModel[GraspMemory]):
                 return find(tried[-1], thoroughly=True)
             raise error
 
-    def _as_given(self, others: Candidates, view: WorldView) -> Candidates:
-        """Those that have the approach and the closing axis that the author gave, if any."""
-        given = np.ones(len(others.tools), bool)
+    def _as_given(self, tools: Array, view: WorldView) -> Array:
+        """Whether ``(k,)`` tools ``(k, 7)`` have the approach and the closing axis that the author gave."""
+        given = np.ones(len(tools), bool)
         if self.approach is not None:
-            given &= poses.z_axis(others.tools[:, 3:]) @ np.array(self.approach) >= AS_GIVEN
+            given &= poses.z_axis(tools[:, 3:]) @ np.array(self.approach) >= AS_GIVEN
         if self.closing is not None:
             axis = poses.rotate(view.objects[self.target][3:], np.array(self.closing))
-            across = poses.rotate(others.tools[:, 3:], np.array([0.0, 1.0, 0.0]))
+            across = poses.rotate(tools[:, 3:], np.array([0.0, 1.0, 0.0]))
             given &= abs(across @ axis) >= AS_GIVEN
-        return others.keeping(given)
+        return given
 
     def _estimate(self, seen: Seen, goal: Array, approach: Array) -> Array:
         pose, stands = seen.observed(self.target), resting_place(seen, self.target)

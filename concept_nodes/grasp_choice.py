@@ -253,6 +253,11 @@ class Chooser:
         said = ", ".join(f"{count} {why}" for why, count in self._why.most_common()) or "none fits the hand"
         raise NoWayError(f"no grasp of {self._target} serves: of {sum(self._why.values())} {said}")
 
+    def leave_out(self, count: int, why: str) -> None:
+        """So many candidates were not even asked about; the reason counts them."""
+        if count:
+            self._why[why] += count
+
     def _has_room(self, tool: Array, hand: Opening) -> bool:
         """Whether the hand has room at a grasp ``(7,)``; says what it would touch."""
         if hand.free(tool):

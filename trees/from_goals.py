@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.plain import short
 from bt_tasksim.core.registry import parts
 from bt_tasksim.scene.specs import Goal
 from bt_tasksim.trees.backchain import (
@@ -56,6 +57,8 @@ def tidy(goals: Sequence[Goal], *, parking: str | None = None, name: str = "tidy
         InputError: There is no goal, goals contradict each other, or no concept brings one about.
     """
     order = in_order(goals)
+    if any(parking == goal.object for goal in order):
+        raise InputError(f"tidy: '{parking}' cannot be the parking place, since a goal moves it")
     stages = [_stage(goal, _about(order[:k], goal.place)) for k, goal in enumerate(order)]
     if len(order) == 1:
         stages[0].name = name
@@ -80,6 +83,8 @@ def in_order(goals: Sequence[Goal]) -> list[Goal]:
     """
     if isinstance(goals, Goal):
         raise InputError("tidy takes a sequence of goals, found one goal: write tidy([goal])")
+    if not isinstance(goals, Iterable):
+        raise InputError(f"tidy takes a sequence of goals, found {short(goals)}")
     goals = list(goals)
     _check_goals(goals)
     of = {goal.object: goal for goal in goals}

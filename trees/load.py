@@ -209,6 +209,15 @@ def has_scene(file: str) -> bool:
     return callable(getattr(_module(Path(file)), "scene", None))
 
 
+def has_tree(file: str) -> bool:
+    """A Python file has a function ``build()``.
+
+    Raises:
+        InputError: The file is missing or fails.
+    """
+    return callable(getattr(_module(Path(file)), "build", None))
+
+
 def load_scene_of(file: str, robot: str | None = None) -> Scene:
     """The scene of a scene file, or of the ``scene()`` of a Python file.
 

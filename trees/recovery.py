@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from itertools import groupby
 
 from py_trees.behaviour import Behaviour
+from py_trees.composites import Sequence
 
 from bt_tasksim.concept_nodes import HandEmpty, Holding, Place, Release, Settle, Withdraw
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.plain import short
 from bt_tasksim.trees.backchain import asked_by, condition_leaf
 from bt_tasksim.trees.nodes.any_order import AnyOrder, any_order
 from bt_tasksim.trees.nodes.fallback import fallback
@@ -60,6 +62,8 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
     """
     if isinstance(attempts, bool) or not isinstance(attempts, int) or attempts < 1:
         raise InputError(f"recovering: 'attempts' should be a positive whole number, found {attempts!r}")
+    if not isinstance(tree, Behaviour):
+        raise InputError(f"recovering takes a tree, such as sequence('tidy up', ...), found {short(tree)}")
     if tree.parent is not None:
         raise InputError(f"'{tree.name}' stands under '{tree.parent.name}': recover the root of a tree")
     rounds, body = (tree.attempts, tree.decorated) if isinstance(tree, Retry) else (1, tree)
@@ -123,6 +127,10 @@ def _children(body: Behaviour) -> list[Behaviour]:
         return opened(body.children)
     if isinstance(body, AnyOrder) or asks_itself(body) is not None:
         return [body]
+    if isinstance(body, Sequence) and not body.children:
+        raise InputError(
+            f"'{body.name}' is empty: nothing was put into it, or it was made anew by recovering before"
+        )
     raise InputError(
         f"recovering takes a sequence, or what tidy gives, and '{body.name}' is a {type(body).__name__}: "
         f"put it into a sequence"

@@ -74,8 +74,21 @@ def _code(file: str, tree: str | None, robot: str | None) -> Report:
     from bt_tasksim.trees.load import has_scene, own_nodes
 
     if tree is None and not own_nodes(file, needed=False) and has_scene(file):
-        return _scene(file, robot)
+        return _scene_and_tree(file, robot)
     return concept_file.check(file, tree)
+
+
+def _scene_and_tree(file: str, robot: str | None) -> Report:
+    """The scene of a Python file, and its tree, if it builds one: its names have to be in the scene."""
+    from bt_tasksim.trees.load import has_tree, load_source
+
+    if not has_tree(file):
+        return _scene(file, robot)
+    source = load_source(file, robot)
+    report = _scene(file, robot)
+    nodes = sum(1 for _ in source.build().iterate())
+    report.checked.append(f"tree {source.name}, {nodes} nodes: shape, memory, names of objects and places")
+    return report
 
 
 def _robot(robot: str) -> Report:

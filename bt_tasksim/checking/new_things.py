@@ -1,4 +1,4 @@
-"""``bt-tasksim new tree`` and ``new scene``: one file each that works as it is."""
+"""``bt-tasksim new tree``, ``new scene`` and ``new object``: one file each that works as it is."""
 
 from __future__ import annotations
 
@@ -54,3 +54,23 @@ def write_scene(name: str, folder: str | Path = ".") -> str:
     return f"wrote {path}\nnext: bt-tasksim check {path}; bt-tasksim new tree mine; " + (
         f"bt-tasksim run mine.py --scene {path}"
     )
+
+
+def write_object(name: str, folder: str | Path = ".") -> str:
+    """Write an object's file, which a scene can take.
+
+    Args:
+        name: Its name, lower-case words joined by underscores.
+        folder: Where to; it is made where there is none.
+
+    Returns:
+        What was written, and what to do next.
+
+    Raises:
+        InputError: The name is no good, or the file is there already; then nothing is written.
+        MachineError: The disk is full or not writable; then nothing is written.
+    """
+    check_word(name, "an object", "watering_can")
+    path = Path(folder) / f"{name}.yaml"
+    write_new(Path(folder), {path: filled(("new_object", "object.yaml.txt"), named(name))})
+    return f"wrote {path}\nnext: bt-tasksim check {path}; name it in a scene: '{path.name} on table'"

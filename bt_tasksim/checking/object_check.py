@@ -15,6 +15,7 @@ from bt_tasksim.scene.antipodal import width_at
 from bt_tasksim.scene.grips import GivenGrip
 from bt_tasksim.scene.object_file import load_object, object_fields
 from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.scene_file import DENSEST
 from bt_tasksim.scene.shapes import ShapeSize, shape, size_range
 from bt_tasksim.scene.specs import ObjectSpec
 
@@ -57,7 +58,10 @@ def check_object(name: str, spec: ObjectSpec, robot: str = "panda", report: Repo
     if not SMALL <= max(extent) <= LARGE:
         what = f"is {1000 * max(extent):.0f} mm long"
         report.add(WARNING, name, "size", what, "a file in millimetres wants scale: 0.001")
-    if heavy < LIGHT or light > HEAVY:
+    if heavy > DENSEST:
+        what = f"has {heavy:.0f} kg/m3, denser than any metal"
+        report.add(ERROR, name, "mass", what, "see its mass (kg) and its size (m)")
+    elif heavy < LIGHT or light > HEAVY:
         found = (
             f"{heavy:.0f} kg/m3, lighter than foam"
             if heavy < LIGHT

@@ -42,8 +42,7 @@ def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repor
         link, depth = _deepest(links, fixture.pose_array(), boxes)
         if depth > DEEP:
             what = f"stands {1000 * depth:.0f} mm in '{link}' of {robot.name}"
-            remedy = f"put it elsewhere, such as Fixture('{fixture.name}', at=(x, y))"
-            report.add(ERROR, scene.name, f"fixture '{fixture.name}'", what, remedy)
+            report.add(ERROR, scene.name, f"fixture '{fixture.name}'", what, "put it elsewhere, by its 'at'")
     for name in scene.object_names:
         deep = [found for world in worlds if (found := _of_object(links, world, name))[1] > DEEP]
         if deep:

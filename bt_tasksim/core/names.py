@@ -6,6 +6,8 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.plain import shown
 
 LONGEST = 64
+TOOL = "tool"
+"""What the robot's own tool is called among paths and poses: no object of a scene has this name."""
 
 
 def name_fault(name: object) -> str:

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.names import TOOL
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Observation, WorldState
-
-TOOL = "tool"
-"""By what name the tool's path is asked for; an object of this name comes first."""
 
 
 @dataclass(frozen=True, repr=False)

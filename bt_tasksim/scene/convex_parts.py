@@ -7,12 +7,19 @@ search", SIGGRAPH 2022) cuts the solid; then neighbours whose common hull adds l
 from __future__ import annotations
 
 import heapq
+import io
+import json
+import signal
+import subprocess
+import sys
 from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.meshes import TriangleMesh, mass_properties
 
@@ -24,6 +31,11 @@ _THRESHOLD = 0.035
 """Concavity, as a share of the size, at which CoACD stops: 0.05 adds 13 % to a mug's volume, this 8 %."""
 _SEARCH = {"resolution": 200, "mcts_iterations": 12, "mcts_nodes": 6, "mcts_max_depth": 2}
 """How hard it searches for cuts: CoACD's defaults take several times as long for about the same volume."""
+AT_ONCE = 2000
+"""Triangles up to which it cuts in this process, without a limit; beyond, half a second more is nothing."""
+MOST_SECONDS = 120
+"""Seconds of computing that it has beyond that, see `bt_tasksim.scene.cutting`."""
+MISSING = "meshes with hollows need the package coacd: install bt-tasksim with its extra 'sim'"
 _JOINED = 0.002
 """Parts are joined where this adds at most this share of the solid's volume, up to `_FREE` in all."""
 _FREE = 0.04
@@ -45,6 +57,7 @@ def convex_parts(body: TriangleMesh) -> tuple[Array, ...]:
         body: A closed surface.
 
     Raises:
+        InputError: It is too rough or too fine to be cut in `MOST_SECONDS`.
         MachineError: The package that decomposes meshes is not installed.
     """
     vertices = np.ascontiguousarray(body.vertices, np.float64)
@@ -66,20 +79,40 @@ def _parts(vertices: bytes, faces: bytes) -> tuple[Array, ...]:
 
 
 def _cut(points: Array, triangles: Array) -> list[Array]:
+    if len(triangles) > AT_ONCE:
+        return _cut_apart(points, triangles)
     try:
-        import coacd
+        from bt_tasksim.scene import cutting
     except ImportError:
-        raise MachineError(
-            "meshes with hollows need the package coacd: install bt-tasksim with its extra 'sim'"
-        ) from None
-    coacd.set_log_level("off")
-    mesh = coacd.Mesh(points, triangles)
-    found = coacd.run_coacd(mesh, threshold=_THRESHOLD, preprocess_mode="off", merge=False, seed=0, **_SEARCH)
-    if not found:  # its cuts need a manifold, which a surface that touches itself is not
-        found = coacd.run_coacd(
-            mesh, threshold=_THRESHOLD, preprocess_mode="on", merge=False, seed=0, **_SEARCH
+        raise MachineError(MISSING) from None
+    return cutting.cut(points, triangles, _THRESHOLD, _SEARCH)
+
+
+def _cut_apart(points: Array, triangles: Array) -> list[Array]:
+    """The same in a process of its own, which is stopped where it takes too long.
+
+    Raises:
+        InputError: It was.
+        MachineError: CoACD is not installed, or did not work.
+    """
+    if find_spec("coacd") is None:
+        raise MachineError(MISSING)
+    asked = io.BytesIO()
+    np.savez(asked, points=points, triangles=triangles)
+    how = json.dumps({"threshold": _THRESHOLD, "search": _SEARCH})
+    program = Path(__file__).with_name("cutting.py")
+    command = [sys.executable, "-I", str(program), str(MOST_SECONDS), how]
+    done = subprocess.run(command, input=asked.getvalue(), capture_output=True, check=False)
+    if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        raise InputError(
+            f"a mesh of {len(triangles)} triangles cannot be cut into convex parts in {MOST_SECONDS} s: its "
+            f"surface is too rough or too fine; give it fewer triangles, or a smoother surface"
         )
-    return [corners for corners, _ in found]
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise MachineError(f"CoACD did not cut a mesh: {said[-1] if said else f'exit {done.returncode}'}")
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as parts:
+        return [parts[name] for name in parts.files]
 
 
 def _part(points: Array) -> _Part:

@@ -43,7 +43,7 @@ def check_fixtures(fixtures: Sequence[Fixture]) -> None:
         if depth > TOUCHING:
             raise FieldError(
                 f"fixtures '{a.name}' and '{b.name}' stand {1000 * depth:.0f} mm in one another: put one of "
-                f"them elsewhere, such as Fixture('{b.name}', at=(x, y))",
+                f"them elsewhere, by its 'at'",
                 "fixtures",
             )
 

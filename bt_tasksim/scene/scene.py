@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from bt_tasksim.core.errors import FieldError, InputError, NoDrawError, nearest, within
-from bt_tasksim.core.names import check_name
+from bt_tasksim.core.names import TOOL, check_name
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.renamed import renamed_arguments, renamed_fields
 from bt_tasksim.core.resources import is_file
@@ -19,7 +19,7 @@ from bt_tasksim.scene.fixture_overlap import check_fixtures
 from bt_tasksim.scene.fixtures import load_fixture
 from bt_tasksim.scene.goal_functions import GoalFunction, Judge
 from bt_tasksim.scene.specs import FixtureSpec, Goal, HandStart, ObjectSpec, SpotSpec, object_spec
-from bt_tasksim.scene.starts import draw_order
+from bt_tasksim.scene.starts import check_hollows, draw_order
 
 UNSAID = cast("Goal", object())
 """What stands for a goal that nobody gave, so that None says that there shall be none."""
@@ -176,13 +176,21 @@ class Scene:
 
     def _check_names(self, specs: Mapping[str, ObjectSpec]) -> None:
         """Every name that is used is one of the scene, and means one thing."""
-        places = {p.name for f in self.fixtures for p in load_fixture(f).places}
+        furniture = [p for f in self.fixtures for p in load_fixture(f).places]
+        places, containers = {p.name for p in furniture}, [p.name for p in furniture if p.kind == "bin"]
         for i, spot in enumerate(self.spots):
             _require_place(f"spot '{spot.name}'", "on", spot.on, places, ("spots", i, "on"))
             if spot.name in places:
                 raise FieldError(f"two places are called '{spot.name}': rename the spot", "spots", i, "name")
             places.add(spot.name)
         for name in specs:
+            if name == TOOL:
+                raise FieldError(
+                    f"an object is called '{TOOL}', which is the robot's own: give the object another name, "
+                    f"such as 'my_{TOOL}'",
+                    "objects",
+                    name,
+                )
             if name in places:
                 raise FieldError(
                     f"an object and a place are both called '{name}': give the object another name, such as "
@@ -201,6 +209,14 @@ class Scene:
                 _require("goal", goal.object, specs, (*where, "object"))
                 if goal.place:
                     _require("goal", goal.place, {*places, *specs}, (*where, "place"))
+                if goal.relation == "inside" and goal.place in places and goal.place not in containers:
+                    said = f"it has {', '.join(containers)}" if containers else "it has none"
+                    raise FieldError(
+                        f"a goal is inside '{goal.place}', which is no container of the scene: {said}; "
+                        f"or write on='{goal.place}'",
+                        *where,
+                        "place",
+                    )
         if self.disturbed is not None:
             _require("disturbed", self.disturbed, specs, ("disturbed",))
 
@@ -266,6 +282,7 @@ class Scene:
             others = list(drawn_objects.values())
             drawn_objects[name] = sampling.draw_object(name, specs[name], places, others, rng, fixtures)
         objects = [drawn_objects[name] for name in specs]
+        check_hollows(self.goals, drawn_objects)
         if taught is not None and taught.tilt is not None:
             sampling.tilt_access(taught.tilt, objects, places, generator(seed, stream, "approach"))
         disturbance = None if self.disturbed is None else sampling.draw_disturbance(self.disturbed, rng)

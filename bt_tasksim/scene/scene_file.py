@@ -26,7 +26,7 @@ from bt_tasksim.scene.scene_schema import (
 from bt_tasksim.scene.shapes import KINDS, ShapeSize, shape, shape_kind
 from bt_tasksim.scene.specs import STARTS, FixtureSpec, Goal, ObjectSpec, SpotSpec, split_start
 
-_DENSEST = 20000.0
+DENSEST = 20000.0
 _TRIED = 3
 FLOATING = 0.02
 """Metres from the nearest box beyond which a place stands on nothing."""
@@ -206,7 +206,7 @@ def _check_density(name: str, spec: ObjectSpec) -> None:
     for kind in spec.kinds:
         small = (spec.size or KINDS[kind].size_range)[0]
         volume = shape(kind, ShapeSize(small, _smallest_exponents(spec), spec.mesh)).volume
-        if spec.mass[1] > _DENSEST * volume:
+        if spec.mass[1] > DENSEST * volume:
             raise FieldError(
                 f"object '{name}': {spec.mass[1]:g} kg in {1e6 * volume:.3g} cm3 would be denser than any "
                 f"metal: check its mass (kg) and size (m)",

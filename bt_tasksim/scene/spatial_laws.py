@@ -179,7 +179,7 @@ def is_on(where: Whereabouts, name: str, place: str) -> IsOn:
         surface = where.surface(place)
         aside = beyond_edges(surface.frame, surface.centre, surface.half, body.pose)
         level = surface.frame[:, 2]
-    elsewhere = _rests_elsewhere(where, (name, place), body.pose, low, level)
+    elsewhere = _rests_elsewhere(where, (name, place), body, low, level)
     lean = leaning(body.pose[:, 3:], body.cubic)
     return IsOn(poses.clip(aside, 0.0, math.inf), low - level, lean, elsewhere)
 
@@ -312,21 +312,23 @@ def _beyond_outline(pose: Array, below: PlacedObject) -> Array:
 
 
 def _rests_elsewhere(
-    where: Whereabouts, names: tuple[str, str], pose: Array, low: Array, level: Array
+    where: Whereabouts, names: tuple[str, str], body: PlacedObject, low: Array, level: Array
 ) -> Array:
     """Booleans ``(N,)``: what is right below objects is not the surface on which they should stand.
 
     It is another surface that they are nearer to; or an object that stands on that surface and under their
-    middle, and lower than they do.
+    middle, and lower than they do; or one that they reach over, and whose top they are nearer to: what
+    bridges two slabs has neither of them under its middle.
 
     Args:
         where: Where everything is.
         names: The object, and what it should stand on.
-        pose: Poses ``(N, 7)`` of the objects.
+        body: The objects.
         low: Heights ``(N,)`` of their lowest points, metres.
         level: Heights ``(N,)`` of the surfaces on which they should stand.
     """
     found = low != low  # not a number: unknown, and so it stands nowhere
+    xp, pose = array_namespace(low), body.pose
     for name in where.surfaces:
         if name not in names:
             other = where.surface(name)
@@ -336,10 +338,16 @@ def _rests_elsewhere(
             found = found | (there & nearer)
     for name in where.bodies:
         if name not in names:
-            body = where.body(name)
-            floor = lowest(body)
-            there = (_beyond_outline(pose, body) <= 0.0) & (floor > level - BELOW)
+            other_body = where.body(name)
+            floor, reach = lowest(other_body), other_body.reach
+            there = (_beyond_outline(pose, other_body) <= 0.0) & (floor > level - BELOW)
             found = found | (there & (low > floor + ABOVE))
+            top = xp.max(reach[..., 2], axis=-1)
+            nearer = (top > level + BELOW) & (abs(low - top) < abs(low - level))
+            if bool(xp.any(nearer)):
+                normals = xp.concat([_normals(pose), _normals(other_body.pose)], axis=1)
+                over = between(body.reach[..., :2], reach[..., :2], normals) < -IN_ONE_ANOTHER
+                found = found | (nearer & over)
     return found
 
 

@@ -110,8 +110,10 @@ class ObjectSpec:
             self._complete(self.file)
         if isinstance(self.kinds, str):
             object.__setattr__(self, "kinds", (self.kinds,))
+        if self.kinds in ((), []) and self.mesh is not None:
+            object.__setattr__(self, "kinds", ("mesh",))
         if self.kinds is None or self.kinds in ((), []):
-            raise FieldError("an object needs 'kinds', or a 'file' that says what it is", "kind")
+            raise FieldError("an object needs 'kinds', a 'mesh', or a 'file' that says what it is", "kind")
         fields = checked(
             ObjectFields, {name: getattr(self, name) for name in ObjectFields.model_fields}, "an object"
         )

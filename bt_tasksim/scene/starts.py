@@ -31,7 +31,7 @@ from bt_tasksim.scene.outlines import (
 )
 from bt_tasksim.scene.shape_kind import ShapeKind
 from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject, beyond_hollow
-from bt_tasksim.scene.specs import ObjectSpec
+from bt_tasksim.scene.specs import Goal, ObjectSpec
 
 
 def draw_order(specs: Mapping[str, ObjectSpec]) -> list[str]:
@@ -218,6 +218,25 @@ def start_of(
     middle = np.array(under.centre) - frame[:2]
     beside = replace(under, pose=level, centre=(float(middle[0]), float(middle[1])))
     return Start(word, reference, beside, actor.on, actor, actor.base)
+
+
+def check_hollows(goals: Sequence[object], objects: Mapping[str, ObjectActor]) -> None:
+    """What is to be inside an object has room there.
+
+    Args:
+        goals: Goals, and functions, which are passed over.
+        objects: The drawn objects, by name.
+
+    Raises:
+        InputError: An object has no hollow.
+    """
+    for goal in goals:
+        actor = objects.get(goal.place) if isinstance(goal, Goal) and goal.relation == "inside" else None
+        if actor is not None and not len(actor.shape().hollow):
+            raise InputError(
+                f"nothing can come to be inside '{actor.name}', as a goal asks: "
+                f"it has no hollow with a floor and walls all around"
+            )
 
 
 def top_of(actor: ObjectActor, places: Mapping[str, PlaceModel]) -> PlaceModel:

@@ -232,3 +232,10 @@ def test_an_unknown_object_is_named(toy):
 
     with pytest.raises(InputError, match="no object 'cupp' in the scene; did you mean 'cup'"):
         toy(Grasp("cupp")).tick()
+
+
+@pytest.mark.parametrize("closing", [(0.0, 0.0, 1.0), (0.7071, 0.7071, 0.0)])
+def test_what_was_given_and_cannot_be_had_is_counted_and_not_ignored(toy, closing):
+    leaf = Grasp("box", approach=(0.0, 0.0, -1.0), closing=closing)
+    with pytest.raises(NoWayError, match=r"\d+ that do not have the approach and the closing axis given"):
+        leaf.model.begin(view(toy, leaf))

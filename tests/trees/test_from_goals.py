@@ -484,3 +484,10 @@ def test_what_is_taller_than_a_low_container_is_in_it_and_a_small_thing_in_a_cup
     with Runner(lambda: tidy([goal]), scene) as runner:
         for result in successes(runner.run, range(5)):
             assert result.status == Status.SUCCESS, "the tree knows that it is there"
+
+
+def test_what_is_no_list_of_goals_or_moves_its_own_parking_place_is_refused():
+    with pytest.raises(InputError, match="takes a sequence of goals, found nothing"):
+        tidy(None)
+    with pytest.raises(InputError, match="'a' cannot be the parking place, since a goal moves it"):
+        tidy([Goal("a", on="spot"), Goal("b", on="table")], parking="a")

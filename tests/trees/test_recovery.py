@@ -374,3 +374,10 @@ def test_a_batch_comes_to_the_same():
             together[seed].why,
             together[seed].control_steps,
         )
+
+
+def test_what_is_no_tree_or_empty_is_said_to_be():
+    with pytest.raises(InputError, match=r"recovering takes a tree, such as .*, found nothing"):
+        recovering(None)
+    with pytest.raises(InputError, match="'nobody' is empty"):
+        recovering(sequence("nobody"))

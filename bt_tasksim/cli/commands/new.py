@@ -15,7 +15,8 @@ from bt_tasksim.core.registry import register
 @register("command", "new")
 def new(
     kind: Annotated[
-        Literal["concept", "tree", "scene", "robot"], typer.Argument(metavar="KIND", help="What to begin.")
+        Literal["concept", "tree", "scene", "object", "robot"],
+        typer.Argument(metavar="KIND", help="What to begin."),
     ],
     name: Annotated[str, typer.Argument(metavar="NAME", help="Its name, such as push or wipe_table.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Write the files to this folder.")] = Path(),
@@ -34,7 +35,7 @@ def new(
         ),
     ] = None,
 ) -> None:
-    """Start a concept, tree, scene or robot of your own.
+    """Start a concept, tree, scene, object or robot of your own.
 
     A concept comes with the tree in which it is trained and its test; a tree with its scene. Every file works
     as it is, and none is written over.
@@ -54,4 +55,9 @@ def new(
     else:
         from bt_tasksim.checking import new_things
 
-        say(new_things.write_tree(name, out) if kind == "tree" else new_things.write_scene(name, out))
+        write = {
+            "tree": new_things.write_tree,
+            "scene": new_things.write_scene,
+            "object": new_things.write_object,
+        }[kind]
+        say(write(name, out))

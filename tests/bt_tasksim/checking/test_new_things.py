@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bt_tasksim import Session, load_robot, load_scene, run
+from bt_tasksim import Scene, Session, load_robot, load_scene, run
 from bt_tasksim.checking.kinds import check_file
 from bt_tasksim.checking.new_robot import write_robot
-from bt_tasksim.checking.new_things import write_scene, write_tree
+from bt_tasksim.checking.new_things import write_object, write_scene, write_tree
 from bt_tasksim.checking.report import Report
 from bt_tasksim.checking.robot_frames import check_frames
 from bt_tasksim.cli.main import main
@@ -47,6 +47,32 @@ def test_a_new_scene_has_nothing_to_mend():
     write_scene("kitchen")
     report = check_file("kitchen.yaml")
     assert not report.findings, report.lines()
+
+
+def test_a_new_object_has_nothing_to_mend_and_goes_into_a_scene():
+    assert "bt-tasksim check watering_can.yaml" in write_object("watering_can")
+    report = check_file("watering_can.yaml")
+    assert not report.findings, report.lines()
+    world = Scene(objects={"it": "watering_can.yaml on table"}).sample(0)
+    assert world.objects[0].category == "watering_can"
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "sentence"),
+    [
+        ('Pick("cup")', 'Pick("cop")', "no object 'cop'.*did you mean 'cup'"),
+        ('to="mat"', 'to="matt"', "no place 'matt'.*did you mean 'mat'"),
+        ('Pick("cup")', 'Pick("cup", distanse=0.1)', "distanse"),
+    ],
+)
+def test_the_tree_beside_a_scene_is_checked_too(right, wrong, sentence):
+    write_tree("mine")
+    assert any("tree mine" in line for line in check_file("mine.py").checked)
+    text = Path("mine.py").read_text()
+    assert right in text
+    Path("other.py").write_text(text.replace(right, wrong))
+    with pytest.raises(InputError, match=sentence):
+        check_file("other.py")
 
 
 def test_a_new_robot_is_the_panda_to_be_changed():

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import ConvexHull
 
 from benchmarks.any_tree.meshes import FORMS, made
-from bt_tasksim.scene.convex_parts import MOST_PARTS, _parts, convex_parts
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.scene.convex_parts import AT_ONCE, MOST_PARTS, _parts, convex_parts
 from bt_tasksim.scene.meshes import TriangleMesh, mass_properties
 
 EXCESS = {"mug": 0.10, "tube": 0.10, "bowl": 0.5, "jar": 0.4, "ladle": 0.4}
@@ -50,3 +52,22 @@ def test_a_mug_stays_hollow():
         planes = ConvexHull(part).equations
         for point in inside:
             assert np.max(planes[:, :3] @ point + planes[:, 3]) > 0
+
+
+def test_a_mesh_of_many_triangles_is_cut_apart_and_gives_the_same(monkeypatch):
+    mesh = TriangleMesh(*made("mug", 2))
+    here = convex_parts(mesh)
+    monkeypatch.setattr("bt_tasksim.scene.convex_parts.AT_ONCE", 10)
+    _parts.cache_clear()
+    for one, other in zip(here, convex_parts(mesh), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_one_that_is_too_rough_is_refused_and_does_not_hang(monkeypatch):
+    monkeypatch.setattr("bt_tasksim.scene.convex_parts.MOST_SECONDS", 2)
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.04)
+    rough = np.random.default_rng(1).uniform(0.9, 1.1, (len(ball.vertices), 1))
+    mesh = TriangleMesh(np.asarray(ball.vertices) * rough, np.asarray(ball.faces))
+    assert len(mesh.faces) > AT_ONCE
+    with pytest.raises(InputError, match=r"triangles cannot be cut into convex parts in 2 s"):
+        convex_parts(mesh)

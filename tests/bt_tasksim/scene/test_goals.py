@@ -12,7 +12,7 @@ from bt_tasksim.core.errors import FieldError, InputError
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.moments import Moments
 from bt_tasksim.scene.scene import Scene
-from bt_tasksim.scene.specs import Goal, ObjectSpec
+from bt_tasksim.scene.specs import Goal, ObjectSpec, SpotSpec
 from bt_tasksim.scene.success import NO_GOAL, evaluate_success
 from tests.bt_tasksim.scene.states import drawn, state, tilted
 
@@ -357,3 +357,21 @@ def test_other_functions_are_other_goals():
     assert one != two and one == Scene(objects=OBJECTS, goals=one.goals)
     world = one.sample(0)
     assert ActorConfiguration.from_json(world.to_json()).functions == world.functions
+
+
+@pytest.mark.parametrize("place", ["table", "spot"])
+def test_nothing_is_to_be_inside_what_is_no_container(place):
+    spot = SpotSpec("spot", "table", (0.0, 0.1), (0.0, 0.0))
+    with pytest.raises(
+        InputError, match=f"inside '{place}', which is no container of the scene: it has tray"
+    ):
+        Scene(
+            fixtures=["tray"], objects={"cup": "cup on table"}, spots=[spot], goal=Goal("cup", inside=place)
+        )
+
+
+def test_nothing_is_to_be_inside_an_object_without_a_hollow():
+    objects = {"cup": "cup on table", "block": "cube on table"}
+    scene = Scene(objects=objects, goal=Goal("cup", inside="block"))
+    with pytest.raises(InputError, match="nothing can come to be inside 'block'"):
+        scene.sample(0)

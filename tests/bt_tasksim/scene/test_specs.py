@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from bt_tasksim.core.errors import FieldError, InputError
+from bt_tasksim.core.resources import asset
 from bt_tasksim.scene import ObjectSpec, Scene
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.grips import GivenGrip
@@ -152,3 +153,13 @@ def test_a_colour_that_is_none_is_said_to_be_none(tmp_path):
         InputError, match=r"'objects.box.colour' should be the name of a colour, or 3 numbers"
     ):
         load_scene(tmp_path / "s.yaml")
+
+
+def test_a_mesh_alone_says_that_it_is_one():
+    spec = ObjectSpec(on="table", mesh=str(asset("objects", "mug.obj")))
+    assert spec.kinds == ("mesh",)
+
+
+def test_no_object_is_called_as_the_robots_tool_is():
+    with pytest.raises(FieldError, match="an object is called 'tool', which is the robot's own"):
+        Scene(objects={"tool": "cup on table"})

@@ -175,3 +175,13 @@ def test_beside_a_place_is_off_its_outline():
         judged(goal, {"red": poses.pose([0.48, 0.30, 0.008 + SIZE / 2])}, ["tray"]).reason
         == "over_one_another"
     )
+
+
+def test_what_bridges_two_slabs_on_the_table_does_not_stand_on_the_table():
+    objects = {"a": little((0.02, 0.09, 0.05), -0.2), "one": little(LITTLE, 0.1), "two": little(LITTLE, 0.16)}
+    configuration, world = drawn(Scene(objects=objects, goal=Goal("a", on="table", relation="anywhere")))
+    middle = np.array(configuration.objects[1].pose)
+    at = {"a": poses.shifted(middle, np.array([0.0, 0.03, 0.016 + 0.017]))}
+    assert evaluate_success(configuration, world, state(configuration, at)).reason == "on_something_else"
+    at["a"] = poses.shifted(middle, np.array([0.021, 0.03, 0.017]))  # it stands beside both of them
+    assert evaluate_success(configuration, world, state(configuration, at)).success
