@@ -20,9 +20,11 @@ from bt_tasksim.planning.things import Leave
 from bt_tasksim.planning.ways import WayFinder
 from bt_tasksim.robot.kinematics.hand import SLIDE, standing_side
 
-SHARES = (1.0, 0.75, 0.5, 0.25, 0.1)
-"""Shares of a retreat that are tried where not all of it is clear, or in reach: an arm may be nearly as high
-as it comes."""
+SHARES = (1.0, 0.75, 0.5, 0.25)
+"""Shares of a retreat that are tried where not all of it is clear."""
+LEAST = 0.1
+"""The share that will do where there is no room for more, at the end of the arm's reach or below a board: so
+much takes the fingers off what they have let go of."""
 
 
 class Retreat(NamedTuple):
@@ -40,7 +42,12 @@ class Retreat(NamedTuple):
 
 
 def clear_retreat(
-    view: WorldView, hand: Array, distance: float, directions: Sequence[Array], let_go: Collection[str]
+    view: WorldView,
+    hand: Array,
+    distance: float,
+    directions: Sequence[Array],
+    let_go: Collection[str],
+    shares: Sequence[float] = SHARES,
 ) -> Retreat:
     """The first retreat that touches nothing: by direction, and then as far as it is clear.
 
@@ -50,6 +57,7 @@ def clear_retreat(
         distance: How far it is to go, metres.
         directions: Unit vectors ``(3,)`` in which it may go, robot base frame.
         let_go: Objects that it may touch.
+        shares: Of the distance, the first that is clear.
 
     Raises:
         NoWayError: None is clear; says what would be touched.
@@ -60,7 +68,7 @@ def clear_retreat(
         begin = finder.start if beside is None else beside.joints[-1]
         tool = view.tool if beside is None else poses.shifted(view.tool, beside.away)
         for direction in directions:
-            for share in SHARES:
+            for share in shares:
                 end = poses.shifted(tool, share * distance * direction)
                 joints = finder.straight([tool, end], start=begin, leans=finder.leanings[-1])
                 if joints is not None:
@@ -68,7 +76,7 @@ def clear_retreat(
                     return Retreat(end[:3] - view.tool[:3], np.concatenate([begin[None], joints]), aside)
     touches = finder.touched(end)
     why = f"{touches[0][0]} would touch {touches[0][1]}" if touches else "the arm cannot follow"
-    raise NoWayError(f"the hand cannot draw back by {1000 * SHARES[-1] * distance:.0f} mm: {why}")
+    raise NoWayError(f"the hand cannot draw back by {1000 * shares[-1] * distance:.0f} mm: {why}")
 
 
 def let_go_aside(view: WorldView, hand: Array, let_go: Collection[str]) -> Retreat:

@@ -1,5 +1,6 @@
 """Release: each world as alone, opens before it draws back, and ends what was held."""
 
+import dataclasses
 import sys
 
 import numpy as np
@@ -11,6 +12,7 @@ from bt_tasksim.concept_nodes import Release, retreat
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import TIMED_OUT
+from bt_tasksim.core.world import Obstacle
 from bt_tasksim.robot.kinematics.hand import SLIDE
 from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject, beyond_hollow
 
@@ -154,3 +156,16 @@ def test_a_hand_that_presses_on_nothing_opens_from_where_it_is(toy):
     stage.look()
     assert stage.tick(200) == Status.SUCCESS
     assert stage.world.steps[0].hand[0] == pytest.approx(0.5)
+
+
+def test_where_there_is_little_room_it_draws_back_a_little(toy):
+    gone = []
+    for height in (0.9, 0.67):
+        stage = start(toy, Release("cup", retreat=0.12))
+        plate = Obstacle(poses.pose([0.62, 0.0, height]), (0.3, 0.6, 0.02), "plate")
+        stage.context.begin([dataclasses.replace(stage.world.model, obstacles=(plate,))])
+        stage.look()
+        before = stage.world.now.tool_pose[2]
+        assert stage.tick(300) == Status.SUCCESS
+        gone.append(stage.world.now.tool_pose[2] - before)
+    assert gone == pytest.approx([0.12, 0.012], abs=2e-3)
