@@ -136,6 +136,9 @@ SURELY_ABOVE = 0.008
 """The same above an object's top, for the ends of a jaw that swings: they go far down beside what is tall."""
 SLOWEST = 0.05
 """The least share of the reference motion's own speed at which it does so."""
+PATIENCE = 8.0
+"""Seconds by which a grasp that feels its way may last longer: the ends of a stiff arm's jaws go down
+beside what is tall at 4 mm a second."""
 YIELDS = 15.0
 """Newtons against the approach from which on a hand gives way: a finger that stands on something as it comes,
 or a jaw that swings and presses what it closes on against its support."""
@@ -529,8 +532,10 @@ class Grasp(ConceptModel[GraspMemory]):
         return (memory.settled >= SETTLED) & (memory.closed >= self._asked(memory.offset)) & between
 
     def planned(self, memory: GraspMemory) -> Array | float:
-        """How long the way takes, where it was searched for."""
-        return searched_for(memory.path)
+        """How long the way takes, where it was searched for, and how much longer by feeling."""
+        xp = array_namespace(memory.delay)
+        felt = poses.clip(memory.delay, 0.0, PATIENCE)
+        return searched_for(memory.path) + xp.where(memory.tight, felt, xp.zeros_like(felt))
 
     def limits(self, seen: Seen, memory: GraspMemory) -> tuple[Limit, ...]:
         """The hand has closed on nothing, presses too hard, or has pushed the object away or over."""

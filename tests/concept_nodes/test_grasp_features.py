@@ -7,7 +7,7 @@ import pytest
 
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Grasp, grasp, grasp_features
-from bt_tasksim.concept_nodes.grasp import FEELING, SLOWEST, YIELDING
+from bt_tasksim.concept_nodes.grasp import FEELING, PATIENCE, SLOWEST, YIELDING
 from bt_tasksim.concept_nodes.grasp_features import (
     ACROSS,
     ACTIONS,
@@ -321,6 +321,30 @@ def test_what_touches_goes_on_no_faster_than_what_feels_its_way(near, monkeypatc
         memory = memory._replace(tight=np.array([True]), goal=seen.tool)
         paces.append(near.model.programmed_motion(seen, memory)[0, TIME_SCALING])
     assert paces[0] < 0.0 and paces[1] <= paces[0]
+
+
+@pytest.mark.parametrize(
+    ("tight", "delay", "more"), [(True, 3.0, 3.0), (True, 99.0, PATIENCE), (False, 3.0, 0.0)]
+)
+def test_a_grasp_that_feels_its_way_may_last_longer(near, tight, delay, more):
+    _, memory = instant(near)
+    usual = near.model.planned(memory._replace(tight=np.array([False])))
+    feeling = memory._replace(tight=np.array([tight]), delay=np.array([delay]))
+    assert near.model.planned(feeling) - usual == pytest.approx(more)
+
+
+def test_jaws_that_go_down_beside_something_tall_feel_their_way_from_its_top(near, monkeypatch):
+    """Others do so where fingers may meet an edge of what they hold; these reach far below it."""
+    seen, memory = approaching(near, within=0.2)
+    far = poses.shifted(memory.goal, -0.06 * poses.z_axis(memory.goal[:, 3:]))
+    memory = memory._replace(tight=np.array([True]), goal=far)
+    monkeypatch.setattr(grasp, "gentler", lambda tool: np.full(len(tool), 0.3))
+    monkeypatch.setattr(grasp, "beyond", lambda robot: 1.0)
+    others = near.model.programmed_motion(seen, memory)[0, TIME_SCALING]
+    monkeypatch.setattr(grasp, "standing_side", lambda robot: -0.007)
+    jaws = near.model.programmed_motion(seen, memory)[0, TIME_SCALING]
+    monkeypatch.setattr(grasp, "beyond", lambda robot: -1.0)
+    assert jaws < others == near.model.programmed_motion(seen, memory)[0, TIME_SCALING]
 
 
 def without_contacts(seen, but=None):
