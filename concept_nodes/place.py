@@ -264,7 +264,7 @@ class Place(ConceptModel[PlaceMemory]):
     def _by_world(self, seen: Seen) -> list[Place]:
         """The same in each world, with the place that is below named."""
         if self.on is not None or self.beside is not None:
-            return [self] * len(seen.tool)
+            return [self] * seen.tool.shape[0]
         (ranks,) = fetched([carrying(seen, self.target).place.rank])
         below = (list(seen.world.model_of(k).places)[int(rank)] for k, rank in enumerate(ranks))
         return [type(self).value(**{**self.arguments(), "on": name}) for name in below]

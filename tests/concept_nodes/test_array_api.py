@@ -76,6 +76,7 @@ def concepts(target="target", place="goal"):
         "bring by the way": Bring.value(target, to=place, via=((0.0, 0.1, 0.2), (0.0, 0.0, 0.2))),
         "place": Place.value(target, on=place),
         "place anywhere": Place.value(target, on=place, anywhere=True),
+        "place on what is below": Place.value(target, anywhere=True),
         "place by a distance": Place.value(target, on=place, distance=0.02),
         "release": Release.value(target),
         "wait": Wait.value(1.0),
