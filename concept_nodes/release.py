@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -20,14 +19,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING
 from bt_tasksim.concept_nodes.holding import HOLDING
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
-from bt_tasksim.concept_nodes.retreat import (
-    LEAST,
-    SHARES,
-    Retreat,
-    clear_retreat,
-    let_go_aside,
-    retreat_path,
-)
+from bt_tasksim.concept_nodes.retreat import Retreat, clear_retreat, little_retreat, retreat_path
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.concept_nodes.whereabouts import Estimates
@@ -157,10 +149,10 @@ class Release(ConceptModel[ReleaseMemory]):
     def _clear(self, view: WorldView, hand: Array) -> Retreat:
         """Where the open hand draws back to, touching nothing; where nothing is clear it only lets go."""
         ways = [-poses.z_axis(view.tool[3:]), UP]
-        for shares in (SHARES, (LEAST,)):
-            with suppress(NoWayError):
-                return clear_retreat(view, hand, self.retreat, ways, {self.target}, shares)
-        return let_go_aside(view, hand, {self.target})
+        try:
+            return clear_retreat(view, hand, self.retreat, ways, {self.target})
+        except NoWayError:
+            return little_retreat(view, hand, self.retreat, ways, {self.target})
 
     def command(self, action: Array, seen: Seen, memory: ReleaseMemory) -> Command:
         """Open, then draw back."""

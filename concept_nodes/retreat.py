@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -22,9 +23,8 @@ from bt_tasksim.robot.kinematics.hand import SLIDE, standing_side
 
 SHARES = (1.0, 0.75, 0.5, 0.25)
 """Shares of a retreat that are tried where not all of it is clear."""
-LEAST = 0.1
-"""The share that will do where there is no room for more, at the end of the arm's reach or below a board: so
-much takes the fingers off what they have let go of."""
+LITTLE = 0.1
+"""Share of a retreat that does for a hand which lets go: its arm may be nearly as high as it comes."""
 
 
 class Retreat(NamedTuple):
@@ -42,12 +42,7 @@ class Retreat(NamedTuple):
 
 
 def clear_retreat(
-    view: WorldView,
-    hand: Array,
-    distance: float,
-    directions: Sequence[Array],
-    let_go: Collection[str],
-    shares: Sequence[float] = SHARES,
+    view: WorldView, hand: Array, distance: float, directions: Sequence[Array], let_go: Collection[str]
 ) -> Retreat:
     """The first retreat that touches nothing: by direction, and then as far as it is clear.
 
@@ -57,7 +52,6 @@ def clear_retreat(
         distance: How far it is to go, metres.
         directions: Unit vectors ``(3,)`` in which it may go, robot base frame.
         let_go: Objects that it may touch.
-        shares: Of the distance, the first that is clear.
 
     Raises:
         NoWayError: None is clear; says what would be touched.
@@ -68,7 +62,7 @@ def clear_retreat(
         begin = finder.start if beside is None else beside.joints[-1]
         tool = view.tool if beside is None else poses.shifted(view.tool, beside.away)
         for direction in directions:
-            for share in shares:
+            for share in SHARES:
                 end = poses.shifted(tool, share * distance * direction)
                 joints = finder.straight([tool, end], start=begin, leans=finder.leanings[-1])
                 if joints is not None:
@@ -76,19 +70,25 @@ def clear_retreat(
                     return Retreat(end[:3] - view.tool[:3], np.concatenate([begin[None], joints]), aside)
     touches = finder.touched(end)
     why = f"{touches[0][0]} would touch {touches[0][1]}" if touches else "the arm cannot follow"
-    raise NoWayError(f"the hand cannot draw back by {1000 * shares[-1] * distance:.0f} mm: {why}")
+    raise NoWayError(f"the hand cannot draw back by {1000 * SHARES[-1] * distance:.0f} mm: {why}")
 
 
-def let_go_aside(view: WorldView, hand: Array, let_go: Collection[str]) -> Retreat:
-    """A retreat of a hand that cannot draw back: a finger that stands still goes away from what it touches.
+def little_retreat(
+    view: WorldView, hand: Array, distance: float, directions: Sequence[Array], let_go: Collection[str]
+) -> Retreat:
+    """A retreat of a hand that lets go where none is clear: a little of one.
 
-    Any other hand stays, and so does this one where it has no room for that.
+    Where not even that is, a finger that stands still goes away from what it touches, and other hands stay.
 
     Args:
         view: The world.
         hand: The opened hand's joints ``(n_hand,)``.
+        distance: How far it was to go, metres.
+        directions: Unit vectors ``(3,)`` in which it may go, robot base frame.
         let_go: Objects that it may touch.
     """
+    with suppress(NoWayError):
+        return clear_retreat(view, hand, LITTLE * distance, directions, let_go)
     finder = view.finder(hand=hand, leave=Leave(hand=let_go), closer=TOUCHING)
     nothing = np.zeros((0, len(view.arm)))
     return _beside(finder, view) or Retreat(np.zeros(3), nothing, nothing)

@@ -115,7 +115,8 @@ def test_a_finger_that_stands_still_leaves_what_it_let_go_even_where_the_hand_ca
     module = sys.modules[Release.__module__]
     monkeypatch.setattr(retreat, "standing_side", lambda robot: -0.007)
     monkeypatch.setattr(module, "_opened", lambda view, target: view.robot.hand_open)
-    monkeypatch.setattr(module, "clear_retreat", nowhere)
+    for place in (module, retreat):
+        monkeypatch.setattr(place, "clear_retreat", nowhere)
     stage = start(toy, Release("cup", retreat=0.12, opening=0.4))
     first = stage.world.now.tool_pose.copy()
     assert stage.tick(300) == Status.SUCCESS
