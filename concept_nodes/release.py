@@ -69,6 +69,9 @@ they open, and get no farther."""
 BARELY = 0.002
 """Metres below a container's rim at which the middle of what leans in it may be above it: estimates are as
 wrong as that."""
+PRESSES = 0.6
+"""Share of the force limit from which on a hand that has parted its fingers draws back at once as it opens,
+since they stand on something."""
 AT = 0.004
 """Metres within which the hand is at a piece of what it holds."""
 UP = np.array([0.0, 0.0, 1.0])
@@ -169,6 +172,8 @@ class Release(ConceptModel[ReleaseMemory]):
         slack = xp.where(memory.end > 0.0, slack, xp.full_like(slack, OPEN))
         open_now = (seen.elapsed > self.opening) & (seen.closure < memory.end + slack)
         open_now = open_now | (seen.elapsed > self.opening + STUCK)
+        parted = seen.closure < memory.held - OPEN
+        open_now = open_now | (parted & (force_at_wrist(seen) > PRESSES * self.force_limit))
         begun = xp.where(open_now, xp.zeros_like(memory.opened), memory.opened)
         going = memory.opened >= 0.0
         return memory._replace(opened=xp.where(going, memory.opened + seen.world.control_period, begun))

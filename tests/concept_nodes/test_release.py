@@ -70,6 +70,27 @@ def test_fingers_that_something_stops_as_they_open_are_drawn_back_from_it(toy):
     assert stage.tick(160) == Status.SUCCESS
 
 
+@pytest.mark.parametrize(("closure", "at_once"), [(0.3, True), (0.45, False)])
+def test_fingers_that_press_on_something_once_they_have_parted_are_drawn_back_at_once(toy, closure, at_once):
+    stage = start(toy, Release("cup", opening=0.4))
+    first, step = stage.world.now.tool_pose.copy(), stage.world.step
+    began = []
+
+    def pressing(command):
+        step(command)
+        if np.linalg.norm(stage.world.now.tool_pose[:3] - first[:3]) < 0.01:
+            stopped = max(float(stage.world.now.closure), closure)
+            stage.world.put(closure=np.array(stopped), wrench=np.array([0.0, 0, 50.0, 0, 0, 0]))
+        else:
+            began.append(stage.context.now)
+            stage.world.put(wrench=np.zeros(6))
+        return stage.world.now
+
+    stage.world.step = pressing
+    assert stage.tick(160) == Status.SUCCESS
+    assert (began[0] < 1.0) == at_once
+
+
 def test_afterwards_nothing_is_held(toy):
     stage = start(toy, Release("cup"))
     stage.tick(200)
