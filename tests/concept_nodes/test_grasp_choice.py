@@ -8,10 +8,18 @@ import pytest
 
 from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.leaf import ONE
-from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.concept_nodes import Grasp, grasp_choice
 from bt_tasksim.concept_nodes.closer import CLOSER, ROOMS
 from bt_tasksim.concept_nodes.grasp_candidates import candidates
-from bt_tasksim.concept_nodes.grasp_choice import FARTHEST, Chooser, _straight, aims_of, goes_aside, rooms
+from bt_tasksim.concept_nodes.grasp_choice import (
+    FARTHEST,
+    NARROWER,
+    Chooser,
+    _straight,
+    aims_of,
+    goes_aside,
+    rooms,
+)
 from bt_tasksim.concept_nodes.grasp_firmness import HARDLY
 from bt_tasksim.concept_nodes.grasp_opening import Opening
 from bt_tasksim.concept_nodes.holding import HOLDING
@@ -22,6 +30,7 @@ from bt_tasksim.core.world import Obstacle
 from bt_tasksim.planning.arm import arm_of
 from bt_tasksim.planning.route import Pace
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.kinematics.hand import SPARE
 from bt_tasksim.scene.grips import GivenGrip
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -183,6 +192,23 @@ def test_what_would_hardly_be_held_is_no_firm_grasp(view):
     assert np.isfinite(found[0].other(tools).goal).all()
     with pytest.raises(NoWayError, match="that would hardly be held"):
         found[1].other(candidates(view, "box", DOWN, view.tool[3:]))
+
+
+@pytest.mark.parametrize(
+    ("closer", "swings", "spare"),
+    [(ROOMS[1], True, NARROWER[0]), (ROOMS[0], True, None), (ROOMS[1], False, None)],
+)
+def test_a_jaw_that_swings_comes_less_wide_open_where_it_has_no_room(
+    view, monkeypatch, closer, swings, spare
+):
+    """As in the hole of a ring; the hand is a number here: the metres by which it is wider open."""
+    monkeypatch.setattr(grasp_choice, "opened_about", lambda robot, width, spare=SPARE: spare)
+    chooser = Chooser(view, "box", 0.1, Pace(0.5), (), closer)
+    chooser.__dict__["_slide"] = 0.004 if swings else 0.0
+    chooser._has_room = lambda tool, hand: hand.free(tool)
+    chooser._opened = lambda wide: SimpleNamespace(closure=-wide, wide=wide, free=lambda tool: wide < SPARE)
+    found = chooser._with_room(view.tool, 0.03)
+    assert (None if found is None else found.wide) == spare
 
 
 def test_a_hand_of_many_fingers_takes_a_round_thing_about_its_middle_from_the_side():
