@@ -43,6 +43,9 @@ WITHIN = 0.020
 """Metres from a model within which what is seen may be its, where other things hang together with it."""
 SMALL = 0.4
 """Part of an object's diagonal that what is seen of it spans at least: less is but a piece of something."""
+FOOT = 0.003
+"""Metres by which the lowest point that is seen of a thing is above its foot at least: near a fixture nothing
+is taken to be seen (6 mm), and what is seen has errors."""
 MARGIN = 0.02
 """Metres that it may span more than an object does: what is seen has errors."""
 FAIR = 0.35
@@ -205,15 +208,17 @@ class Group:
             for column, part in enumerate(parts):
                 if not self._may_be(i, part, stage):
                     continue
-                fit = self._fit(i, self._lowest(i, part) if stage.pieces else part, estimate, stage)
+                tried = self._lowest(i, part) if stage.pieces else part
+                fit = self._fit(i, tried, estimate, stage)
                 if fit is None:
                     continue
-                own = part & (self._gaps(i, fit.pose) < WITHIN)
+                own = tried & (self._gaps(i, fit.pose) < WITHIN)
                 if stage.pieces:
                     fit = self._fit_to(i, own, fit.pose, estimate)
                 if fit is not None and fit.cost < stage.limit:
                     fits[row, column] = Sight(fit, own)
-                    worth[row, column] = np.count_nonzero(own) * (1.0 - fit.cost)
+                    # By the whole part: of a stack it is not the larger one that counts, but what fits.
+                    worth[row, column] = np.count_nonzero(part) * (1.0 - fit.cost)
         return {rest[row]: fits[row, column] for row, column in matched(worth) if (row, column) in fits}
 
     def _may_be(self, i: int, part: Array, stage: Stage) -> bool:
@@ -226,7 +231,7 @@ class Group:
     def _lowest(self, i: int, part: Array) -> Array:
         """What of a part is no higher above its foot than an object: others may stand on it."""
         height = self.cloud.smooth[:, 2]
-        lowest: Array = part & (height < np.min(height[part]) + self.targets[i].model.extent[2] + OWN)
+        lowest: Array = part & (height < np.min(height[part]) + self.targets[i].model.extent[2] - FOOT)
         return lowest
 
     def _fit(

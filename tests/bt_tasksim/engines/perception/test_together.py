@@ -99,9 +99,15 @@ def test_one_that_stands_on_another_is_found_though_they_are_one_patch_of_colour
         assert poses.z_axis(found.sightings[i].fit.pose[3:])[2] > 0.999
 
 
-@pytest.mark.parametrize("tall", [0.04, 0.14])
-def test_of_a_stack_the_lower_one_is_found_first_and_so_the_upper_one_upright(tall):
-    low, high = (0.08, 0.07, 0.03), (0.06, 0.05, tall)
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [
+        ((0.08, 0.07, 0.03), (0.06, 0.05, 0.04)),
+        ((0.08, 0.07, 0.03), (0.06, 0.05, 0.14)),
+        ((0.05, 0.05, 0.05), (0.077, 0.048, 0.109)),  # it overhangs what bears it
+    ],
+)
+def test_of_a_stack_the_lower_one_is_found_first_and_so_the_upper_one_upright(low, high):
     drawn = world([high, low])
     where = {1: spot(0.5, 0.0, low, heading=0.3), 0: spot(0.5, 0.004, high, low[2], heading=0.5)}
     found = look(drawn, where, errors=CameraErrors())
