@@ -57,10 +57,23 @@ _WITHIN = 0.02
 corrects where it goes, is to have joints left for that."""
 
 
+_KEPT = 20_000
+"""Answers that are kept, a few MB."""
+
+
 class _Scratch(threading.local):
-    """What each thread has of its own; a copy begins anew."""
+    """What each thread has of its own; a copy begins anew.
+
+    Attributes:
+        data: What Pinocchio writes into.
+        solved: Joints that were found, or None, by what was asked: where nothing serves, the same tool poses are
+            asked about with more room and with less.
+    """
 
     data: pin.Data | None = None
+
+    def __init__(self) -> None:
+        self.solved: dict[tuple[bytes, bytes, bool, float], Array | None] = {}
 
     def __reduce__(self) -> tuple[type[_Scratch], tuple[()]]:
         return _Scratch, ()
@@ -122,6 +135,16 @@ class Arm:
             follow: The arm is drawn towards its rest posture on the way, as it is when it follows commands.
             leans: Radians by which the tool may be turned from the pose, by an arm of fewer than six joints.
         """
+        asked, solved = (tool.tobytes(), start.tobytes(), follow, leans), self._scratch.solved
+        if asked not in solved:
+            if len(solved) >= _KEPT:
+                solved.clear()
+            solved[asked] = self._solve(tool, start, follow, leans)
+        found = solved[asked]
+        return None if found is None else found.copy()
+
+    def _solve(self, tool: Array, start: Array, follow: bool, leans: float) -> Array | None:
+        """See `joints`."""
         robot, target = self.robot, se3(tool)
         q = np.clip(start, self._lower, self._upper)
         if len(q) < FULL:

@@ -120,3 +120,15 @@ def test_a_copied_robot_has_an_arm_too(panda):
     again = copy.deepcopy(panda.robot)
     at = arm_of(panda.robot).tool(panda.robot.rest)
     assert np.array_equal(arm_of(again).tool(again.rest), at)
+
+
+def test_who_asks_again_gets_the_same_and_may_change_it(each):
+    robot, arm = each.robot, each.arm
+    tool = poses.shifted(arm.tool(robot.rest), np.array([0.01, 0.0, -0.02]))
+    far = poses.shifted(tool, np.array([3.0, 0.0, 0.0]))
+    first = arm.joints(tool, robot.rest)
+    kept = first.copy()
+    first += 1.0
+    for other in (arm, copy.copy(arm), copy.deepcopy(arm)):
+        np.testing.assert_array_equal(other.joints(tool, robot.rest), kept)
+        assert other.joints(far, robot.rest) is None is other.joints(far, robot.rest)
