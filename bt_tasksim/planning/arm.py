@@ -66,8 +66,8 @@ class _Scratch(threading.local):
 
     Attributes:
         data: What Pinocchio writes into.
-        solved: Joints that were found, or None, by what was asked: where nothing serves, the same tool poses are
-            asked about with more room and with less.
+        solved: Joints that were found, or None, by what was asked: where nothing serves, the same tool poses
+            are asked about with more room and with less.
     """
 
     data: pin.Data | None = None
