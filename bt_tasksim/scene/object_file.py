@@ -19,8 +19,6 @@ from bt_tasksim.scene.object_schema import GraspEntry, ObjectFile, SizeRange
 from bt_tasksim.scene.shapes import ShapeSize, shape, size_range
 
 Entry = TypeVar("Entry", bound=ObjectFile)
-BESIDE = 0.02
-"""Metres beside an object beyond which nobody can hold it."""
 
 
 def object_file(name: str, folder: Path | None = None) -> Path:
@@ -133,17 +131,11 @@ def given_grip(entry: GraspEntry, kind: str, size: SizeRange | None, mesh: str |
         mesh: The path of its mesh, for the kind ``mesh``.
 
     Raises:
-        FieldError: It is beside the object, there is no single size to measure the width from, or fingers
-            meet nothing there.
+        FieldError: There is no single size to measure the width from, or fingers meet nothing there.
     """
     width = entry.width
-    low, high = size or size_range(kind, mesh)
-    if any(abs(at) > side / 2 + BESIDE for at, side in zip(entry.point, high, strict=True)):
-        raise FieldError(
-            f"{list(entry.point)} is more than {1000 * BESIDE:.0f} mm beside the object, and holds nothing",
-            "point",
-        )
     if width is None:
+        low, high = size or size_range(kind, mesh)
         if low != high:
             raise FieldError("'width' is missing, and the object has no single size to measure it from")
         solid = shape(kind, ShapeSize(low, mesh=mesh))

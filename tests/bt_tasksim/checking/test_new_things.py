@@ -60,9 +60,9 @@ def test_a_new_object_has_nothing_to_mend_and_goes_into_a_scene():
 @pytest.mark.parametrize(
     ("right", "wrong", "sentence"),
     [
-        ('Pick("cup")', 'Pick("cop")', "no object 'cop'.*did you mean 'cup'"),
+        ('Pick("cup"', 'Pick("cop"', "no object 'cop'.*did you mean 'cup'"),
         ('to="mat"', 'to="matt"', "no place 'matt'.*did you mean 'mat'"),
-        ('Pick("cup")', 'Pick("cup", distanse=0.1)', "distanse"),
+        ("distance=", "distanse=", "distanse"),
     ],
 )
 def test_the_tree_beside_a_scene_is_checked_too(right, wrong, sentence):
