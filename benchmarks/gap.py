@@ -26,7 +26,7 @@ from bt_tasksim.core.world import Hidden
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import QUIET, SETTLE, Runner
 from bt_tasksim.hardware.twin.evaluation import EvaluationClient
-from bt_tasksim.scene.success import at_rest, evaluate_success
+from bt_tasksim.scene.success import Overlap, at_rest, evaluate_success
 from bt_tasksim.training.evaluation import Job, evaluate
 from bt_tasksim.training.evaluation_outcomes import wilson
 from bt_tasksim.trees.load import load_source
@@ -98,22 +98,22 @@ def judged_by_truth(
     except BtTasksimError as error:
         outcome = outcome_of_error(error)
         status, leaf, reason, why = "INVALID", "", outcome.cause.reason.name, outcome.sentence
-    truth = _settled(evaluation)
+    truth, overlap = _settled(evaluation)
     model = configuration.world_model([tip.name for tip in robot.tips], robot.opening)
-    verdict = evaluate_success(configuration, model, truth)
+    verdict = evaluate_success(configuration, model, truth, overlap=overlap)
     if status == "SUCCESS":
         reason, why = verdict.reason, verdict.why
     return Judged(status == "SUCCESS" and verdict.success, status, leaf, reason, why)
 
 
-def _settled(evaluation: EvaluationClient) -> Hidden:
+def _settled(evaluation: EvaluationClient) -> tuple[Hidden, Overlap | None]:
     """The truth once things have come to rest, or have not for as long as a simulation would wait."""
     end, quiet = time.monotonic() + SETTLE, 0
     while True:
-        truth = evaluation.truth()
+        truth, overlap = evaluation.truth()
         quiet = quiet + 1 if at_rest(truth.velocities) else 0
         if quiet >= QUIET or time.monotonic() > end:
-            return truth
+            return truth, overlap
         time.sleep(0.05)
 
 

@@ -244,7 +244,7 @@ def test_over_a_container_that_has_something_in_it_it_ends_beside_that(toy):
     view = views(stage.context.seen(ONE, np.zeros(1)))[0]
     goal = view.world.place("goal")
     place = dataclasses.replace(goal, name="bin", kind="bin", extent=(0.3, 0.3), height=0.1)
-    world = dataclasses.replace(view.world, places={**view.world.places, "bin": place})
+    world = dataclasses.replace(view.world, places={"bin": place})
     middle = poses.transform(np.asarray(place.pose), np.array([*place.centre, 0.0]))
     for beside, empty in ((1.0, True), (0.0, False)):
         there = poses.pose(middle + np.array([beside, 0.0, 0.02]))

@@ -228,6 +228,11 @@ class Cell:
         return self._physics.hidden()
 
     @property
+    def deepest_pair(self) -> tuple[str, str, float, float] | None:
+        """The two bodies that overlapped most, see `PhysicsEngine.deepest_pair`."""
+        return self._physics.deepest_pair
+
+    @property
     def state(self) -> WorldState:
         """The state of now, without noise."""
         return self._state

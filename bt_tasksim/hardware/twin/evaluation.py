@@ -21,6 +21,7 @@ import numpy as np
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.world import Hidden
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.success import Overlap
 
 LONGEST = 4_000_000
 """Bytes of a line."""
@@ -145,10 +146,12 @@ class EvaluationClient:
         """Make a world anew; factors and noise follow from the seed."""
         self.ask(do="load", configuration=configuration.to_json(), seed=seed)
 
-    def truth(self) -> Hidden:
-        """The physics state."""
+    def truth(self) -> tuple[Hidden, Overlap | None]:
+        """The physics state, and the two bodies that overlapped most."""
         answer = self.ask(do="truth")
-        return Hidden(**{f.name: np.asarray(answer[f.name]) for f in fields(Hidden)})
+        pair = answer["deepest_pair"]
+        hidden = Hidden(**{f.name: np.asarray(answer[f.name]) for f in fields(Hidden)})
+        return hidden, None if pair is None else tuple(pair)
 
     def tell(self) -> dict[str, Any]:
         """See `Cell.tell`."""

@@ -196,7 +196,7 @@ class TwinNode(Node):  # type: ignore[misc]
             case "picture":
                 return self._picture(question.get("known"))
             case "truth":
-                return hidden_to_json(self.cell.hidden())
+                return hidden_to_json(self.cell.hidden()) | {"deepest_pair": self.cell.deepest_pair}
             case "tell":
                 return self.cell.tell()
             case "fault":

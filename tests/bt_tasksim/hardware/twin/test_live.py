@@ -48,7 +48,7 @@ def test_a_scenario_on_the_command_line_judged_by_the_twin(bench: Bench, tmp_pat
     for seed in (0, 1, 2):
         configuration = scene.sample(seed)
         bench.evaluation.load(configuration, seed)
-        before = bench.evaluation.truth()
+        before, _ = bench.evaluation.truth()
         assert not evaluate_success(configuration, world_of(configuration, robot), before).success
         port, out = bench.twin.port, str(tmp_path / str(seed))
         ran = on_the_command_line(
@@ -71,7 +71,7 @@ def test_a_scenario_on_the_command_line_judged_by_the_twin(bench: Bench, tmp_pat
 def settled(bench: Bench, patience: float = 5.0) -> Hidden:
     """The physics state once everything rests, or after so many seconds."""
     end = time.monotonic() + patience
-    while not at_rest((truth := bench.evaluation.truth()).velocities) and time.monotonic() < end:
+    while not at_rest((truth := bench.evaluation.truth()[0]).velocities) and time.monotonic() < end:
         time.sleep(0.1)
     return truth
 
@@ -132,7 +132,7 @@ def test_meshes_among_other_things_on_the_twin(tmp_path: Path) -> None:
     asked = Conditions("panda", "obvious", None, EngineOptions(), tmp_path, twin=True)
     player, found = player_of(asked), []
     try:
-        for seed in (988016, 988027, 988041):
+        for seed in (988041, 988027, 988049):
             found.append(player.play(seed))
             if found[-1]["success"]:
                 break
