@@ -164,6 +164,7 @@ def prepared(tmp_path_factory):
         assert main(["run", "kitchen.xml", "--seed", "11", "--out", "runs/kitchen"]) in (0, 1)
         assert main(["new", "concept", "push"]) == 0
         assert main(["new", "scene", "kitchen"]) == 0
+        assert main(["new", "object", "watering_can"]) == 0
         assert main(["new", "tree", "mine"]) == 0
     shutil.copy(folder / "kitchen.xml", folder / "shelf.xml")
     return folder

@@ -12,7 +12,7 @@ FAILED = {"concept": "pick", "leaf": "pick cup", "reason": "goal_lost", "status"
 
 def result(good, bad, impossible=0):
     """Results of draws, as the benchmark writes them."""
-    draws = [{"seed": k, "success": True} for k in range(good)]
+    draws = [{"seed": k, "success": True, "reason": ""} for k in range(good)]
     draws += [{**FAILED, "seed": 100 + k, "success": False} for k in range(bad)]
     gone = {"oracle": {"possible": False, "reason": "no grasp"}}
     draws += [{**FAILED, **gone, "seed": 200 + k, "success": False} for k in range(impossible)]

@@ -34,10 +34,10 @@ from bt_tasksim.engines.perception.segmentation import (
 from bt_tasksim.engines.perception.together import (
     STAGES,
     STANDING,
-    Group,
-    Place,
+    ColourView,
+    FitStage,
+    SameColour,
     Sight,
-    Stage,
     group_of,
     pairs_of,
 )
@@ -172,11 +172,11 @@ class Looker:
     def _found(
         self,
         pictures: Mapping[str, _Picture],
-        groups: Sequence[Group],
+        groups: Sequence[SameColour],
         capture: Capture,
         wanted: Collection[int],
         given: Mapping[int, Sight],
-        stages: Sequence[Stage] = STAGES,
+        stages: Sequence[FitStage] = STAGES,
     ) -> tuple[dict[int, Sighting], dict[int, Sight]]:
         """Sightings of the wanted objects; and of those that share a colour, what is theirs of it."""
         alone = [i for i in wanted if not any(i in group.members for group in groups)]
@@ -200,16 +200,16 @@ class Looker:
                 found[i] = self._sighting(sight, group, list(pictures))
         return found, sights
 
-    def _still_there(self, i: int, group: Group, capture: Capture) -> bool:
+    def _still_there(self, i: int, group: SameColour, capture: Capture) -> bool:
         """Whether an object that nothing has moved is but hidden: then nothing else is taken for it."""
         known = bool(np.isfinite(capture.estimate[i, 0]))
         moved = any(capture.handled[i]) or i in capture.unsettled
         return known and not moved and group.hidden(i, capture.estimate[i])
 
-    def _group(self, members: Sequence[int], pictures: Mapping[str, _Picture]) -> Group:
+    def _group(self, members: Sequence[int], pictures: Mapping[str, _Picture]) -> SameColour:
         """The objects of one colour."""
         first = members[0]
-        shown = [Place(p.camera, p.depth, p.others[first]) for p in pictures.values()]
+        shown = [ColourView(p.camera, p.depth, p.others[first]) for p in pictures.values()]
         masks = [np.any([p.masks[i] for i in members], axis=0) for p in pictures.values()]
         return group_of(self.targets, members, shown, masks, self._model.obstacles, self._places, self._rng)
 
@@ -219,7 +219,7 @@ class Looker:
         pairs = pairs_of([i for i in members if i in never])
         return [(a, b) for a, b in pairs if self._told_apart(names[a], names[b])]
 
-    def _sighting(self, sight: Sight, group: Group, names: Sequence[str]) -> Sighting:
+    def _sighting(self, sight: Sight, group: SameColour, names: Sequence[str]) -> Sighting:
         """What was found together with others, as it is told of one object: the camera that shows most."""
         cloud, own = group.cloud, sight.points
         best = int(np.argmax(np.bincount(cloud.camera[own], minlength=len(names))))

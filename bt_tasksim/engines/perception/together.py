@@ -61,7 +61,7 @@ SURE = 0.03
 """Cost by which pictures should be explained better than with two objects exchanged, to tell them apart."""
 
 
-class Place(NamedTuple):
+class ColourView(NamedTuple):
     """A camera's picture: the camera, depth ``(height, width)``, and what shows objects of other colours."""
 
     camera: CameraModel
@@ -76,7 +76,7 @@ class Sight(NamedTuple):
     points: Array
 
 
-class Stage(NamedTuple):
+class FitStage(NamedTuple):
     """How objects are looked for: with all motions free, in pieces of a part, up to which cost."""
 
     free: bool
@@ -84,13 +84,13 @@ class Stage(NamedTuple):
     limit: float
 
 
-STANDING = (Stage(False, False, FAIR), Stage(False, True, FAIR))
-STAGES = (*STANDING, Stage(True, False, FAIR), Stage(True, True, FAIR), Stage(True, False, POOR))
+STANDING = (FitStage(False, False, FAIR), FitStage(False, True, FAIR))
+STAGES = (*STANDING, FitStage(True, False, FAIR), FitStage(True, True, FAIR), FitStage(True, False, POOR))
 """The usual first: what stands alone, then what touches others, then what lies."""
 
 
 @dataclass(frozen=True)
-class Group:
+class SameColour:
     """Objects of one colour, and what is seen in it.
 
     Args:
@@ -105,7 +105,7 @@ class Group:
 
     targets: Sequence[Target]
     members: Sequence[int]
-    pictures: Sequence[Place]
+    pictures: Sequence[ColourView]
     cloud: ColouredCloud
     boxes: Sequence[Obstacle]
     places: Callable[[int, Array], Sequence[PlaceModel]]
@@ -147,7 +147,7 @@ class Group:
         wanted: Iterable[int],
         estimate: Array,
         given: Mapping[int, Sight],
-        stages: Sequence[Stage] = STAGES,
+        stages: Sequence[FitStage] = STAGES,
     ) -> dict[int, Sight]:
         """Those that can be found.
 
@@ -193,13 +193,13 @@ class Group:
         more = pixels = 0.0
         for i, instead in seen:
             fit, own = found[i]
-            other = self._fit(instead, own, estimate, Stage(True, False, POOR), fit.pose)
+            other = self._fit(instead, own, estimate, FitStage(True, False, POOR), fit.pose)
             n = int(np.count_nonzero(own))
             more, pixels = more + n * ((1.0 if other is None else other.cost) - fit.cost), pixels + n
         return more / pixels
 
     def _assigned(
-        self, rest: Sequence[int], parts: Sequence[Array], estimate: Array, stage: Stage
+        self, rest: Sequence[int], parts: Sequence[Array], estimate: Array, stage: FitStage
     ) -> dict[int, Sight]:
         """The assignment of objects to parts that explains most."""
         fits: dict[tuple[int, int], Sight] = {}
@@ -221,7 +221,7 @@ class Group:
                     worth[row, column] = np.count_nonzero(part) * (1.0 - fit.cost)
         return {rest[row]: fits[row, column] for row, column in matched(worth) if (row, column) in fits}
 
-    def _may_be(self, i: int, part: Array, stage: Stage) -> bool:
+    def _may_be(self, i: int, part: Array, stage: FitStage) -> bool:
         """Whether a part's size is an object's, or that of several together."""
         points = self.cloud.smooth[part]
         across = float(np.linalg.norm(np.max(points, axis=0) - np.min(points, axis=0)))
@@ -235,7 +235,7 @@ class Group:
         return lowest
 
     def _fit(
-        self, i: int, part: Array, estimate: Array, stage: Stage, before: Array | None = None
+        self, i: int, part: Array, estimate: Array, stage: FitStage, before: Array | None = None
     ) -> Fit | None:
         """The best fit of an object to a part."""
         places = self.places(i, estimate)
@@ -316,16 +316,16 @@ def matched(worth: Array) -> list[tuple[int, int]]:
 def group_of(
     targets: Sequence[Target],
     members: Sequence[int],
-    pictures: Sequence[Place],
+    pictures: Sequence[ColourView],
     masks: Sequence[Array],
     boxes: Sequence[Obstacle],
     places: Callable[[int, Array], Sequence[PlaceModel]],
     rng: np.random.Generator,
-) -> Group:
+) -> SameColour:
     """The objects of one colour, given what shows it: masks ``(height, width)``, one for each picture."""
     cameras, depths = [p.camera for p in pictures], [p.depth for p in pictures]
     cloud = coloured_cloud(cameras, depths, masks, boxes)
-    return Group(targets, members, pictures, cloud, boxes, places, rng)
+    return SameColour(targets, members, pictures, cloud, boxes, places, rng)
 
 
 def pairs_of(numbers: Collection[int]) -> list[tuple[int, int]]:
