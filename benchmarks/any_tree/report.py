@@ -38,6 +38,7 @@ def summary(draws: Sequence[Draw]) -> dict[str, Any]:
         "refused": [draw["seed"] for draw in draws if draw["reason"] == NOT_TOLD_APART.name],
         "asked_oracle": sum("oracle" in draw for draw in draws),
         "impossible": dict(Counter(draw["oracle"]["reason"] for draw in draws if impossible(draw))),
+        "unended": sum(impossible(draw) and not draw["oracle"].get("exhausted") for draw in draws),
         "failures": [
             {"concept": concept, "reason": reason, "count": len(group), "seeds": [d["seed"] for d in group]}
             for (concept, reason), group in groups
@@ -75,6 +76,10 @@ def lines(draws: Sequence[Draw], title: str) -> list[str]:
             f"({100 * said['possible_rate']:.1f} %, 95 % interval {100 * low:.1f} to {100 * high:.1f})"
         )
         out += [f"  {count:4d} impossible: {reason}" for reason, count in said["impossible"].items()]
+        if said["unended"]:
+            out.append(
+                f"  {said['unended']} of these because the oracle's time was over before its samples were"
+            )
     out.append(
         f"  {said['lies']} said SUCCESS while goals were missed, and {said['overlaps']} more in which "
         f"all goals were reached and bodies overlapped"

@@ -104,9 +104,15 @@ def distance(a: Array, b: Array) -> float:
 
 def holds(outline: Array, points: Array, margin: float = 0.0) -> bool:
     """All points ``(k, 2)`` lie within a convex outline, ``margin`` metres from its edges at least."""
+    return bool(np.all(within(outline, points) >= margin))
+
+
+def within(outline: Array, points: Array) -> Array:
+    """Metres ``(k,)`` from points ``(k, 2)`` to a convex outline's nearest edge; negative outside."""
     ends = np.roll(outline, -1, axis=0)
     normals = _normals(outline, ends)
-    return bool(np.all(np.sum(normals * outline, axis=1) - points @ normals.T >= margin))
+    found: Array = (np.sum(normals * outline, axis=1) - points @ normals.T).min(axis=1)
+    return found
 
 
 def rectangle(pose: Array, centre: Sequence[float], extent: Sequence[float]) -> Array:

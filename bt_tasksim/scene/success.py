@@ -50,6 +50,7 @@ __all__ = [
     "Verdict",
     "at_rest",
     "evaluate_success",
+    "knocked_over",
     "penetration",
 ]
 
@@ -195,7 +196,7 @@ def _wrong(
         more = [f"and {len(missed) - NAMED} more"] if len(missed) > NAMED else []
         named = ", ".join([*(placement.goal for placement in missed[:NAMED]), *more])
         yield GOALS_MISSED(missed[0].outcome, missed=len(missed), count=len(placements), goals=named)
-    yield from _knocked_over(frozenset().union(*(placement.objects for placement in placements)), final)
+    yield from knocked_over(frozenset().union(*(placement.objects for placement in placements)), final)
     if float(final.hidden.penetration) > DEEPEST:
         yield penetration(final.hidden.penetration, overlap)
 
@@ -213,10 +214,14 @@ def penetration(depth: Array | float, overlap: Overlap | None = None) -> Outcome
     return PENETRATION(bodies=f"{one} and {two}", depth=depth, moment=f" at {time:.2f} s")
 
 
-def _knocked_over(meant: Collection[str], final: FinalState) -> Iterator[Outcome]:
+def knocked_over(meant: Collection[str], final: FinalState) -> Iterator[Outcome]:
     """Objects that were moved, though no goal is about them.
 
     What stood on an object, or in it, is carried along: it is looked at from there.
+
+    Args:
+        meant: Names of the objects that goals are about.
+        final: The physics state, and where everything began.
     """
     for actor in final.configuration.objects:
         if actor.name in meant or actor.movable:

@@ -61,9 +61,16 @@ def work(tmp_path_factory):
 
 
 def of_ray():
-    """Processes of Ray that this one has."""
+    """Processes of Ray that this one has and that run."""
+
+    def words(process: psutil.Process) -> list[str]:
+        try:
+            return [process.name(), *process.cmdline()]
+        except psutil.NoSuchProcess:  # it ends as it is looked at, or nobody has asked yet how it ended
+            return []
+
     found = psutil.Process().children(recursive=True)
-    return {p for p in found if any("ray" in word for word in [p.name(), *p.cmdline()])}
+    return {process for process in found if any("ray" in word for word in words(process))}
 
 
 @pytest.fixture(scope="module")
