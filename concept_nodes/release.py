@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, Obje
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING
+from bt_tasksim.concept_nodes.grasp_firmness import TWO
 from bt_tasksim.concept_nodes.holding import HOLDING
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.retreat import Retreat, clear_retreat, little_retreat, retreat_path
@@ -73,10 +74,12 @@ PRESSES = 0.6
 """Share of the force limit from which on a hand that has parted its fingers draws back at once as it opens,
 since they stand on something."""
 AT = 0.004
-"""Metres within which the hand is at a piece of what it holds."""
+"""Metres within which the hand is at a piece of what it holds, and that it stays away from others."""
 UP = np.array([0.0, 0.0, 1.0])
 SPARES = (0.006, 0.010, 0.014, 0.018, SPARE)
 """Metres by which a jaw that swings opens wider than what it lets go of, the last where there is room."""
+SHUT = (0.0, 0.25, 0.5, 0.75)
+"""Shares of its closure that are left of other hands' where they have no room to open all the way."""
 
 
 class ReleaseMemory(NamedTuple):
@@ -242,26 +245,34 @@ def _surely(hollow: Hollow) -> Hollow:
 def _opened(view: WorldView, target: str) -> Array:
     """Joints ``(n_hand,)`` of the hand that has let go of what it holds.
 
-    One with a jaw that swings opens as wide as it may without touching anything else, or another wall of what
-    it holds.
+    One of two sides opens no wider than it may without touching anything else, or another wall of what it
+    holds: in the hole of a ring a finger would meet the far side. A jaw that swings sweeps things aside on
+    its way, so there each amount has to be clear up to the last.
     """
-    robot = view.robot
-    wide = wide_at(robot, float(robot.closure(view.hand)))
-    found = [opened_about(robot, wide, spare) for spare in SPARES]
-    if standing_side(robot) is None:
-        return found[-1]
+    robot, closure = view.robot, float(view.robot.closure(view.hand))
+    if len(robot.tips) > TWO:
+        return robot.hand_open
     walls = _other_walls(view, target)
-    for k, hand in enumerate(found[1:]):
-        finder = view.finder(hand=hand, leave=Leave(hand={target}), closer=TOUCHING)
-        alone = HandCollisions(bodies_of(robot), hand, walls)
-        if not finder.collisions.free(finder.start) or not alone.free(view.tool):
-            return found[k]
-    return found[-1]
+    if standing_side(robot) is None:
+        hands = [robot.hand_position(np.array([share * closure])) for share in SHUT]
+        return next((hand for hand in hands[:-1] if _has_room(view, target, hand, walls)), hands[-1])
+    found = [opened_about(robot, wide_at(robot, closure), spare) for spare in SPARES]
+    clear = itertools.takewhile(lambda hand: _has_room(view, target, hand, walls), found[1:])
+    return [found[0], *clear][-1]
+
+
+def _has_room(view: WorldView, target: str, hand: Array, walls: list[Thing]) -> bool:
+    """The hand touches nothing where it is, if it is open so far, save the object and what that is about."""
+    finder = view.finder(hand=hand, leave=Leave(hand={target}), closer=TOUCHING)
+    if not finder.collisions.free(finder.start):
+        return False
+    return not walls or HandCollisions(bodies_of(view.robot), hand, walls).free(view.tool)
 
 
 def _other_walls(view: WorldView, target: str) -> list[Thing]:
-    """The pieces of what is held that the hand is not at."""
-    bodies = bodies_of(view.robot)
-    pieces = [Thing(target, view.objects[target], pieces=[p]) for p in pieces_of(view.model(target))]
-    away = [HandCollisions(bodies, view.hand, [replace(p, margin=AT)]).free(view.tool) for p in pieces]
-    return [piece for piece, is_away in zip(pieces, away, strict=True) if is_away]
+    """The pieces of what is held that the hand is not at, and a little more about them."""
+    bodies, solid = bodies_of(view.robot), pieces_of(view.model(target))
+    if len(solid) == 1:
+        return []
+    pieces = [Thing(target, view.objects[target], pieces=[piece], margin=AT) for piece in solid]
+    return [piece for piece in pieces if HandCollisions(bodies, view.hand, [piece]).free(view.tool)]

@@ -9,12 +9,14 @@ R. Culley, "Determining the minimum translational distance between two convex po
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import coal
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.sapien_world import array
 from bt_tasksim.scene.hulls import convex
 
@@ -36,6 +38,38 @@ def least_overlap(contact: physx.PhysxContact, said: float, step: float) -> floa
     pairs = list(zip(contact.bodies, contact.shapes, strict=True))
     deepest = max(_deep(solids, [_placement(*pair, back) for pair in pairs]) for back in (0.0, step))
     return min(said, deepest)
+
+
+@dataclass(frozen=True)
+class Met:
+    """Where two shapes overlap most.
+
+    Attributes:
+        depth: Metres along the least way that parts them; negative where they are apart.
+        place: Middle of the overlap ``(3,)``, metres.
+        normal: That way ``(3,)``, of length one: from the first to the second.
+    """
+
+    depth: float
+    place: Array
+    normal: Array
+
+
+def deepest_place(contact: physx.PhysxContact) -> Met | None:
+    """Where the two shapes of a contact overlap most, as they are now.
+
+    Returns:
+        None for shapes that are neither boxes nor convex meshes.
+    """
+    solids = [_solid(shape) for shape in contact.shapes]
+    if any(solid is None for solid in solids):
+        return None
+    placed = [_placement(*pair, 0.0) for pair in zip(contact.bodies, contact.shapes, strict=True)]
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    request.enable_signed_distance = True
+    depth = -float(coal.distance(solids[0], placed[0], solids[1], placed[1], request, result))
+    place = 0.5 * (np.asarray(result.getNearestPoint1()) + np.asarray(result.getNearestPoint2()))
+    return Met(depth, place, np.asarray(result.normal, float))
 
 
 def _deep(solids: Sequence[Any], placed: Sequence[Any]) -> float:

@@ -11,6 +11,7 @@ from bt_tasksim.engines.physics.layout import body_column
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import Robot
+from bt_tasksim.engines.physics.sapien_sinking import stop_sinking
 from bt_tasksim.engines.physics.sapien_world import DAMPING, PARTING, World, floats
 from bt_tasksim.engines.physics.threaded import FALLING
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -176,6 +177,7 @@ class SapienWorld:
             for _ in range(finer):
                 if self._disturbance.pushing:
                     self._push()
+                stop_sinking(world, moving)
                 self._step(self._last_dt)
                 if last:
                     self._feel_wrist()
