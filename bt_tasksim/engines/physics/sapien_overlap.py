@@ -17,7 +17,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
-from bt_tasksim.engines.physics.sapien_world import array
+from bt_tasksim.engines.physics.sapien_world import array, floats
 from bt_tasksim.scene.hulls import convex
 
 if TYPE_CHECKING:
@@ -55,16 +55,30 @@ class Met:
     normal: Array
 
 
-def deepest_place(contact: physx.PhysxContact) -> Met | None:
+Solids = dict[Any, tuple[Any, Any] | None]
+"""By shape: coal's, and its place in its body; None for those that are neither boxes nor convex meshes."""
+
+
+def deepest_place(contact: physx.PhysxContact, known: Solids) -> Met | None:
     """Where the two shapes of a contact overlap most, as they are now.
+
+    Args:
+        contact: The contact.
+        known: What is known already of some shapes; more is added.
 
     Returns:
         None for shapes that are neither boxes nor convex meshes.
     """
-    solids = [_solid(shape) for shape in contact.shapes]
-    if any(solid is None for solid in solids):
-        return None
-    placed = [_placement(*pair, 0.0) for pair in zip(contact.bodies, contact.shapes, strict=True)]
+    solids, placed = [], []
+    for body, shape in zip(contact.bodies, contact.shapes, strict=True):
+        if shape not in known:
+            solid = _solid(shape)
+            known[shape] = None if solid is None else (solid, _transform(array(shape.local_pose)))
+        found = known[shape]
+        if found is None:
+            return None
+        solids.append(found[0])
+        placed.append(_transform(floats(body.entity_pose)) * found[1])
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     request.enable_signed_distance = True
     depth = -float(coal.distance(solids[0], placed[0], solids[1], placed[1], request, result))
@@ -98,4 +112,10 @@ def _placement(body: physx.PhysxRigidBaseComponent, shape: physx.PhysxCollisionS
             [pose[:3] - back * np.asarray(body.linear_velocity, float), poses.quat_multiply(turn, pose[3:])]
         )
     placed = poses.multiply(pose, array(shape.local_pose))
-    return coal.Transform3s(poses.to_matrix(placed[3:]), placed[:3].copy())
+    return _transform(placed)
+
+
+def _transform(pose: Sequence[float] | Array) -> Any:
+    x, y, z, *turn = (float(v) for v in pose)
+    w, i, j, k = turn
+    return coal.Transform3s(coal.Quaternion(w, i, j, k), np.array([x, y, z]))

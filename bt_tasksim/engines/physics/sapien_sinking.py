@@ -10,14 +10,14 @@ simulation of non-penetrating rigid bodies", SIGGRAPH 1989, with several contact
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
-from bt_tasksim.engines.physics.sapien_overlap import deepest_place
+from bt_tasksim.engines.physics.sapien_overlap import Solids, deepest_place
 from bt_tasksim.engines.physics.sapien_world import World, array
 
 if TYPE_CHECKING:
@@ -25,39 +25,63 @@ if TYPE_CHECKING:
 
 SUNK = 0.0008
 """Metres of overlap from which on things are stopped: PhysX itself keeps what it stops well below that."""
+FAR = 1.0
+"""Metres that stand for shapes of which nobody knows how deep they are in each other."""
 
 
-def stop_sinking(world: World, moving: Collection[int]) -> None:
-    """Stop what overlaps something and still sinks into it, in its velocity for the steps to come.
+class Sinking:
+    """Watches things that move, for some steps.
+
+    PhysX's own word is no help: of a box that is in a wall it may say that they are centimetres apart. So all
+    within its reach are looked at, each again once they can have gone the way that was between them.
 
     Args:
         world: The world.
-        moving: Indices of the objects that are looked at.
+        moving: Indices of the objects that are watched.
+        known: What is known already of their shapes.
     """
-    for contact in world.system.get_contacts():
-        kinds = [world.bodies.get(body, ("", -1)) for body in contact.bodies]
-        if any(kind not in ("object", "fixture") for kind, _ in kinds):
-            continue
-        if not any(kind == "object" and k in moving for kind, k in kinds):
-            continue
-        if min(point.separation for point in contact.points) > 0.0:  # along its own normal it may be little
-            continue
-        met = deepest_place(contact)
-        if met is not None and met.depth > SUNK:
-            _stop(world, contact, met.place, met.normal)
+
+    def __init__(self, world: World, moving: Collection[int], known: Solids) -> None:
+        self._world, self._moving, self._known = world, moving, known
+        self._apart: dict[tuple[object, object], float] = {}  # metres, by pair of shapes
+
+    def stop(self, way: float) -> None:
+        """Stop what overlaps something and still sinks into it, in its velocity for the steps to come.
+
+        Args:
+            way: Metres that surfaces have neared each other at most since this was called last.
+        """
+        world, sunk = self._world, []
+        for contact in world.system.get_contacts():
+            kinds = [world.bodies.get(body, ("", -1)) for body in contact.bodies]
+            if any(kind not in ("object", "fixture") for kind, _ in kinds):
+                continue
+            if not any(kind == "object" and k in self._moving for kind, k in kinds):
+                continue
+            first, second = contact.shapes
+            apart = self._apart.get((first, second), 0.0) - way
+            if apart <= 0.0:
+                met = deepest_place(contact, self._known)
+                apart = FAR if met is None else -met.depth
+                if met is not None and met.depth > SUNK:
+                    sunk.append((met, contact.bodies))
+            self._apart[first, second] = apart
+        # PhysX lists contacts in an order of its own, on which nothing may depend.
+        for met, bodies in sorted(sunk, key=lambda each: -each[0].depth):
+            _stop(world, bodies, met.place, met.normal)
 
 
-def _stop(world: World, contact: physx.PhysxContact, place: Array, normal: Array) -> None:
+def _stop(world: World, bodies: Sequence[physx.PhysxRigidBaseComponent], place: Array, normal: Array) -> None:
     """Take from two bodies the speed at which they near each other at a place.
 
     Args:
         world: The world.
-        contact: The contact of the two.
+        bodies: The two.
         place: Where ``(3,)``, metres.
         normal: Along which direction ``(3,)``, from the first to the second.
     """
     nearing, mobility, loose = 0.0, 0.0, []
-    for body, sign in zip(contact.bodies, (1.0, -1.0), strict=True):
+    for body, sign in zip(bodies, (1.0, -1.0), strict=True):
         kind, k = world.bodies[body]
         if kind != "object":
             continue

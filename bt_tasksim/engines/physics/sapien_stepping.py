@@ -9,9 +9,10 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.layout import body_column
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
+from bt_tasksim.engines.physics.sapien_overlap import Solids
 from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import Robot
-from bt_tasksim.engines.physics.sapien_sinking import stop_sinking
+from bt_tasksim.engines.physics.sapien_sinking import Sinking
 from bt_tasksim.engines.physics.sapien_world import DAMPING, PARTING, World, floats
 from bt_tasksim.engines.physics.threaded import FALLING
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -89,6 +90,7 @@ class SapienWorld:
             articulation.get_link_incoming_joint_forces,
         )
         self._frames = [link.get_entity_pose for link in robot.frames]
+        self._solids: Solids = {}
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
 
@@ -166,18 +168,17 @@ class SapienWorld:
         world, reader = self.world, self._reader
         for body in world.objects:
             body.set_max_depenetration_velocity(PARTING_FINELY)
+        sinking = Sinking(world, moving, self._solids)
         for _ in range(FLYING):
             self._look_down()
-            finer = 1
-            if reader.within_reach(moving):
-                way = max(self._speed(k) for k in moving) * self._dt / FLYING
-                finer = max(1, math.ceil(way / STRIDE))
+            way = max(self._speed(k) for k in moving) * self._dt / FLYING
+            finer = max(1, math.ceil(way / STRIDE)) if reader.within_reach(moving) else 1
             self._last_dt = self._dt / (FLYING * finer)
             world.scene.set_timestep(self._last_dt)
             for _ in range(finer):
                 if self._disturbance.pushing:
                     self._push()
-                stop_sinking(world, moving)
+                sinking.stop(2.0 * way / finer)
                 self._step(self._last_dt)
                 if last:
                     self._feel_wrist()
