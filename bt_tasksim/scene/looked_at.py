@@ -7,6 +7,7 @@ from typing import Any
 
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import ObjectModel
+from bt_tasksim.scene.geometry import Shape
 from bt_tasksim.scene.outlines import Slab
 from bt_tasksim.scene.relations import FinalState
 
@@ -51,6 +52,10 @@ class WatchedState(FinalState):
     def parts(self, name: str) -> tuple[Slab, ...]:
         """See `FinalState.parts`."""
         return self._noted(name).parts(name)
+
+    def shape(self, name: str) -> Shape:
+        """See `FinalState.shape`."""
+        return self._noted(name).shape(name)
 
     def touched(self, name: str) -> bool:
         """See `FinalState.touched`."""

@@ -61,8 +61,11 @@ class FinalState:
 
     def parts(self, name: str) -> tuple[Slab, ...]:
         """The convex pieces of an object from above, where it is."""
-        actor = self.configuration.objects[self.world.object_index(name)]
-        return slabs(actor.shape().collision, self.pose(name))
+        return slabs(self.shape(name).collision, self.pose(name))
+
+    def shape(self, name: str) -> Shape:
+        """The shape of an object, in its own frame."""
+        return self.configuration.objects[self.world.object_index(name)].shape()
 
     def outline(self, name: str) -> Array:
         """Outline ``(n, 2)`` from above of an object where it is, or of a place, robot base frame, metres."""
@@ -138,7 +141,7 @@ class _Truth(Whereabouts):
     def body(self, name: str) -> PlacedObject:
         """See `Whereabouts.body`."""
         cubic = np.array([self._final.model(name).cubic])
-        return PlacedObject(self._final.pose(name)[None], self._shape(name).outer[None], cubic)
+        return PlacedObject(self._final.pose(name)[None], self._final.shape(name).outer[None], cubic)
 
     def surface(self, name: str) -> LevelSurface:
         """See `Whereabouts.surface`."""
@@ -151,14 +154,11 @@ class _Truth(Whereabouts):
     def hollow(self, name: str) -> Hollow:
         """See `Whereabouts.hollow`."""
         if name in self.bodies:
-            boxes = self._shape(name).hollow
+            boxes = self._final.shape(name).hollow
             return Hollow(self._final.pose(name)[None], boxes[None] if len(boxes) else np.array([[NOTHING]]))
         place, surface = self._final.place(name), self.surface(name)
         height = np.array([[0.0, place.height]])
         return Hollow(surface.frame, np.concatenate([surface.centre, surface.half, height], axis=1)[None])
-
-    def _shape(self, name: str) -> Shape:
-        return self._final.configuration.objects[self._final.world.object_index(name)].shape()
 
 
 @dataclass(frozen=True)

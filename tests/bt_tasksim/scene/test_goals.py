@@ -158,11 +158,18 @@ def red_is_there_by_the_arrays(final):
     return bool(final.hidden.objects[0, 0] > 0.0)
 
 
+def red_is_whole(final):
+    """By the laws that trees and goals share, which ask about one body at a time."""
+    where = final.whereabouts
+    return bool((where.body("red").pose[:, 2] > 0.0).all() and (where.hollow("red").boxes.shape[-1] == 6))
+
+
 @pytest.mark.parametrize("moved", [AWAY, OVER])
 def test_what_no_function_looks_at_is_knocked_over(moved):
     assert verdict([red_is_there], {}).success
     assert verdict([red_is_there], {"red": poses.pose([0.7, 0.1, 0.025])}).success
     assert verdict([red_is_there], moved).reason == "knocked_over"
+    assert verdict([red_is_whole], moved).reason == "knocked_over"
     assert verdict([red_is_there, lambda final: final.touched("green") or True], moved).success
     assert verdict([red_is_there, Goal("green", "table", position_tolerance=1.0)], AWAY).success
     assert verdict([red_is_there_by_the_arrays], moved).success  # nobody knows what it looks at
