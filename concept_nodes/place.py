@@ -100,6 +100,8 @@ long: a hand that has just come to rest shakes, and so does what it holds."""
 ROOMS = ((PUT_DOWN, 0.0), (TOUCHING, 0.0), (TOUCHING, DROPPED))
 """What is tried one after the other: how much closer than usual one may come to things, and metres above its
 support where the way may end."""
+HIGHER = ((TOUCHING, 0.012), (TOUCHING, 0.024))
+"""The same before a way around is looked for: fingers beside the rim of a tray have no room any lower."""
 OTHERS = 8
 """Rotations in which an object may stand, too, that are tried where it cannot come down as it is held."""
 SLOWLY, GENTLY = 0.02, 0.4
@@ -288,16 +290,21 @@ class Place(ConceptModel[PlaceMemory]):
     def _found(self, view: WorldView, goal: Array) -> tuple[Array, Route]:
         """The tool pose ``(7,)`` to go to, and the way; turned by its symmetry, or tipped, where need be.
 
+        A way around is the last resort: to come down a little aside, or turned, or to let go a little higher,
+        is much shorter, and nothing is scraped on the way.
+
         Raises:
             NoWayError: There is none; says what would touch what as it is held now.
         """
-        try:
-            return goal, self._down(view, goal)
-        except NoWayError:
-            for other in self._other_ends(view):
+        others: list[Array] = []
+        for rooms, around in ((ROOMS, False), (HIGHER, False), (ROOMS, True)):
+            with suppress(NoWayError):
+                return goal, self._down(view, goal, rooms, around)
+            others = others or list(self._other_ends(view))
+            for other in others:
                 with suppress(NoWayError):
-                    return other, self._down(view, other)
-            raise
+                    return other, self._down(view, other, rooms, around)
+        return goal, self._down(view, goal, ROOMS, around=True)
 
     def _other_ends(self, view: WorldView) -> Array:
         """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first.
@@ -321,8 +328,16 @@ class Place(ConceptModel[PlaceMemory]):
         tried = np.concatenate([options[1 : 1 + OTHERS], aside[nearest], leaning])
         return poses.multiply(tried, grip[None]) + self.overshoot * self._along
 
-    def _down(self, view: WorldView, goal: Array) -> Route:
-        """The way down to a tool pose ``(7,)``: straight where the arm can go straight, else as it can.
+    def _down(
+        self, view: WorldView, goal: Array, rooms: Sequence[tuple[float, float]], around: bool
+    ) -> Route:
+        """The way down to a tool pose ``(7,)``: straight, or ``around`` what is in the way.
+
+        Args:
+            view: The world.
+            goal: The pose.
+            rooms: What is tried, see `ROOMS`.
+            around: It need not be straight.
 
         Raises:
             NoWayError: There is none; says what would touch what.
@@ -331,15 +346,21 @@ class Place(ConceptModel[PlaceMemory]):
         def find(room: tuple[float, float, float]) -> Route:
             closer, above, leans = room
             end = goal - (self.overshoot + above) * self._along
-            return self._down_to(view, end, closer, None if above else goal, leans)
+            return self._down_to(view, end, closer, None if above else goal, leans, around)
 
-        slanted = ROOMS if len(view.arm) < FULL else ()
+        slanted = rooms if len(view.arm) < FULL else ()
         return with_room(
-            [*((*room, LEANS) for room in ROOMS), *((*room, SET_DOWN) for room in slanted)], find
+            [*((*room, LEANS) for room in rooms), *((*room, SET_DOWN) for room in slanted)], find
         )
 
     def _down_to(
-        self, view: WorldView, standing: Array, closer: float, deeper: Array | None, leans: float
+        self,
+        view: WorldView,
+        standing: Array,
+        closer: float,
+        deeper: Array | None,
+        leans: float,
+        around: bool,
     ) -> Route:
         """The way to a tool pose ``(7,)`` in which the object stands, and on to a deeper one, if any.
 
@@ -349,12 +370,15 @@ class Place(ConceptModel[PlaceMemory]):
             closer: How much closer than usual one may come to things.
             deeper: A deeper one ``(7,)``.
             leans: Radians by which an arm of few joints may turn its tool from them.
+            around: It need not be straight.
         """
         leave = Leave(held=self._supports(view))
         finder = view.finder([self.target], held=view.held(self.target), leave=leave, closer=closer)
         pace = Pace(self.speed, acceleration=ACCELERATION)
-        straight = finder.straight([view.tool, standing], spacing=0.02, leans=leans)
-        if straight is not None:
+        if not around:
+            straight = finder.straight([view.tool, standing], spacing=0.02, leans=leans)
+            if straight is None:
+                raise NoWayError(f"no way straight down {self._where}")
             way = np.concatenate([finder.start[None], straight])
         else:
             pace = Pace(AROUND)
@@ -488,7 +512,15 @@ class Place(ConceptModel[PlaceMemory]):
         return xp.where(self._supported(seen, memory), memory.progress, on)
 
     def _supported(self, seen: Seen, memory: PlaceMemory) -> Array:
-        return (self._force(seen) - memory.baseline > self.press) & (seen.elapsed > 0.25)
+        """The support is felt; not on a way around, where forces change as the arm turns, and it is aside."""
+        felt = (self._force(seen) - memory.baseline > self.press) & (seen.elapsed > 0.25)
+        return felt & ~((searched_for(memory.path) > 0.0) & (self._aside(seen) > MISSED))
+
+    def _aside(self, seen: Seen) -> Array:
+        """How far ``(N,)`` the object is beside where it should stand, metres."""
+        off = self._standing(seen)[:, :3] - seen.object(self.target)[:, :3]
+        d = poses.constant(self.direction, seen.tool)
+        return poses.norm(off - poses.dot(off, d)[:, None] * d)
 
     def _above(self, seen: Seen) -> Array:
         """How far ``(N,)`` the object is above where it should stand, metres."""
