@@ -28,7 +28,7 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
-from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, DROPPED, NARROWLY, TOUCHING, with_room
+from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, DROPPED, HIGHER, NARROWLY, TOUCHING, with_room
 from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, resting_place
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.spots import GAP, Spots, spots_beside, spots_on
@@ -78,6 +78,8 @@ SLANTED = (CARRIED, 1.0, BROUGHT, 0.0), (BROUGHT, SLOWER, TOUCHING, 0.0)
 slanted."""
 TIPPING = ((BROUGHT, SLOWER, TOUCHING, DROPPED),)
 """The same for other arms, which lean it on purpose, see `tipped`."""
+FROM_HIGHER = tuple((BROUGHT, SLOWER, TOUCHING, above) for above in HIGHER)
+"""The same at last: it falls a little when it is let go."""
 SPOT_ROOMS = (CARRIED, CARRIED), (CARRIED, BROUGHT), (BROUGHT, BROUGHT), (BROUGHT, TOUCHING)
 """The same two closenesses over and on free spots, for all of which one is tried before the next."""
 LOWER = (1.0, 0.4, 0.15)
@@ -413,6 +415,8 @@ def _found(
         tried += [(goals, *room, SET_DOWN) for room in SLANTED]
     elif leaning is not None:
         tried += [(leaning, *room, SET_DOWN) for room in TIPPING]
+    if goals.floor is not None:
+        tried += [(goals, *room, LEANS) for room in FROM_HIGHER]
     return with_room(tried, find)
 
 

@@ -28,7 +28,7 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
-from bt_tasksim.concept_nodes.closer import DROPPED, PUT_DOWN, TOUCHING, with_room
+from bt_tasksim.concept_nodes.closer import DROPPED, HIGHER, PUT_DOWN, TOUCHING, with_room
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
@@ -100,8 +100,8 @@ long: a hand that has just come to rest shakes, and so does what it holds."""
 ROOMS = ((PUT_DOWN, 0.0), (TOUCHING, 0.0), (TOUCHING, DROPPED))
 """What is tried one after the other: how much closer than usual one may come to things, and metres above its
 support where the way may end."""
-HIGHER = ((TOUCHING, 0.012), (TOUCHING, 0.024))
-"""The same before a way around is looked for: fingers beside the rim of a tray have no room any lower."""
+FROM_HIGHER = tuple((TOUCHING, above) for above in HIGHER)
+"""The same after that."""
 OTHERS = 8
 """Rotations in which an object may stand, too, that are tried where it cannot come down as it is held."""
 SLOWLY, GENTLY = 0.02, 0.4
@@ -297,7 +297,7 @@ class Place(ConceptModel[PlaceMemory]):
             NoWayError: There is none; says what would touch what as it is held now.
         """
         others: list[Array] = []
-        for rooms, around in ((ROOMS, False), (HIGHER, False), (ROOMS, True)):
+        for rooms, around in ((ROOMS, False), (FROM_HIGHER, False), (ROOMS, True)):
             with suppress(NoWayError):
                 return goal, self._down(view, goal, rooms, around)
             others = others or list(self._other_ends(view))
