@@ -28,8 +28,8 @@ TOUCHING = 1.0
 DROPPED = 0.006
 """Metres that something may fall when it is let go, where a hand cannot come down all the way."""
 HIGHER = (0.012, 0.024)
-"""The same before it is given up, or a way around is looked for: what has turned in the hand, or stands next to
-a rim, leaves the fingers no room any lower."""
+"""The same before it is given up, or a way around is looked for: what has turned in the hand, or stands next
+to a rim, leaves the fingers no room any lower."""
 VERY_CLOSE = 0.9
 """At a grasp where nothing else serves."""
 ROOMS = (0.4, 0.8, 1.0)
