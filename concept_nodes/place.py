@@ -130,12 +130,14 @@ class PlaceMemory(NamedTuple):
         baseline: Force ``(N,)`` against the direction of placing when it began, N.
         felt: Ticks ``(N,)`` in a row with the support's force.
         progress: Seconds ``(N,)`` of the path that have been commanded.
+        around: Booleans ``(N,)``: the path does not lead straight there.
     """
 
     path: Path
     baseline: Array
     felt: Array
     progress: Array
+    around: Array
 
 
 @register("concept")
@@ -255,13 +257,14 @@ class Place(ConceptModel[PlaceMemory]):
             place._found(view, goals[k])
             for k, (place, view) in enumerate(zip(self._by_world(seen), views(seen), strict=True))
         ]
-        routes = {k: [route] for k, (_, route) in enumerate(found)}
-        tool_goal = poses.constant(np.array([goal for goal, _ in found]), now)
+        routes = {k: [route] for k, (_, route, _) in enumerate(found)}
+        tool_goal = poses.constant(np.array([goal for goal, _, _ in found]), now)
+        around = xp.asarray([around for _, _, around in found], device=now.device)
         path = plan([seen.tool, tool_goal], self.speed, samples=SAMPLES)
         path = with_routes(path, routes, len(seen.robot.arm_joints))
         nothing = xp.zeros_like(path.duration)
         felt = xp.astype(nothing, xp.int64)
-        return PlaceMemory(path, self._force(seen), felt, nothing - seen.world.control_period)
+        return PlaceMemory(path, self._force(seen), felt, nothing - seen.world.control_period, around)
 
     def _by_world(self, seen: Seen) -> list[Place]:
         """The same in each world, with the place that is below named."""
@@ -287,8 +290,10 @@ class Place(ConceptModel[PlaceMemory]):
             return straight_down(frame, now, model, edges(seen, self.on))
         return standing_pose(frame, now, model)
 
-    def _found(self, view: WorldView, goal: Array) -> tuple[Array, Route]:
-        """The tool pose ``(7,)`` to go to, and the way; turned by its symmetry, or tipped, where need be.
+    def _found(self, view: WorldView, goal: Array) -> tuple[Array, Route, bool]:
+        """The tool pose ``(7,)`` to go to, the way, and whether it leads around something.
+
+        The object is turned by its symmetry, or tipped, where need be.
 
         A way around is the last resort: to come down a little aside, or turned, or to let go a little higher,
         is much shorter, and nothing is scraped on the way.
@@ -299,12 +304,12 @@ class Place(ConceptModel[PlaceMemory]):
         others: list[Array] = []
         for rooms, around in ((ROOMS, False), (FROM_HIGHER, False), (ROOMS, True)):
             with suppress(NoWayError):
-                return goal, self._down(view, goal, rooms, around)
+                return goal, self._down(view, goal, rooms, around), around
             others = others or list(self._other_ends(view))
             for other in others:
                 with suppress(NoWayError):
-                    return other, self._down(view, other, rooms, around)
-        return goal, self._down(view, goal, ROOMS, around=True)
+                    return other, self._down(view, other, rooms, around), around
+        return goal, self._down(view, goal, ROOMS, around=True), True
 
     def _other_ends(self, view: WorldView) -> Array:
         """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first.
@@ -514,7 +519,7 @@ class Place(ConceptModel[PlaceMemory]):
     def _supported(self, seen: Seen, memory: PlaceMemory) -> Array:
         """The support is felt; not on a way around, where forces change as the arm turns, and it is aside."""
         felt = (self._force(seen) - memory.baseline > self.press) & (seen.elapsed > 0.25)
-        return felt & ~((searched_for(memory.path) > 0.0) & (self._aside(seen) > MISSED))
+        return felt & ~(memory.around & (self._aside(seen) > MISSED))
 
     def _aside(self, seen: Seen) -> Array:
         """How far ``(N,)`` the object is beside where it should stand, metres."""

@@ -10,6 +10,7 @@ from py_trees.common import Status
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Bring, Place
 from bt_tasksim.concept_nodes.bring import _Goals, standing_pose
+from bt_tasksim.concept_nodes.closer import HIGHER
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.concept_nodes.standing import ASIDE, FARTHER
 from bt_tasksim.concept_nodes.view import views
@@ -66,7 +67,7 @@ def test_above_another_object_and_to_a_position(toy):
     assert status == Status.SUCCESS and np.allclose(cup[:3], [0.5, 0.1, 0.4], atol=1e-3)
 
 
-@pytest.mark.parametrize(("lower", "fits"), [(0.0, False), (0.04, True)])
+@pytest.mark.parametrize(("lower", "fits"), [(0.0, False), (0.07, True)])
 @pytest.mark.parametrize("hover", [0.04, 0.12])
 def test_how_far_it_goes_down_follows_from_where_the_object_is_in_the_hand(toy, lower, fits, hover):
     """Between ribs that are lower than the object there is room for it, and for a hand that holds it high."""
@@ -74,7 +75,7 @@ def test_how_far_it_goes_down_follows_from_where_the_object_is_in_the_hand(toy, 
     stage = toy(sequence("put down", leaf, Place("cup", on="goal")))
     model = stage.world.model
     goal, cup = model.place("goal").pose, model.object("cup").extent
-    middle = goal[2] + cup[2] / 2
+    middle = goal[2] + cup[2] / 2 + HIGHER[-1]  # from higher it may fall
     inner, outer = cup[0] / 2 + 0.012, cup[0] / 2 + 0.1
     ribs = [
         Obstacle(

@@ -8,6 +8,7 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Place
+from bt_tasksim.concept_nodes.closer import DROPPED
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.concept_nodes.limits import FAR, gentler
 from bt_tasksim.concept_nodes.place import (
@@ -27,7 +28,7 @@ from bt_tasksim.concept_nodes.place import (
     UNSURE,
 )
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.errors import InputError, NoWayError
 from bt_tasksim.core.outcomes import CANNOT_START, DONE, NO_WAY
 from bt_tasksim.core.world import Obstacle
 from bt_tasksim.planning.reference_motion import sample
@@ -365,3 +366,44 @@ def test_a_hard_force_is_felt_at_once(toy, newtons, ticks):
     stage.look()
     seen = stage.context.seen(ONE, np.ones(1))
     assert model.advance(None, seen, memory).felt[0] == ticks
+
+
+@pytest.mark.parametrize(
+    ("serves", "tried"),
+    [
+        (lambda above, around, turned: not around and above <= DROPPED and not turned, 1),
+        (lambda above, around, turned: not around and above <= DROPPED and turned, 2),
+        (lambda above, around, turned: not around and above > DROPPED, 3),
+        (lambda above, around, turned: around, 5),
+    ],
+)
+def test_it_comes_down_aside_or_lets_go_higher_before_it_goes_around(toy, monkeypatch, serves, tried):
+    """As it is held and then otherwise: straight, from a little higher, and only then around something."""
+    stage = held(toy, Place("cup", on="goal"))
+    model, goals, asked = stage.tree.model, [np.zeros(7), np.ones(7)], []
+    monkeypatch.setattr(type(model), "_other_ends", lambda self, view: goals[1:])
+
+    def down(self, view, goal, rooms, around):
+        asked.append((max(above for _, above in rooms), around))
+        if serves(max(above for _, above in rooms), around, goal[0] > 0.5):
+            return "a way"
+        raise NoWayError("no way")
+
+    monkeypatch.setattr(type(model), "_down", down)
+    _, way, around = model._found(None, goals[0])
+    assert way == "a way" and len(asked) == tried and around == (tried == 5)
+
+
+@pytest.mark.parametrize(("around", "felt"), [(False, 1), (True, 0)])
+def test_on_a_way_around_nothing_bears_it_that_is_aside(toy, around, felt):
+    stage = held(toy, Place("cup", on="goal"))
+    stage.tick(10)
+    model = stage.tree.model
+    memory = model.begin(stage.context.seen(ONE, np.zeros(1)))._replace(around=np.array([around]))
+    for aside, ticks in ((MISSED + 0.01, felt), (0.0, 1)):
+        objects = stage.world.now.objects.copy()
+        objects[0, :2] = stage.world.model.place("goal").pose[:2] + np.array([aside, 0.0])
+        stage.world.put(objects=objects, wrench=np.array([0.0, 0.0, -4.0, 0.0, 0.0, 0.0]))
+        stage.look()
+        seen = stage.context.seen(ONE, np.ones(1))
+        assert model.advance(None, seen, memory).felt[0] == ticks
