@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -373,12 +372,10 @@ class Grasp(ConceptModel[GraspMemory]):
         tried = rooms(view.robot, goes_aside(aims))
         try:
             return with_room(tried, find)
-        except NoWayError as error:
+        except NoWayError:
             if not thorough(view.robot):
                 raise
-            with suppress(NoWayError):
-                return find(tried[-1], thoroughly=True)
-            raise error
+        return find(tried[-1], thoroughly=True)
 
     def _as_given(self, tools: Array, view: WorldView) -> Array:
         """Whether ``(k,)`` tools ``(k, 7)`` have the approach and the closing axis that the author gave."""

@@ -18,7 +18,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from bt_tasksim.concept.aim import Aim
-from bt_tasksim.concept_nodes.closer import ROOMS
+from bt_tasksim.concept_nodes.closer import HIGHER, ROOMS
 from bt_tasksim.concept_nodes.grasp_candidates import HOLLOW, Candidates
 from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, TWO, Firm, deeper
 from bt_tasksim.concept_nodes.grasp_opening import Opening, wide_along
@@ -58,6 +58,7 @@ ENOUGH = 3
 FROM_GRIP = 0.018
 """Metres that the usual grasp of a simple solid may be from a known grip of it; farther off, fingers that
 close on a rounded side squeeze it out."""
+UP = np.array([0.0, 0.0, 1.0])
 STILL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 SAME_GRIP = (0.012, 0.02, 0.96)
 """Metres aside of a known grip, metres along its closing axis, and the cosine of the angle between the axes,
@@ -143,7 +144,8 @@ class Chooser:
         firmly: Grasps that the fingers would hardly hold do not count.
         aside: It may be put down a little aside of where it should stand, see `Aim.aside`.
         thoroughly: Nothing has served: more grasps are asked, first those that the arm comes near to, and
-            to what follows with them; and a hand comes partly closed where it has no room wide open.
+            to what follows with them; a hand comes partly closed where it has no room wide open; and with the
+            least room it may let go a little above where the object should stand.
     """
 
     def __init__(
@@ -167,7 +169,10 @@ class Chooser:
         if close:
             self._pace = pace = Pace(SLOWER * pace.speed, acceleration=SLOWER**2 * pace.acceleration)
         around = _Around(view, target, closer)
-        self._aims = [_Served(around, aim, aside) for aim in reversed(aims)]  # the last one is the hardest
+        higher = thoroughly and closer == ROOMS[-1]
+        self._aims = [
+            _Served(around, aim, aside, higher) for aim in reversed(aims)
+        ]  # the last is the hardest
         self._why: Counter[str] = Counter()
         self._gently = pace._replace(acceleration=GENTLE)
 
@@ -510,9 +515,11 @@ class _Around:
 class _Served:
     """An aim that a grasp has to serve."""
 
-    def __init__(self, around: _Around, aim: Aim, aside: bool) -> None:
+    def __init__(self, around: _Around, aim: Aim, aside: bool, higher: bool) -> None:
         self._around, self._aim = around, aim
-        self._poses = aim.aside if aside and aim.aside is not None and len(aim.aside) else aim.poses
+        ends = aim.aside if aside and aim.aside is not None and len(aim.aside) else aim.poses
+        falls = (0.0, *HIGHER) if higher and not aim.on_the_way else (0.0,)
+        self._poses = np.concatenate([poses.shifted(ends, above * UP) for above in falls])
         self.words = aim.words
 
     def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
