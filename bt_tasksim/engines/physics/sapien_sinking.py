@@ -17,7 +17,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
-from bt_tasksim.engines.physics.sapien_overlap import Solids, deepest_place
+from bt_tasksim.engines.physics.sapien_overlap import Met, Solids, deepest_place
 from bt_tasksim.engines.physics.sapien_world import World, array
 
 if TYPE_CHECKING:
@@ -68,37 +68,40 @@ class Sinking:
             self._apart[first, second] = apart
         # PhysX lists contacts in an order of its own, on which nothing may depend.
         for met, bodies in sorted(sunk, key=lambda each: -each[0].depth):
-            _stop(world, bodies, met.place, met.normal)
+            without_nearing(world, bodies, met)
 
 
-def _stop(world: World, bodies: Sequence[physx.PhysxRigidBaseComponent], place: Array, normal: Array) -> None:
-    """Take from two bodies the speed at which they near each other at a place.
+def without_nearing(world: World, bodies: Sequence[physx.PhysxRigidBaseComponent], met: Met) -> None:
+    """Take from two bodies the speed at which they near each other where they meet.
 
     Args:
         world: The world.
-        bodies: The two.
-        place: Where ``(3,)``, metres.
-        normal: Along which direction ``(3,)``, from the first to the second.
+        bodies: The two, at least one of them an object. What is none goes on as it does.
+        met: Where they meet.
     """
     nearing, mobility, loose = 0.0, 0.0, []
     for body, sign in zip(bodies, (1.0, -1.0), strict=True):
-        kind, k = world.bodies[body]
-        if kind != "object":
-            continue
-        about = place - _centre(body)
-        inverse = _inverse_inertia(world, k)
-        turning = np.cross(about, normal)
-        nearing += sign * float(
-            np.asarray(body.linear_velocity) @ normal + np.asarray(body.angular_velocity) @ turning
-        )
-        mobility += 1.0 / body.mass + float(turning @ inverse @ turning)
-        loose.append((body, sign, inverse @ turning))
+        nearing += sign * float(_velocity_at(body, met.place) @ met.normal)
+        kind, k = world.bodies.get(body, ("", -1))
+        if kind == "object":
+            turning = np.cross(met.place - _centre(body), met.normal)
+            spin = _inverse_inertia(world, k) @ turning
+            mobility += 1.0 / body.mass + float(turning @ spin)
+            loose.append((body, sign, spin))
     if nearing <= 0.0:
         return
     impulse = nearing / mobility
     for body, sign, spin in loose:
-        body.set_linear_velocity(np.asarray(body.linear_velocity) - sign * impulse / body.mass * normal)
+        body.set_linear_velocity(np.asarray(body.linear_velocity) - sign * impulse / body.mass * met.normal)
         body.set_angular_velocity(np.asarray(body.angular_velocity) - sign * impulse * spin)
+
+
+def _velocity_at(body: physx.PhysxRigidBaseComponent, place: Array) -> Array:
+    """Velocity ``(3,)`` of a body's material at a place, m/s; none of what stands still."""
+    if not hasattr(body, "linear_velocity"):
+        return np.zeros(3)
+    about = place - _centre(body)
+    return np.asarray(body.linear_velocity) + np.cross(np.asarray(body.angular_velocity), about)
 
 
 def _centre(body: physx.PhysxRigidDynamicComponent) -> Array:

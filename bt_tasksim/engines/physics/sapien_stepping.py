@@ -10,6 +10,7 @@ from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.layout import body_column
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_overlap import Solids
+from bt_tasksim.engines.physics.sapien_phantoms import Phantoms
 from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import Robot
 from bt_tasksim.engines.physics.sapien_sinking import Sinking
@@ -38,6 +39,8 @@ table; and of 40 tasks with things of 10 to 50 g 37 are done with shorter steps 
 250 iterations instead."""
 ROLLING = 0.02
 """Speed in rad/s of an object that the hand does not touch, from which its supports resist rolling."""
+NEAR = 0.15
+"""Metres from the tool to an object's surface within which the hand may touch it in the next period."""
 WATCHED = 4
 """Control periods from the beginning, and after the hand closed fast or a contact came or went, in which
 overlaps are looked for at every step; at other times at the period's end."""
@@ -91,6 +94,7 @@ class SapienWorld:
         )
         self._frames = [link.get_entity_pose for link in robot.frames]
         self._solids: Solids = {}
+        self._phantoms, self._near = Phantoms(world, self._solids), list[int]()
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
 
@@ -161,7 +165,9 @@ class SapienWorld:
         """One step of PhysX so long, with what it does not know."""
         if self.robot.twist.holds:
             self.robot.twist.resist(seconds)
+        before = self._phantoms.look(self._near)
         self.world.system.step()
+        self._phantoms.undo(before, seconds)
 
     def _fine_steps(self, moving: list[int], last: bool) -> None:
         """One of the scene's steps, in shorter ones while these objects move; see `_usual_steps`."""
@@ -221,6 +227,9 @@ class SapienWorld:
             for k, body in enumerate(bodies):
                 out.objects[row, k] = floats(body.entity_pose)
                 out.linear[row, k], out.angular[row, k] = body.linear_velocity, body.angular_velocity
+        tool, radii = out.frames[row][0], self.world.radius
+        places = out.objects[row, : self.n_objects, :3]
+        self._near = [k for k, at in enumerate(places) if math.dist(at, tool[:3]) < radii[k] + NEAR]
 
     def _write_touch(self) -> None:
         out, row, n, now, before = self._readings, self._row, self.n_objects, self._touch, self._written
