@@ -326,7 +326,7 @@ class Mover:
         return found
 
     def _collisions(self, hand: Array, held: Held | None = None, target: bool = False) -> Collisions:
-        return Collisions(self._bodies, hand, self._all if target else self._others, held)
+        return Collisions(self._bodies, hand, self._all if target else self._others, held, own=0.0)
 
     def _postures(
         self, collisions: Collisions, tool: Array, most: int, depth: int, leans: float = TURNED

@@ -24,6 +24,8 @@ _POSTURES = 400
 """Random postures by which pairs of bodies are told apart."""
 _ALWAYS = 0.8
 """Share of them from which on two bodies touch by the way that they are built."""
+_AT_REST = 0.004
+"""Metres from each other within which two bodies in the rest posture count as touching."""
 _MOST_CORNERS = 200
 """Corners of a hull; of a finer one a sample is taken, with what it leaves out added around it."""
 
@@ -88,6 +90,7 @@ class RobotBodies:
             q = self.configuration(arm, robot.hand_open)
             pin.computeCollisions(self.model, data, shapes, found, q, False)
             touched += [result.isCollision() for result in found.collisionResults]
+        found.setSecurityMargins(shapes, np.full((shapes.ngeoms,) * 2, _AT_REST))
         pin.computeCollisions(
             self.model, data, shapes, found, self.configuration(robot.rest, robot.hand_open), False
         )

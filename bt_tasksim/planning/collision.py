@@ -12,6 +12,10 @@ from bt_tasksim.planning.lines import halves
 from bt_tasksim.planning.pairs import Pairs
 from bt_tasksim.planning.things import Held, Leave, Thing, Touch
 
+OWN = 0.002
+"""Metres: bodies have skins of half a millimetre in physics, and arms lag by some. An SO-100 that took a cube
+near its base with its jaw a millimetre from its own arm pressed on that with 180 N."""
+
 
 class Collisions:
     """A robot among things.
@@ -22,6 +26,7 @@ class Collisions:
         things: What stands around.
         held: What is in the hand, if anything.
         leave: What may touch.
+        own: Metres that the robot's own bodies keep from each other.
     """
 
     def __init__(
@@ -31,12 +36,13 @@ class Collisions:
         things: Sequence[Thing],
         held: Held | None = None,
         leave: Leave | None = None,
+        own: float = OWN,
     ) -> None:
         self._bodies, self._q = bodies, bodies.configuration(bodies.robot.rest, hand)
         self._arm = bodies.order[: len(bodies.robot.arm_joints)]
         self._pairs = Pairs(bodies.model, bodies.shapes.copy(), bodies.links, leave)
         inside = self._pairs.add_held(held, bodies.tool_joint, bodies.tool_placement)
-        self._pairs.compare(map(tuple, bodies.apart.tolist()))
+        self._pairs.compare(map(tuple, bodies.apart.tolist()), own)
         arm = [
             i
             for i in np.flatnonzero(~bodies.hand).tolist()

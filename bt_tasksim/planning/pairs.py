@@ -46,6 +46,7 @@ class Pairs:
         self._model, self._shapes, self._names, self._leave = model, shapes, list(names), leave or Leave()
         self._keys = list(self._names)
         self._compared: list[tuple[int, int]] = []
+        self._margins: dict[tuple[int, int], float] = {}
 
     def add(self, name: str, joint: int, placement: Any, shapes: Iterable[Any], key: str = "") -> range:
         """Add shapes that move with a joint; their numbers."""
@@ -87,13 +88,21 @@ class Pairs:
                 movers += held
             self.compare((i, k) for i in movers for k in solids)
 
-    def compare(self, pairs: Iterable[tuple[int, int]]) -> None:
-        """Compare pairs of shapes, by number, unless they may touch."""
+    def compare(self, pairs: Iterable[tuple[int, int]], margin: float = _TOUCHING) -> None:
+        """Compare pairs of shapes, by number, unless they may touch.
+
+        Args:
+            pairs: The pairs.
+            margin: Metres from each other within which they count as touching.
+        """
         left = set(self._leave.pairs)
         if left:
             names, keys = self._names, self._keys
             pairs = [(i, k) for i, k in pairs if not {(names[i], names[k]), (names[i], keys[k])} & left]
+        pairs = list(pairs)
         self._compared += pairs
+        if margin > _TOUCHING:
+            self._margins |= dict.fromkeys(pairs, margin)
 
     @cached_property
     def _work(self) -> _Work:
@@ -102,7 +111,10 @@ class Pairs:
         compared[tuple(np.sort(self._compared, axis=1).T) if self._compared else ([], [])] = True
         self._shapes.setCollisionPairs(compared)
         found = self._shapes.createData()
-        found.setSecurityMargins(self._shapes, np.full(compared.shape, _TOUCHING))
+        margins = np.full(compared.shape, _TOUCHING)
+        for (i, k), margin in self._margins.items():
+            margins[i, k] = margins[k, i] = margin
+        found.setSecurityMargins(self._shapes, margins)
         tree = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._model, self._shapes, found)
         return _Work(self._model.createData(), found, tree)
 

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from bt_tasksim.core import poses
 from bt_tasksim.planning.bodies import bodies_of
-from bt_tasksim.planning.collision import Collisions
+from bt_tasksim.planning.collision import OWN, Collisions
 from bt_tasksim.planning.things import Leave, Thing, box_corners
+from bt_tasksim.robot.description import load_robot
 
 
 def among(bench, *things, held=None, leave=None):
@@ -100,3 +101,16 @@ def test_what_is_held_counts_against_the_robots_base(panda):
     assert among(panda, held=panda.held()).free(q)
     wide = panda.held((1.2, 0.2, 0.9))  # so large that it reaches into the base
     assert any("panda_link0" in touch for touch in among(panda, held=wide).touches(q))
+
+
+@pytest.mark.parametrize("name", ["so100", "panda", "xarm7_ability"])
+def test_a_robot_keeps_a_little_room_from_itself(name):
+    robot = load_robot(name)
+    bodies = bodies_of(robot)
+    near, touching = (Collisions(bodies, robot.hand_open, [], own=own) for own in (OWN, 0.0))
+    drawn = np.random.default_rng(1).uniform(robot.arm_lower, robot.arm_upper, (1500, len(robot.rest)))
+    free = np.array([[near.free(q), touching.free(q)] for q in drawn])
+    assert near.free(robot.rest) and not (free[:, 0] & ~free[:, 1]).any()
+    only_near = np.flatnonzero(~free[:, 0] & free[:, 1])
+    assert len(only_near) > 0, "the margin tells none apart"
+    assert all(near.touches(q) and not touching.touches(q) for q in drawn[only_near])
