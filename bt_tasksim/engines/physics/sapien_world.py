@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import sapien
     from sapien import physx
 
-CONTACT_OFFSET = {"robot": 0.001, "object": 0.003, "fixture": 0.027}
+CONTACT_OFFSET = {"robot": 0.001, "object": 0.002, "fixture": 0.006}
 """Metres by body; PhysX looks for contacts of two bodies within the sum of theirs. It must exceed what a
 falling object covers in one step (2.2 m/s after 25 cm: 22 mm), or the object is stopped only inside."""
 LIGHT, MOST = 1.6, 60
