@@ -18,10 +18,11 @@ if TYPE_CHECKING:
     from sapien import physx
 
 CONTACT_OFFSET = {"robot": 0.001, "object": 0.003, "fixture": 0.004}
-"""Metres by body; PhysX looks for contacts of two bodies within the sum of theirs. It must exceed what a falling
-object covers in one of the shorter steps, in which it is looked at (2.2 m/s after 25 cm: 2.8 mm), or the object
-is stopped only inside; and of convex meshes that are farther apart PhysX makes up the more contacts, see
-`bt_tasksim.engines.physics.sapien_phantoms`: within 8 mm in 18 of 60 places, within 3 mm in 3."""
+"""Metres by body; PhysX looks for contacts of two bodies within the sum of theirs. It must exceed what a
+falling object covers in one of the shorter steps, in which it is looked at (2.2 m/s after 25 cm: 2.8 mm), or
+the object is stopped only inside; and of convex meshes that are farther apart PhysX makes up the more
+contacts, see `bt_tasksim.engines.physics.sapien_phantoms`: with 8 mm between them in 18 of 60 places, with
+3 mm in 3 of 60."""
 LIGHT, MOST = 1.6, 60
 """Kilograms times the solver's position iterations that a body needs between fingers that press with tens of
 newtons, and the most iterations. Boxes, cylinders and ovals of 60 g between the Panda's fingers sink in by
