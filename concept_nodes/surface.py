@@ -58,6 +58,8 @@ def straight_down(
 def upright(frame: Array, now: Array, cubic: Array | None = None) -> Array:
     """The rotations ``(N, 4)`` that set objects upright on surfaces by the shortest turn.
 
+    What is upside down is turned about its own x axis.
+
     Args:
         frame: Poses ``(N, 7)`` of the surfaces.
         now: Poses ``(N, 7)`` of the objects.
@@ -72,6 +74,9 @@ def upright(frame: Array, now: Array, cubic: Array | None = None) -> Array:
     small = length <= 1e-9
     angle = xp.atan2(length, poses.dot(up, should)) / xp.where(small, xp.ones_like(length), length)
     tilt = axis * xp.where(small, xp.zeros_like(length), angle)[:, None]
+    over = small & (poses.dot(up, should) < 0.0)
+    half = math.pi * poses.rotate(now[:, 3:], constant([1.0, 0.0, 0.0], now))
+    tilt = xp.where(over[:, None], half, tilt)
     return poses.quat_multiply(poses.from_rotation_vector(tilt), now[:, 3:])
 
 

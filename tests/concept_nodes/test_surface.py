@@ -11,7 +11,7 @@ from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.concept_nodes.bring import destination
 from bt_tasksim.concept_nodes.standing import reference_frame
-from bt_tasksim.concept_nodes.surface import heading_of, top_frame
+from bt_tasksim.concept_nodes.surface import heading_of, top_frame, upright
 from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
 from tests.array_libraries import agree
@@ -79,3 +79,14 @@ def test_a_cube_that_lies_on_another_face_carries_as_an_upright_one(toy, face):
     assert np.cos(4 * (heading_of(frame)[0] - 0.4)) == pytest.approx(1.0, abs=1e-6)
     view = views(seen)[0]
     assert np.allclose(reference_frame(view, "box")[0], frame[0], atol=1e-8)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.5, 2.0])
+@pytest.mark.parametrize("tilted", [0.0, 1.0, np.pi - 1e-3, np.pi])
+def test_whatever_was_tilted_is_set_upright_and_what_is_upside_down_too(heading, tilted):
+    axis = np.array([np.cos(heading), np.sin(heading), 0.0])
+    turn = poses.quat_multiply(poses.from_rotation_vector(tilted * axis), poses.yaw(heading))
+    now, frame = (poses.pose([0.0, 0.0, 0.05], rotation)[None] for rotation in (turn, poses.yaw(0.3)))
+    found = upright(frame, now)
+    assert poses.z_axis(found)[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
+    assert poses.angle_between(found, now[:, 3:])[0] == pytest.approx(tilted, abs=1e-6)

@@ -41,7 +41,7 @@ def least_overlap(contact: physx.PhysxContact, said: float, step: float) -> floa
 
 
 @dataclass(frozen=True)
-class Met:
+class DeepestPlace:
     """Where two shapes overlap most.
 
     Attributes:
@@ -59,7 +59,7 @@ Solids = dict[Any, tuple[Any, Any] | None]
 """By shape: coal's, and its place in its body; None for those that are neither boxes nor convex meshes."""
 
 
-def deepest_place(contact: physx.PhysxContact, known: Solids) -> Met | None:
+def deepest_place(contact: physx.PhysxContact, known: Solids) -> DeepestPlace | None:
     """Where the two shapes of a contact overlap most, as they are now.
 
     Args:
@@ -83,7 +83,7 @@ def deepest_place(contact: physx.PhysxContact, known: Solids) -> Met | None:
     request.enable_signed_distance = True
     depth = -float(coal.distance(solids[0], placed[0], solids[1], placed[1], request, result))
     place = 0.5 * (np.asarray(result.getNearestPoint1()) + np.asarray(result.getNearestPoint2()))
-    return Met(depth, place, np.asarray(result.normal, float))
+    return DeepestPlace(depth, place, np.asarray(result.normal, float))
 
 
 def _deep(solids: Sequence[Any], placed: Sequence[Any]) -> float:

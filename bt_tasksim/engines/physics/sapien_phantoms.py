@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bt_tasksim.core.poses import Array
-from bt_tasksim.engines.physics.sapien_overlap import Met, Solids, deepest_place
+from bt_tasksim.engines.physics.sapien_overlap import DeepestPlace, Solids, deepest_place
 from bt_tasksim.engines.physics.sapien_sinking import without_nearing
 from bt_tasksim.engines.physics.sapien_world import World
 
@@ -84,7 +84,9 @@ class Phantoms:
                 if true.depth > -TOUCHES:
                     without_nearing(self._world, bodies, true)
 
-    def _met(self, body: physx.PhysxRigidDynamicComponent) -> Iterator[tuple[bool, Met, Sequence[Any]]]:
+    def _met(
+        self, body: physx.PhysxRigidDynamicComponent
+    ) -> Iterator[tuple[bool, DeepestPlace, Sequence[Any]]]:
         """Of each contact that pushes an object: whether it is made up, what is true, and the bodies."""
         for contact in self._world.system.get_contacts():
             if not any(other == body for other in contact.bodies):

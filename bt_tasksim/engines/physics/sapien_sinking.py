@@ -17,7 +17,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
-from bt_tasksim.engines.physics.sapien_overlap import Met, Solids, deepest_place
+from bt_tasksim.engines.physics.sapien_overlap import DeepestPlace, Solids, deepest_place
 from bt_tasksim.engines.physics.sapien_world import World, array
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Sinking:
             without_nearing(world, bodies, met)
 
 
-def without_nearing(world: World, bodies: Sequence[physx.PhysxRigidBaseComponent], met: Met) -> None:
+def without_nearing(world: World, bodies: Sequence[physx.PhysxRigidBaseComponent], met: DeepestPlace) -> None:
     """Take from two bodies the speed at which they near each other where they meet.
 
     Args:

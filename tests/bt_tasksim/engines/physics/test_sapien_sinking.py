@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bt_tasksim.engines.physics import sapien_sinking
-from bt_tasksim.engines.physics.sapien_overlap import Met
+from bt_tasksim.engines.physics.sapien_overlap import DeepestPlace
 from bt_tasksim.engines.physics.sapien_sinking import SUNK, Sinking
 
 MASS, INERTIA = 0.2, [4e-5, 5e-5, 6e-5]
@@ -56,7 +56,7 @@ PLACE, DOWN = np.array([0.02, 0.01, -0.03]), np.array([0.0, 0.0, -1.0])
 
 
 def test_on_something_that_stands_it_does_not_go_on_into_it(monkeypatch):
-    first, sinking, _ = meeting(monkeypatch, "wall", Met(2 * SUNK, PLACE, DOWN))
+    first, sinking, _ = meeting(monkeypatch, "wall", DeepestPlace(2 * SUNK, PLACE, DOWN))
     sinking.stop(0.0)
     assert first.velocity_at((0, 0, 0), PLACE) @ DOWN == pytest.approx(0.0, abs=1e-12)
     assert first.linear_velocity[2] < 0.0 and np.abs(first.angular_velocity).max() > 0.0, "it tips over"
@@ -65,7 +65,7 @@ def test_on_something_that_stands_it_does_not_go_on_into_it(monkeypatch):
 
 def test_of_two_that_move_momentum_stays(monkeypatch):
     second = Body((0.0, 0.0, -0.06), (0.0, 0.0, 0.2))
-    first, sinking, _ = meeting(monkeypatch, second, Met(2 * SUNK, PLACE, DOWN))
+    first, sinking, _ = meeting(monkeypatch, second, DeepestPlace(2 * SUNK, PLACE, DOWN))
     before = MASS * (first.linear_velocity + second.linear_velocity)
     sinking.stop(0.0)
     assert MASS * (first.linear_velocity + second.linear_velocity) == pytest.approx(before)
@@ -75,13 +75,13 @@ def test_of_two_that_move_momentum_stays(monkeypatch):
 
 @pytest.mark.parametrize(("depth", "normal"), [(SUNK / 2, DOWN), (2 * SUNK, -DOWN)])
 def test_what_is_hardly_in_it_or_leaves_it_is_let_alone(monkeypatch, depth, normal):
-    first, sinking, _ = meeting(monkeypatch, "wall", Met(depth, PLACE, normal))
+    first, sinking, _ = meeting(monkeypatch, "wall", DeepestPlace(depth, PLACE, normal))
     sinking.stop(0.0)
     assert first.linear_velocity.tolist() == [0.1, 0.0, -0.5]
 
 
 def test_what_is_apart_is_looked_at_again_once_it_can_have_come(monkeypatch):
-    _, sinking, asked = meeting(monkeypatch, "wall", Met(-0.01, PLACE, DOWN))
+    _, sinking, asked = meeting(monkeypatch, "wall", DeepestPlace(-0.01, PLACE, DOWN))
     for _ in range(4):
         sinking.stop(0.004)
     assert len(asked) == 2
