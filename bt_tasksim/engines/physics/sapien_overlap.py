@@ -21,6 +21,7 @@ from bt_tasksim.engines.physics.sapien_world import array, floats
 from bt_tasksim.scene.hulls import convex
 
 if TYPE_CHECKING:
+    import sapien
     from sapien import physx
 
 
@@ -59,12 +60,15 @@ Solids = dict[Any, tuple[Any, Any] | None]
 """By shape: coal's, and its place in its body; None for those that are neither boxes nor convex meshes."""
 
 
-def deepest_place(contact: physx.PhysxContact, known: Solids) -> DeepestPlace | None:
+def deepest_place(
+    contact: physx.PhysxContact, known: Solids, elsewhere: tuple[Any, sapien.Pose] | None = None
+) -> DeepestPlace | None:
     """Where the two shapes of a contact overlap most, as they are now.
 
     Args:
         contact: The contact.
         known: What is known already of some shapes; more is added.
+        elsewhere: A body, and the pose in which it is to be thought.
 
     Returns:
         None for shapes that are neither boxes nor convex meshes.
@@ -78,7 +82,8 @@ def deepest_place(contact: physx.PhysxContact, known: Solids) -> DeepestPlace | 
         if found is None:
             return None
         solids.append(found[0])
-        placed.append(_transform(floats(body.entity_pose)) * found[1])
+        pose = body.entity_pose if elsewhere is None or body != elsewhere[0] else elsewhere[1]
+        placed.append(_transform(floats(pose)) * found[1])
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     request.enable_signed_distance = True
     depth = -float(coal.distance(solids[0], placed[0], solids[1], placed[1], request, result))

@@ -72,12 +72,10 @@ class Phantoms:
             body = self._world.objects[each.which]
             if float(np.linalg.norm(body.linear_velocity - each.linear)) < least:
                 continue
-            after = body.entity_pose
-            body.entity.set_pose(each.pose)
-            met = list(self._met(body))
+            met = list(self._met(body, each.pose))
             if not any(made_up for made_up, _, _ in met):
-                body.entity.set_pose(after)
                 continue
+            body.entity.set_pose(each.pose)  # only now: PhysX forgets the friction of what is moved so
             body.set_linear_velocity(each.linear)
             body.set_angular_velocity(each.angular)
             for _, true, bodies in sorted(met, key=lambda found: -found[1].depth):
@@ -85,15 +83,20 @@ class Phantoms:
                     without_nearing(self._world, bodies, true)
 
     def _met(
-        self, body: physx.PhysxRigidDynamicComponent
+        self, body: physx.PhysxRigidDynamicComponent, before: sapien.Pose
     ) -> Iterator[tuple[bool, DeepestPlace, Sequence[Any]]]:
-        """Of each contact that pushes an object: whether it is made up, what is true, and the bodies."""
+        """Of each contact that pushes an object: whether it is made up, what is true, and the bodies.
+
+        Args:
+            body: The object.
+            before: Where it was before the step.
+        """
         for contact in self._world.system.get_contacts():
             if not any(other == body for other in contact.bodies):
                 continue
             if not any(np.any(point.impulse) for point in contact.points):
                 continue
-            true = deepest_place(contact, self._known)
+            true = deepest_place(contact, self._known, (body, before))
             if true is not None:
                 said = -min(point.separation for point in contact.points)
                 yield said - max(true.depth, 0.0) > TOO_DEEP, true, contact.bodies

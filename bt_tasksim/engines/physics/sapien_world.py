@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     import sapien
     from sapien import physx
 
-CONTACT_OFFSET = {"robot": 0.001, "object": 0.003, "fixture": 0.004}
+CONTACT_OFFSET = {"robot": 0.001, "object": 0.003, "fixture": 0.027}
 """Metres by body; PhysX looks for contacts of two bodies within the sum of theirs. It must exceed what a
-falling object covers in one of the shorter steps, in which it is looked at (2.2 m/s after 25 cm: 2.8 mm), or
-the object is stopped only inside; and of convex meshes that are farther apart PhysX makes up the more
-contacts, see `bt_tasksim.engines.physics.sapien_phantoms`: with 8 mm between them in 18 of 60 places, with
-3 mm in 3 of 60."""
+falling object covers in one step (2.2 m/s after 25 cm: 22 mm), or the object is stopped only inside. With 4 or
+10 mm of fixtures 2 of 40 runs of `pick_and_place_recovering` strain the wrist as the cube is picked again, with
+27 mm none; but the farther PhysX looks, the more contacts of convex meshes it makes up, see
+`bt_tasksim.engines.physics.sapien_phantoms`."""
 LIGHT, MOST = 1.6, 60
 """Kilograms times the solver's position iterations that a body needs between fingers that press with tens of
 newtons, and the most iterations. Boxes, cylinders and ovals of 60 g between the Panda's fingers sink in by
