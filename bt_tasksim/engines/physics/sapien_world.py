@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 CONTACT_OFFSET = {"robot": 0.001, "object": 0.003, "fixture": 0.027}
 """Metres by body; PhysX looks for contacts of two bodies within the sum of theirs. It must exceed what a
 falling object covers in one step (2.2 m/s after 25 cm: 22 mm), or the object is stopped only inside. With 4
-or 10 mm for fixtures 2 of 40 runs of `pick_and_place_recovering` strain the wrist as the cube is picked again,
-with 27 none; but the farther PhysX looks, the more contacts of convex meshes it makes up, see
+or 10 mm for fixtures 2 of 40 runs of `pick_and_place_recovering` strain the wrist as they pick the cube once
+more, with 27 none; but the farther PhysX looks, the more contacts of convex meshes it makes up, see
 `bt_tasksim.engines.physics.sapien_phantoms`."""
 LIGHT, MOST = 1.6, 60
 """Kilograms times the solver's position iterations that a body needs between fingers that press with tens of
