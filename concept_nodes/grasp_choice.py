@@ -58,7 +58,6 @@ ENOUGH = 3
 FROM_GRIP = 0.018
 """Metres that the usual grasp of a simple solid may be from a known grip of it; farther off, fingers that
 close on a rounded side squeeze it out."""
-UP = np.array([0.0, 0.0, 1.0])
 STILL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 SAME_GRIP = (0.012, 0.02, 0.96)
 """Metres aside of a known grip, metres along its closing axis, and the cosine of the angle between the axes,
@@ -519,7 +518,7 @@ class _Served:
         self._around, self._aim = around, aim
         ends = aim.aside if aside and aim.aside is not None and len(aim.aside) else aim.poses
         falls = (0.0, *HIGHER) if higher and not aim.on_the_way else (0.0,)
-        self._poses = np.concatenate([poses.shifted(ends, above * UP) for above in falls])
+        self._poses = np.concatenate([poses.shifted(ends, np.array([0.0, 0.0, above])) for above in falls])
         self.words = aim.words
 
     def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:

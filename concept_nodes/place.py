@@ -301,15 +301,17 @@ class Place(ConceptModel[PlaceMemory]):
         Raises:
             NoWayError: There is none; says what would touch what as it is held now.
         """
-        others: list[Array] = []
+        others: Array | None = None
         for rooms, around in ((ROOMS, False), (FROM_HIGHER, False), (ROOMS, True)):
-            with suppress(NoWayError):
+            try:
                 return goal, self._down(view, goal, rooms, around), around
-            others = others or list(self._other_ends(view))
+            except NoWayError as error:
+                reason = error  # the last one says what would touch what
+            others = self._other_ends(view) if others is None else others
             for other in others:
                 with suppress(NoWayError):
                     return other, self._down(view, other, rooms, around), around
-        return goal, self._down(view, goal, ROOMS, around=True), True
+        raise reason
 
     def _other_ends(self, view: WorldView) -> Array:
         """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first.

@@ -188,7 +188,7 @@ class Mover:
         spread = rng.uniform(robot.arm_lower, robot.arm_upper, (5, len(robot.arm_joints)))
         self._seeds = [state.arm, robot.rest, *self._arm.seeds, *spread]
         self._late = False
-        self._plane = _plane(robot)
+        self._plane: _Plane = robot.derived("plane of the hand", _plane)
         self._good: dict[int, list[Array]] = {}
         self._depth, self._touched = 0, [Counter[str]() for _ in DEEPEST]
 

@@ -82,13 +82,13 @@ def judge(task: Task, seconds: float = 60.0) -> Finding:
         task: The task.
         seconds: Of planning, at most.
     """
-    began = time.process_time()
-    wrong, beginning = _physical(task, configuration := task.sample()), settled(configuration, {})
-    if wrong is None and (loose := overturned(configuration, beginning)):
-        wrong = ("the start falls over", loose)
+    began, configuration = time.process_time(), task.sample()
     told = tuple(step.target for step in task.steps)
-    if wrong is not None:
+    if (wrong := _physical(task, configuration)) is not None:
         return Finding(False, *wrong, True, told, time.process_time() - began)
+    beginning = settled(configuration, {})
+    if loose := overturned(configuration, beginning):
+        return Finding(False, "the start falls over", loose, True, told, time.process_time() - began)
     search = _Search(load_robot(task.robot), configuration, poses_in(configuration, beginning))
     actors = {actor.name: actor for actor in configuration.objects}
     first, *others = _orders(task.steps, actors)

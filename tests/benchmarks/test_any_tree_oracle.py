@@ -66,7 +66,7 @@ def test_only_what_has_no_goal_must_not_fall_over_at_the_start(meant):
 
 
 def test_on_an_object_the_weight_counts_and_not_the_middle(tmp_path: Path):
-    """A wedge's weight is beside its middle: over a small cube the middle alone would fall."""
+    """The weight of a corner is beside its middle: in the middle of a small cube it would fall."""
     file = mesh_file(tmp_path, "corner", 5, 1.0)
     corner = ObjectSpec(mesh=str(file), on="table", area=(0.0, 0.0), centre=(0.1, 0.1))
     small = replace(CUBE, size=((0.03,) * 3,) * 2)

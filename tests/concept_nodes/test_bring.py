@@ -67,15 +67,20 @@ def test_above_another_object_and_to_a_position(toy):
     assert status == Status.SUCCESS and np.allclose(cup[:3], [0.5, 0.1, 0.4], atol=1e-3)
 
 
-@pytest.mark.parametrize(("lower", "fits"), [(0.0, False), (0.07, True)])
+@pytest.mark.parametrize(
+    ("more", "lower", "fits"), [(HIGHER[-1], 0.0, False), (HIGHER[-1], 0.07, True), (0.0, 0.0, True)]
+)
 @pytest.mark.parametrize("hover", [0.04, 0.12])
-def test_how_far_it_goes_down_follows_from_where_the_object_is_in_the_hand(toy, lower, fits, hover):
-    """Between ribs that are lower than the object there is room for it, and for a hand that holds it high."""
+def test_how_far_it_goes_down_follows_from_where_the_object_is_in_the_hand(toy, more, lower, fits, hover):
+    """Between ribs that are lower than the object there is room for it, and for a hand that holds it high.
+
+    Where they are no higher than its middle, it may fall the rest.
+    """
     leaf = Bring("cup", to="goal", hover=hover)
     stage = toy(sequence("put down", leaf, Place("cup", on="goal")))
     model = stage.world.model
     goal, cup = model.place("goal").pose, model.object("cup").extent
-    middle = goal[2] + cup[2] / 2 + HIGHER[-1]  # from higher it may fall
+    middle = goal[2] + cup[2] / 2 + more
     inner, outer = cup[0] / 2 + 0.012, cup[0] / 2 + 0.1
     ribs = [
         Obstacle(

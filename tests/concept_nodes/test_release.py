@@ -9,6 +9,8 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Release, retreat
+from bt_tasksim.concept_nodes.release import _opened
+from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import TIMED_OUT
@@ -191,3 +193,18 @@ def test_where_there_is_little_room_it_draws_back_a_little(toy):
         assert stage.tick(300) == Status.SUCCESS
         gone.append(stage.world.now.tool_pose[2] - before)
     assert gone == pytest.approx([0.12, 0.012], abs=2e-3)
+
+
+@pytest.mark.parametrize(("beside", "all_the_way"), [(None, True), (0.2, True), (0.07, False)])
+def test_a_hand_of_two_fingers_opens_no_wider_than_it_has_room(toy, beside, all_the_way):
+    stage = start(toy, Release("cup"))
+    tool, model = stage.world.now.tool_pose, stage.world.model
+    if beside is not None:
+        there = poses.multiply(tool, poses.pose([0.0, beside, 0.0]))
+        wall = Obstacle(there, (0.1, 0.02, 0.1), "wall")
+        stage.context.begin([dataclasses.replace(model, obstacles=(*model.obstacles, wall))])
+        stage.look()
+    (view,) = views(stage.context.seen(ONE, np.zeros(1)))
+    opened = float(view.robot.closure(_opened(view, "cup")))
+    held = float(view.robot.closure(view.hand))
+    assert (opened == 0.0) == all_the_way and opened < held

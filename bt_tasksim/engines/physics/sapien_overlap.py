@@ -37,8 +37,8 @@ def least_overlap(contact: physx.PhysxContact, said: float, step: float) -> floa
     if any(solid is None for solid in solids):
         return said
     pairs = list(zip(contact.bodies, contact.shapes, strict=True))
-    deepest = max(_deep(solids, [_placement(*pair, back) for pair in pairs]) for back in (0.0, step))
-    return min(said, deepest)
+    apart = [_compared(solids, [_placement(*pair, back) for pair in pairs]) for back in (0.0, step)]
+    return min(said, max(-float(each.min_distance) for each in apart))
 
 
 @dataclass(frozen=True)
@@ -84,17 +84,17 @@ def deepest_place(
         solids.append(found[0])
         pose = body.entity_pose if elsewhere is None or body != elsewhere[0] else elsewhere[1]
         placed.append(_transform(floats(pose)) * found[1])
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
-    request.enable_signed_distance = True
-    depth = -float(coal.distance(solids[0], placed[0], solids[1], placed[1], request, result))
+    result = _compared(solids, placed)
     place = 0.5 * (np.asarray(result.getNearestPoint1()) + np.asarray(result.getNearestPoint2()))
-    return DeepestPlace(depth, place, np.asarray(result.normal, float))
+    return DeepestPlace(-float(result.min_distance), place, np.asarray(result.normal, float))
 
 
-def _deep(solids: Sequence[Any], placed: Sequence[Any]) -> float:
+def _compared(solids: Sequence[Any], placed: Sequence[Any]) -> Any:
+    """How far two solids are apart, coal's answer: negative where they overlap."""
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     request.enable_signed_distance = True
-    return -float(coal.distance(solids[0], placed[0], solids[1], placed[1], request, result))
+    coal.distance(solids[0], placed[0], solids[1], placed[1], request, result)
+    return result
 
 
 def _solid(shape: physx.PhysxCollisionShape) -> Any:

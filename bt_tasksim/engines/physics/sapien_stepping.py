@@ -128,8 +128,6 @@ class SapienWorld:
             moving = self._moving(free) if loose else []
             if self._disturbs():
                 moving.append(self._pushed)
-                loose = free[self._pushed] = True  # pushed out of the hand it is fast, from then on
-                self._letting_go = WATCHED
             if moving:
                 self._fine_steps(moving, last)
             else:

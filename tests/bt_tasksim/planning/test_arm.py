@@ -130,4 +130,10 @@ def test_who_asks_again_gets_the_same_and_may_change_it(each):
     kept = first.copy()
     first += 1.0
     np.testing.assert_array_equal(arm.joints(tool, robot.rest), kept)
-    assert arm.joints(far, robot.rest) is None is arm.joints(far, robot.rest)
+    for other in (
+        arm,
+        copy.copy(arm),
+        copy.deepcopy(arm),
+    ):  # copies lie elsewhere in memory: sums may round so
+        np.testing.assert_allclose(other.joints(tool, robot.rest), kept, atol=1e-4)
+        assert other.joints(far, robot.rest) is None is other.joints(far, robot.rest)
