@@ -130,10 +130,7 @@ def test_who_asks_again_gets_the_same_and_may_change_it(each):
     kept = first.copy()
     first += 1.0
     np.testing.assert_array_equal(arm.joints(tool, robot.rest), kept)
-    for other in (
-        arm,
-        copy.copy(arm),
-        copy.deepcopy(arm),
-    ):  # copies lie elsewhere in memory: sums may round so
+    for other in (arm, copy.copy(arm), copy.deepcopy(arm)):
+        # Copies lie elsewhere in memory, and sums may round so.
         np.testing.assert_allclose(other.joints(tool, robot.rest), kept, atol=1e-4)
         assert other.joints(far, robot.rest) is None is other.joints(far, robot.rest)
