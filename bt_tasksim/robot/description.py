@@ -193,6 +193,10 @@ class RobotDescription:
             kept[name] = make(self)
         return kept[name]
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy has: what follows from the description is made anew, for not all of it can be copied."""
+        return {name: value for name, value in self.__dict__.items() if name != "_derived"}
+
     @cached_property
     def hand_range(self) -> tuple[Array, Array]:
         """Lowest and highest positions ``(n_hand,)`` that a hand command can ask for."""

@@ -3,6 +3,7 @@ it."""
 
 import copy
 import sys
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -117,6 +118,7 @@ def test_threads_do_not_write_into_one_another(each):
 
 
 def test_a_copied_robot_has_an_arm_too(panda):
+    assert panda.robot.derived("what no copy can have", lambda robot: threading.Lock())
     again = copy.deepcopy(panda.robot)
     at = arm_of(panda.robot).tool(panda.robot.rest)
     assert np.array_equal(arm_of(again).tool(again.rest), at)

@@ -448,7 +448,8 @@ def until(true, seconds=30.0):
 
 @contextmanager
 def flooding(port):
-    """A program that sends 300 MiB of frames without a last one."""
+    """A program that sends 2 GiB of frames without a last one, if it may: the tests that ran before in this
+    process may have left it hundreds of MiB that the first of them fill without its growing."""
     script = f"PORT, GREETING, READY = {port}, {GREETING}, {READY}\n{FLOOD}"
     flood = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.DEVNULL)
     try:
@@ -463,7 +464,7 @@ import socket, time
 frame = b"\\x03" + (1 << 19).to_bytes(8, "big") + bytes(1 << 19)  # another one follows, it says
 with socket.create_connection(("127.0.0.1", PORT)) as wild:
     wild.sendall(GREETING + READY)
-    for _ in range(600):
+    for _ in range(4000):
         wild.sendall(frame)
     time.sleep(60)
 """
