@@ -1,4 +1,4 @@
-"""The solver works longer on what is held far from its centre of mass, and on nothing else."""
+"""The solver works longer on what is held far from its centre of mass or by many fingers, and on nothing else."""
 
 from types import SimpleNamespace
 
@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bt_tasksim.core import poses
-from bt_tasksim.engines.physics.sapien_solving import LEVER, LONG, Solving
+from bt_tasksim.engines.physics.sapien_solving import LEVER, LONG, MANY, Solving
 
 USUAL = 15
 TOOL = np.array([0.0, 0.0, 0.1])
@@ -65,3 +65,20 @@ def test_what_is_let_go_or_changes_hands_is_as_before():
         solving.look(force)
         assert [thing.iterations for thing in far] == expected
     Solving(body(pose([0.0, 0.0, 0.0])), TOOL, []).look([])
+
+
+def test_it_works_longer_on_whatever_many_fingers_hold():
+    things = [
+        body(pose([0.01, 0.0, 0.1])),
+        body(pose([0.1, 0.0, 0.1])),
+        body(pose([0.0, 0.0, 0.1]), iterations=90),
+    ]
+    solving = Solving(body(pose([0.0, 0.0, 0.0])), TOOL, things, many=True)
+    for force, expected in (
+        ([30.0, 0.0, 0.0], [MANY, USUAL, 90]),
+        ([0.0, 30.0, 0.0], [USUAL, MANY, 90]),
+        ([0.0, 0.0, 30.0], [USUAL, USUAL, 90]),
+        ([0.0, 0.0, 0.0], [USUAL, USUAL, 90]),
+    ):
+        solving.look(force)
+        assert [thing.iterations for thing in things] == expected
