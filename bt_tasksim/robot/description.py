@@ -194,7 +194,7 @@ class RobotDescription:
         return kept[name]
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy has: what follows from the description is made anew, for not all of it can be copied."""
+        """What a copy has: what follows from the description is made anew, since not all can be copied."""
         return {name: value for name, value in self.__dict__.items() if name != "_derived"}
 
     @cached_property

@@ -6,8 +6,8 @@ longest: with 15 iterations a ladle of 0.2 kg that hangs 70 mm beside the Panda'
 them by some degrees in each control period, and creeps by 18 degrees on a way on which it turns by less than
 1 with 30 of them, or with 15 in steps half as long. Where many fingers hold, their forces may go to and fro,
 too, from one period to the next and by as much as they are on average: of 83 things that the Ability hand
-held in 30 random tasks 35 were held so, and three of them crept out of it or turned until they leaned. With 30
-iterations it is 20 of 86, and none of the three; 60 are no better.
+held in 30 random tasks 35 were held so, and three of them crept out of it or turned until they leaned. With
+30 iterations it is 20 of 86, and none of the three; 60 are no better.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The solver works longer on what is held far from its centre of mass or by many fingers, and on nothing else."""
+"""The solver works longer on what is held far from its centre of mass or by many fingers, on nothing else."""
 
 from types import SimpleNamespace
 
