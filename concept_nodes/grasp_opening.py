@@ -12,6 +12,7 @@ from bt_tasksim.concept_nodes.view import WorldView, nearly
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.collision import OWN
 from bt_tasksim.planning.hand_collision import HandCollisions
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Leave
@@ -46,7 +47,7 @@ class Opening:
     ) -> None:
         self._view, self._target, self._close = view, target, close
         self._aside = [beside * far for far in ASIDE]
-        self._closer = VERY_CLOSE if close else CLOSER
+        self._closer, self._own = (VERY_CLOSE, 0.0) if close else (CLOSER, OWN)
         self.hand, self.closure = hand, float(view.robot.closure(hand))
 
     @cached_property
@@ -57,13 +58,17 @@ class Opening:
     @cached_property
     def deep(self) -> WayFinder:
         """Ways of a hand that comes as deep as the robot's file says, whatever of it touches then."""
-        return self._view.finder(hand=self.hand, closer=self._closer, taken=self._target, palm=False)
+        return self._view.finder(
+            hand=self.hand, closer=self._closer, taken=self._target, palm=False, own=self._own
+        )
 
     @cached_property
     def beside(self) -> WayFinder:
         """Ways of a hand that stays clear of what it takes, but for its fingers."""
         leave = self._leave
-        return self._view.finder(hand=self.hand, closer=self._closer, taken=self._target, leave=leave)
+        return self._view.finder(
+            hand=self.hand, closer=self._closer, taken=self._target, leave=leave, own=self._own
+        )
 
     @cached_property
     def alone(self) -> HandCollisions:

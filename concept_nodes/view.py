@@ -14,6 +14,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, constant
 from bt_tasksim.core.transfer import fetched
 from bt_tasksim.core.world import ObjectModel, WorldModel
+from bt_tasksim.planning.collision import OWN
 from bt_tasksim.planning.surroundings import adrift, pieces_of, things_of
 from bt_tasksim.planning.things import Held, Leave, Thing
 from bt_tasksim.planning.ways import WayFinder
@@ -93,6 +94,7 @@ class WorldView(NamedTuple):
         hand: Array | None = None,
         taken: str = "",
         palm: bool = True,
+        own: float = OWN,
     ) -> WayFinder:
         """Ways from where the arm is.
 
@@ -104,6 +106,7 @@ class WorldView(NamedTuple):
             hand: The hand's joints ``(n_hand,)``, by default the present ones.
             taken: An object around which no room is kept: the hand closes on it.
             palm: Around that there is room that only fingers may enter, see `things`.
+            own: Metres that the robot's own bodies keep from each other.
         """
         return WayFinder(
             self.robot,
@@ -112,6 +115,7 @@ class WorldView(NamedTuple):
             self.things(without, closer, taken, palm),
             held,
             leave,
+            own,
         )
 
 

@@ -20,7 +20,7 @@ from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.arm import FULL, LEANS, SWAYS, arm_of
 from bt_tasksim.planning.bodies import bodies_of
-from bt_tasksim.planning.collision import Collisions
+from bt_tasksim.planning.collision import OWN, Collisions
 from bt_tasksim.planning.lines import STEP, line
 from bt_tasksim.planning.route import Pace, Route, timed
 from bt_tasksim.planning.search import Search
@@ -71,6 +71,7 @@ class WayFinder:
         things: What to keep clear of.
         held: What is in the hand.
         leave: What may touch.
+        own: Metres that the robot's own bodies keep from each other.
     """
 
     def __init__(
@@ -81,10 +82,11 @@ class WayFinder:
         things: Sequence[Thing],
         held: Held | None = None,
         leave: Leave | None = None,
+        own: float = OWN,
     ) -> None:
         self.arm = arm_of(robot)
         self.start = np.clip(joints, robot.arm_lower, robot.arm_upper)
-        self._robot, self._held = robot, held
+        self._robot, self._held, self._own = robot, held, own
         self._hand, self._things, self._leave = hand, told_apart(things), leave or Leave()
 
     @property
@@ -150,7 +152,7 @@ class WayFinder:
 
     def _among(self, things: Sequence[Thing], pairs: Collection[Touch] = ()) -> Collisions:
         leave = replace(self._leave, pairs={*self._leave.pairs, *pairs})
-        return Collisions(bodies_of(self._robot), self._hand, things, self._held, leave)
+        return Collisions(bodies_of(self._robot), self._hand, things, self._held, leave, self._own)
 
     def ends(self, tools: Array, beginning: Array | None = None, leans: float = LEANS) -> Ends:
         """Postures at tool poses ``(k, 7)``, from where the arm is or from ``beginning (n_arm,)``.
