@@ -28,6 +28,8 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.world import Obstacle
 from bt_tasksim.planning.arm import arm_of
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.collision import Collisions
 from bt_tasksim.planning.route import Pace
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.robot.kinematics.hand import SPARE
@@ -170,6 +172,15 @@ def test_a_hand_that_loses_what_it_holds_poorly_rather_goes_closely_past_things(
     exactly = [(closer, False) for closer in ROOMS]
     for half in (firm, others):
         assert [(c, a) for c, _, a in half] == [*exactly, *([(ROOMS[-1], True)] if aside else [])]
+
+
+def test_a_hand_that_finds_no_other_room_may_come_next_to_its_own_arm(view):
+    robot = view.robot
+    apart = Collisions(bodies_of(robot), robot.hand_open, [])
+    drawn = np.random.default_rng(1).uniform(robot.arm_lower, robot.arm_upper, (1500, len(robot.rest)))
+    next_to = [q for q in drawn if not apart.free(q)]
+    usual, close = (Opening(view, "box", robot.hand_open, close).beside.collisions for close in (False, True))
+    assert not any(usual.free(q) for q in next_to) and any(close.free(q) for q in next_to)
 
 
 def test_a_gripper_of_two_fingers_rather_keeps_room():
