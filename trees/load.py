@@ -90,7 +90,10 @@ def load_source(
         build = functools.partial(_called, build, path)
         own = getattr(module, "scene", None)
         if world is None:
-            world = _scene(scene, robot) if scene or own is None else _made(own, robot, path)
+            if scene or own is None:
+                world = _scene(scene, robot)
+            else:
+                world = _made(_function(module, "scene", path), robot, path)
         source = TreeSource(path.stem, build, world)
     elif path.suffix == ".xml":
         source = _from_xml(path, robot, scene, world)
@@ -395,5 +398,6 @@ def _function(module: Any, name: str, path: Path) -> Any:
     function = getattr(module, name, None)
     if not callable(function):
         returned = "a Scene" if name == "scene" else "the tree's root"
-        raise InputError(f"'{path}' has no function {name}(): define one that returns {returned}")
+        found = "" if function is None else f", {name} is {type(function).__name__}"
+        raise InputError(f"'{path}' has no function {name}(){found}: define one that returns {returned}")
     return function

@@ -160,7 +160,11 @@ def test_a_python_file_with_a_named_scene(write):
     ("text", "sentence"),
     [
         ("x = 1", "has no function build(): define one that returns the tree's root"),
-        ("build = 3", "has no function build()"),
+        ("build = 3", "has no function build(), build is int: define one"),
+        (
+            "scene = 3\ndef build(): ...",
+            "has no function scene(), scene is int: define one that returns a Scene",
+        ),
         ("def build(:\n    pass", "line 1: SyntaxError: invalid syntax"),
         ("x = 1\ny = 1 / 0", "line 2: ZeroDivisionError: division by zero"),
         (
