@@ -102,15 +102,16 @@ class Stuck:
 
 @dataclass(eq=False)
 class _Grasp:
-    """A clear grasp: joints, tool pose, joints when lifted, the tool in the object, and collisions."""
+    """A clear grasp: joints, tool pose, joints when lifted, the tool in the object, and the open hand.
+
+    Thousands of them wait, so they keep no `Collisions`, which are some hundred kB each.
+    """
 
     joints: Array
     tool: Array
     lifted: Array
     back: Array
-    coming: Collisions
-    held: Collisions
-    after: Collisions
+    hand: Array
     goals: list[int]
 
 
@@ -190,6 +191,7 @@ class Mover:
         self._late = False
         self._plane: _Plane = robot.derived("plane of the hand", _plane)
         self._good: dict[int, list[Array]] = {}
+        self._open: dict[bool, Collisions] = {}
         self._depth, self._touched = 0, [Counter[str]() for _ in DEEPEST]
 
     def moved(self, goals: Sequence[Array], lowered: bool) -> State | Stuck:
@@ -235,13 +237,12 @@ class Mover:
                     if not self._meets(grip):
                         self._no(2)
                         continue
-                    held = self._collisions(hand, Held(self._actor.name, grip, self._pieces))
+                    held = self._holding(hand, grip)
                     lifted = self._lifted(held, q, actual)
                     if lifted is None:
                         self._no(3)
                         continue
-                    after = self._collisions(hand)
-                    yield _Grasp(q, actual, lifted, poses.inverse(grip), coming, held, after, list(order))
+                    yield _Grasp(q, actual, lifted, poses.inverse(grip), hand, list(order))
 
     def _meets(self, grip: Array) -> bool:
         """Whether fingers of both sides meet the object when they close, its pose ``(7,)`` in the tool frame.
@@ -382,17 +383,17 @@ class Mover:
 
     def _with(self, grasp: _Grasp, goals: Sequence[Array], lowered: bool) -> State | None:
         """Try the next few goals with a grasp."""
+        held, after = self._holding(grasp.hand, poses.inverse(grasp.back)), self._empty(grasp.hand)
         for _ in range(AT_ONCE):
             if not grasp.goals or time.process_time() > self._until:
                 return None
             goal = goals[grasp.goals.pop(0)]
-            placed = self._placed(grasp.held, grasp.after, goal, grasp.back, lowered)
+            placed = self._placed(held, after, goal, grasp.back, lowered)
             if placed is None:
                 continue
             hover, end, final = placed
-            if self._before(grasp.coming, grasp.joints, grasp.tool) and self._way(
-                grasp.held, grasp.lifted, [hover]
-            ):
+            coming = self._coming(grasp.hand)
+            if self._before(coming, grasp.joints, grasp.tool) and self._way(held, grasp.lifted, [hover]):
                 name, state = self._actor.name, self._state
                 if lowered:
                     return State({**state.objects, name: final}, end, state.dropped)
@@ -402,12 +403,24 @@ class Mover:
         return None
 
     def _coming(self, hand: Array) -> Collisions:
-        """For the hand that comes; that of a hand that opens all the way is kept."""
+        """For the hand that comes."""
+        return self._kept(hand, target=True)
+
+    def _empty(self, hand: Array) -> Collisions:
+        """For the hand that has let go."""
+        return self._kept(hand, target=False)
+
+    def _kept(self, hand: Array, target: bool) -> Collisions:
+        """That of a hand that opens all the way is kept."""
         if not np.array_equal(hand, self._robot.hand_open):
-            return self._collisions(hand, target=True)
-        if not hasattr(self, "_open"):
-            self._open = self._collisions(hand, target=True)
-        return self._open
+            return self._collisions(hand, target=target)
+        if target not in self._open:
+            self._open[target] = self._collisions(hand, target=target)
+        return self._open[target]
+
+    def _holding(self, hand: Array, grip: Array) -> Collisions:
+        """For the hand with the object, whose pose in the tool frame is ``grip (7,)``."""
+        return self._collisions(hand, Held(self._actor.name, grip, self._pieces))
 
     def _lifted(self, held: Collisions, q: Array, tool: Array) -> Array | None:
         free = self._arm.along(q, poses.shifted(tool, np.array([0.0, 0.0, LIFT]))[None])
