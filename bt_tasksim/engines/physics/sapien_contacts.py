@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import MachineError
 from bt_tasksim.engines.physics.rolling import rolling_damping
-from bt_tasksim.engines.physics.sapien_overlap import least_overlap
+from bt_tasksim.engines.physics.sapien_overlap import TOO_DEEP, least_overlap
 from bt_tasksim.engines.physics.sapien_robot import SKIN
 from bt_tasksim.engines.physics.sapien_world import DAMPING, World
 
 if TYPE_CHECKING:
+    import sapien
     from sapien import physx
 
 TOUCH_DISTANCE = 0.002
@@ -57,6 +58,8 @@ class ContactReader:
     Attributes:
         penetration: The deepest overlap so far, metres.
         deepest_pair: Names of its bodies, metres, and seconds since the episode began; None before any.
+        before: Where bodies near the hand, and its own, were before the last step; none, where nobody asked.
+        made_up: Something touched the robot when contacts were read last that is not there.
         nothing: What is read where nothing touches anything.
     """
 
@@ -67,6 +70,8 @@ class ContactReader:
         self._last, self._undisturbed = self.nothing, 0
         self.penetration = 0.0
         self.deepest_pair: tuple[str, str, float, float] | None = None
+        self.before: Mapping[physx.PhysxRigidBaseComponent, sapien.Pose] = {}
+        self.made_up = False
 
     def read_depth(self, time: float) -> _Pairs:
         """Remember the deepest overlap, also between the ends of periods: fingers close within one.
@@ -109,6 +114,7 @@ class ContactReader:
                 robot's, and takes none away.
         """
         contacts = self._world.system.get_contacts()
+        self.made_up = False
         if not contacts:
             self._undisturbed = 0
             return self.nothing
@@ -142,6 +148,9 @@ class ContactReader:
                     if kind_b == "object":
                         support.add((j, i))
                 continue
+            if -separation > TOO_DEEP and self._overlap(contact, -separation) < -separation - TOO_DEEP:
+                self.made_up = True
+                continue
             rate = 1.0 / step
             if by_b:
                 kind_a, kind_b, i, j, rate = kind_b, kind_a, j, i, -rate
@@ -170,9 +179,12 @@ class ContactReader:
         self._last = Touch(tip_force, hand_force, distance, support, touched)
         return self._last
 
+    def _overlap(self, contact: physx.PhysxContact, said: float) -> float:
+        return least_overlap(contact, said, self._world.scene.timestep, self.before)
+
     def _note_depth(self, contact: physx.PhysxContact, deep: float, time: float) -> None:
         if deep > DEEP:
-            deep = least_overlap(contact, deep, self._world.scene.timestep)
+            deep = self._overlap(contact, deep)
         if deep > self.penetration:
             bodies = contact.bodies
             self.penetration = deep

@@ -8,7 +8,7 @@ R. Culley, "Determining the minimum translational distance between two convex po
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,19 +25,28 @@ if TYPE_CHECKING:
     from sapien import physx
 
 
-def least_overlap(contact: physx.PhysxContact, said: float, step: float) -> float:
+TOO_DEEP = 0.0015
+"""Metres deeper than shapes are that PhysX takes them to be, at least, in a contact that it makes up."""
+
+
+def least_overlap(
+    contact: physx.PhysxContact, said: float, step: float, before: Mapping[Any, sapien.Pose]
+) -> float:
     """Metres by which the two shapes of a contact overlap; never more than what PhysX said.
 
     Args:
         contact: The contact.
         said: Metres along the contact's own normal, as the bodies were before the last step.
         step: Seconds of that step: it is looked where the bodies are, and where they were.
+        before: Where bodies were before it. Others are taken to have moved as they move now, which is wrong
+            of what was thrown in it.
     """
     solids = [_solid(shape) for shape in contact.shapes]
     if any(solid is None for solid in solids):
         return said
     pairs = list(zip(contact.bodies, contact.shapes, strict=True))
-    apart = [_compared(solids, [_placement(*pair, back) for pair in pairs]) for back in (0.0, step)]
+    apart = [_compared(solids, [_placement(*pair, 0.0) for pair in pairs])]
+    apart.append(_compared(solids, [_placement(*pair, step, before.get(pair[0])) for pair in pairs]))
     return min(said, max(-float(each.min_distance) for each in apart))
 
 
@@ -108,10 +117,15 @@ def _solid(shape: physx.PhysxCollisionShape) -> Any:
     return None
 
 
-def _placement(body: physx.PhysxRigidBaseComponent, shape: physx.PhysxCollisionShape, back: float) -> Any:
-    """Where a shape is, or was so many seconds back."""
-    pose = array(body.entity.pose)
-    if back and hasattr(body, "linear_velocity"):
+def _placement(
+    body: physx.PhysxRigidBaseComponent,
+    shape: physx.PhysxCollisionShape,
+    back: float,
+    before: sapien.Pose | None = None,
+) -> Any:
+    """Where a shape is, or was so many seconds back, if need be as its body moves now."""
+    pose = array(body.entity.pose if before is None else before)
+    if back and before is None and hasattr(body, "linear_velocity"):
         turn = poses.from_rotation_vector(-back * np.asarray(body.angular_velocity, float))
         pose = np.concatenate(
             [pose[:3] - back * np.asarray(body.linear_velocity, float), poses.quat_multiply(turn, pose[3:])]

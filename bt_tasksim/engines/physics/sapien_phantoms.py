@@ -9,18 +9,20 @@ began so, with bowls and a star of 18 to 49 g.
 
 Such a contact is told by the speed that it gives within one step, and by how deep the shapes truly are
 (`bt_tasksim.engines.physics.sapien_overlap`). What it has thrown goes back to where it was, with the speed
-that it had, less that with which it nears what it does touch.
+that it had, less that with which it nears what it does touch. Where a table bears the thing it is the robot
+that is thrown, by hundreds of newtons; it goes on as it went. Nothing feels such a contact, either, see
+`bt_tasksim.engines.physics.sapien_contacts`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bt_tasksim.core.poses import Array
-from bt_tasksim.engines.physics.sapien_overlap import DeepestPlace, Solids, deepest_place
+from bt_tasksim.engines.physics.sapien_overlap import TOO_DEEP, DeepestPlace, Solids, deepest_place
 from bt_tasksim.engines.physics.sapien_sinking import without_nearing
 from bt_tasksim.engines.physics.sapien_world import World
 
@@ -31,8 +33,8 @@ if TYPE_CHECKING:
 KICK = (0.05, 12.0)
 """Metres a second, and the same for each second of a step, that a thing is thrown with in one, at least: more
 than gravity gives it."""
-TOO_DEEP = 0.0015
-"""Metres deeper than shapes are that PhysX takes them to be, at least, in a contact that it makes up."""
+JOLT = 0.15
+"""Radians a second by which a joint of an arm is thrown in a step, at least: near things arms are gentle."""
 TOUCHES = 0.0003
 """Metres within which shapes truly meet."""
 
@@ -52,10 +54,20 @@ class Phantoms:
     Args:
         world: The world.
         known: What is known already of shapes.
+        articulation: The robot, if any.
+        arm: Which of its joints are the arm's.
     """
 
-    def __init__(self, world: World, known: Solids) -> None:
+    def __init__(
+        self,
+        world: World,
+        known: Solids,
+        articulation: physx.PhysxArticulation | None = None,
+        arm: Sequence[int] = (),
+    ) -> None:
         self._world, self._known = world, known
+        self._articulation, self._arm = articulation, list(arm)
+        self._position = self._velocity = np.zeros(0)
 
     def look(self, near: Sequence[int]) -> list[Before]:
         """How these objects are before a step."""
@@ -63,6 +75,8 @@ class Phantoms:
         for k in near:
             body = self._world.objects[k]
             found.append(Before(k, body.entity_pose, body.linear_velocity, body.angular_velocity))
+        if found and self._articulation is not None:
+            self._position, self._velocity = self._articulation.get_qpos(), self._articulation.get_qvel()
         return found
 
     def undo(self, before: Sequence[Before], seconds: float) -> None:
@@ -81,6 +95,52 @@ class Phantoms:
             for _, true, bodies in sorted(met, key=lambda found: -found[1].depth):
                 if true.depth > -TOUCHES:
                     without_nearing(self._world, bodies, true)
+        if before and self._articulation is not None:
+            self._undo_robot(self._articulation, before, seconds)
+
+    def _undo_robot(
+        self, articulation: physx.PhysxArticulation, before: Sequence[Before], seconds: float
+    ) -> None:
+        """The same for the robot, which goes on as it went before the step, and for what threw it."""
+        position, velocity = articulation.get_qpos(), articulation.get_qvel()
+        if max(abs(velocity[k] - self._velocity[k]) for k in self._arm) < JOLT:
+            return
+        near = {self._world.objects[each.which]: each for each in before}
+        threw = [each for each in self._world.system.get_contacts() if self._is_suspect(each, near)]
+        if not threw:
+            return
+        articulation.set_qpos(self._position)  # to look where its links were
+        made_up = [contact for contact in threw if self._is_made_up(contact, near)]
+        if not made_up:
+            articulation.set_qpos(position)
+            articulation.set_qvel(velocity)
+            return
+        articulation.set_qpos(self._position + seconds * self._velocity)
+        articulation.set_qvel(self._velocity)
+        for contact in made_up:
+            for body in contact.bodies:
+                if body in near:
+                    body.entity.set_pose(near[body].pose)
+                    body.set_linear_velocity(near[body].linear)
+                    body.set_angular_velocity(near[body].angular)
+
+    def _is_suspect(self, contact: physx.PhysxContact, near: Mapping[Any, Before]) -> bool:
+        """It is one of the robot with one of these objects, and deeper than they are in each other now."""
+        kinds = [self._world.bodies.get(body, ("", 0))[0] for body in contact.bodies]
+        if not {"hand", "arm"} & set(kinds) or not any(body in near for body in contact.bodies):
+            return False
+        said = -min(point.separation for point in contact.points)
+        if said < TOO_DEEP or not any(np.any(point.impulse) for point in contact.points):
+            return False
+        true = deepest_place(contact, self._known)
+        return true is not None and said - max(true.depth, 0.0) > TOO_DEEP
+
+    def _is_made_up(self, contact: physx.PhysxContact, near: Mapping[Any, Before]) -> bool:
+        """The two were not so deep in each other before the step, either; the robot is where it was then."""
+        body = next(body for body in contact.bodies if body in near)
+        true = deepest_place(contact, self._known, (body, near[body].pose))
+        said = -min(point.separation for point in contact.points)
+        return true is not None and said - max(true.depth, 0.0) > TOO_DEEP
 
     def _met(
         self, body: physx.PhysxRigidDynamicComponent, before: sapien.Pose

@@ -111,6 +111,7 @@ class Robot:
     Attributes:
         articulation: The articulation.
         index: Where the robot's joints stand in it ``(n_joints,)``.
+        arm: Where those of the arm stand.
         wrist: Number of the wrist's link in it.
         frames: The links that carry the tool and the fingertips, in this order.
         tool_pose: Pose ``(7,)`` of the tool in the first of them.
@@ -153,6 +154,7 @@ class Robot:
         joints = [by_name[name] for name in robot.joints]
         self.index = np.array([order.index(name) for name in robot.joints])
         self._n_arm = n_arm = len(robot.arm_joints)
+        self.arm = self.index[:n_arm].tolist()
         gains = [robot.drive_array(what).tolist() for what in ("stiffness", "damping", "force_limit")]
         for i, (joint, stiffness, damping, limit) in enumerate(zip(joints, *gains, strict=True)):
             drive = robot.arm_drive if i < n_arm else robot.hand_drive

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.layout import body_column
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_overlap import Solids
-from bt_tasksim.engines.physics.sapien_phantoms import Phantoms
+from bt_tasksim.engines.physics.sapien_phantoms import Before, Phantoms
 from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import Robot
 from bt_tasksim.engines.physics.sapien_sinking import Sinking
 from bt_tasksim.engines.physics.sapien_world import DAMPING, PARTING, World, floats
 from bt_tasksim.engines.physics.threaded import FALLING
 from bt_tasksim.scene.configuration import ActorConfiguration
+
+if TYPE_CHECKING:
+    import sapien
+    from sapien import physx
 
 FLYING = 8
 """How many times shorter steps are while something moves that the hand does not hold, or that it lets go of:
@@ -93,8 +98,9 @@ class SapienWorld:
             articulation.get_link_incoming_joint_forces,
         )
         self._frames = [link.get_entity_pose for link in robot.frames]
+        self._hand = [body for body, (kind, _) in world.bodies.items() if kind == "hand"]
         self._solids: Solids = {}
-        self._phantoms, self._near = Phantoms(world, self._solids), list[int]()
+        self._phantoms, self._near = Phantoms(world, self._solids, articulation, robot.arm), list[int]()
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
 
@@ -142,7 +148,7 @@ class SapienWorld:
         if watched or self._rolling:
             self._look_down()
         for _ in range(shorter):
-            self._step(self._last_dt)
+            self._step(self._last_dt, watched or last)
             if shorter > 1 and last:
                 self._feel_wrist()
         if shorter > 1:
@@ -161,13 +167,19 @@ class SapienWorld:
         if self._rolling:
             resist_rolling(self.world, lying, self._last_dt, self._touch.hand_force)
 
-    def _step(self, seconds: float) -> None:
-        """One step of PhysX so long, with what it does not know."""
+    def _step(self, seconds: float, looked_at: bool = True) -> None:
+        """One step of PhysX so long, with what it does not know; contacts are looked at after it, or not."""
         if self.robot.twist.holds:
             self.robot.twist.resist(seconds)
         before = self._phantoms.look(self._near)
+        self._reader.before = self._places(before) if looked_at and before else {}
         self.world.system.step()
         self._phantoms.undo(before, seconds)
+
+    def _places(self, near: Sequence[Before]) -> dict[physx.PhysxRigidBaseComponent, sapien.Pose]:
+        """Where these objects and the hand's links are before a step."""
+        found = {self.world.objects[each.which]: each.pose for each in near}
+        return found | {link: link.entity_pose for link in self._hand}
 
     def _fine_steps(self, moving: list[int], last: bool) -> None:
         """One of the scene's steps, in shorter ones while these objects move; see `_usual_steps`."""
@@ -221,7 +233,8 @@ class SapienWorld:
         position, velocity, incoming = self._joints
         out.time[row], out.penetration[row] = self._time, self._reader.penetration
         out.position[row], out.velocity[row] = position(), velocity()
-        out.incoming[row] = sum(self._felt) / self._dt if self._felt else incoming()
+        if not self._reader.made_up:  # what is not there is not felt
+            out.incoming[row] = sum(self._felt) / self._dt if self._felt else incoming()
         out.frames[row] = [floats(pose()) for pose in self._frames]
         if not still:
             for k, body in enumerate(bodies):

@@ -6,7 +6,9 @@ import sapien
 from sapien import physx
 
 from bt_tasksim.core import poses
-from bt_tasksim.engines.physics.sapien_phantoms import KICK, Phantoms
+from bt_tasksim.engines.physics.sapien_contacts import ContactReader
+from bt_tasksim.engines.physics.sapien_overlap import TOO_DEEP
+from bt_tasksim.engines.physics.sapien_phantoms import JOLT, KICK, Phantoms
 from bt_tasksim.engines.physics.sapien_world import PARTING, World
 
 pytestmark = pytest.mark.physical
@@ -44,6 +46,83 @@ def world_of(seed, deep=None):
         world.inertia.append(([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [1e-5] * 3))
         world.radius.append(0.02)
     return world
+
+
+def with_arm(seed, deep=None):
+    """The finger of `world_of` at the end of three sliding joints, and a plate that nothing moves."""
+    world = world_of(seed, deep)
+    finger, plate = world.objects
+    plate.set_mass(1e4)
+    plate.set_inertia([1e2] * 3)
+    there = finger.entity_pose
+    world.scene.remove_entity(finger.entity)
+    builder = world.scene.create_articulation_builder()
+    link = builder.create_link_builder()
+    for turn in poses.from_rotation_vector(
+        np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.5708], [0.0, 1.5708, 0.0]])
+    ):
+        axis = sapien.Pose([0.0, 0.0, 0.0], turn.tolist())  # joints slide along x
+        link = builder.create_link_builder(link)
+        link.set_joint_properties("prismatic", [[-1.0, 1.0]], axis, axis)
+        link.set_mass_and_inertia(0.02, sapien.Pose(), [1e-5] * 3)
+    link.add_box_collision(half_size=FINGER, density=1.0)
+    articulation = builder.build(fix_root_link=True)
+    articulation.set_root_pose(there)
+    end = articulation.get_links()[-1]
+    for shape in end.get_collision_shapes():
+        shape.set_contact_offset(0.005)
+    for each in articulation.get_links():
+        each.set_disable_gravity(True)
+    world.bodies = {plate: ("object", 0), end: ("hand", 0)}
+    world.objects = [plate]
+    return world, articulation
+
+
+def thrown(watched, deep=None):
+    """How fast each of 60 arms is after a step, m/s, and how far it has come, m."""
+    speeds, ways = [], []
+    for seed in range(60):
+        world, articulation = with_arm(seed, deep)
+        phantoms = Phantoms(world, {}, articulation if watched else None, range(3))
+        before = phantoms.look([0])
+        world.system.step()
+        phantoms.undo(before, 0.01)
+        speeds.append(float(np.linalg.norm(articulation.get_qvel())))
+        ways.append(float(np.linalg.norm(articulation.get_qpos())))
+    return speeds, ways
+
+
+def test_an_arm_is_not_thrown_by_what_it_does_not_touch():
+    assert max(thrown(watched=False)[0]) > 2 * JOLT, "PhysX throws none of them: is this still needed?"
+    assert max(thrown(watched=True)[0]) < 2 * JOLT
+
+
+def test_an_arm_is_pushed_out_of_what_it_is_truly_in():
+    assert thrown(watched=True, deep=0.003) == thrown(watched=False, deep=0.003)
+    assert min(thrown(watched=True, deep=0.003)[1]) > 0.001
+
+
+@pytest.mark.parametrize("deep", [None, 0.003])
+def test_what_is_not_there_is_not_felt(deep):
+    found = []
+    for seed in range(60):
+        world, articulation = with_arm(seed, deep)
+        (plate,), end = world.objects, articulation.get_links()[-1]
+        reader = ContactReader(world, n_tips=1)
+        reader.before = {body: body.entity_pose for body in (plate, end)}
+        phantoms = Phantoms(world, {}, articulation, range(3))
+        before = phantoms.look([0])
+        world.system.step()
+        phantoms.undo(before, 0.01)
+        pushed = any(np.any(p.impulse) for contact in world.system.get_contacts() for p in contact.points)
+        felt = reader.read(0.01, 0.01).hand_force[0]
+        found.append((pushed, felt > 0.0, reader.made_up, reader.penetration))
+    pushed, felt, made_up, penetration = np.array(found).T
+    assert pushed.any()
+    if deep is None:
+        assert not felt.any() and (made_up == pushed).all() and penetration.max() < TOO_DEEP
+    else:
+        assert felt.all() and not made_up.any() and np.allclose(penetration, deep, atol=2e-4)
 
 
 def speeds(world, watched):
