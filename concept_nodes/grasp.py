@@ -101,8 +101,9 @@ EMPTY = 0.97
 """Share of its grip beyond which a hand has nothing between its fingers."""
 PUSHED = 0.06
 """Metres by which a grasp may push the object, as it is seen."""
-TIPPED = math.radians(10.0)
-"""Radians by which a grasp may tip the object over, as it is seen, before it holds it."""
+TIPPED = math.radians(20.0)
+"""Radians by which a grasp may tip the object over, as it is seen, before it holds it. A jaw that swings tips
+what stands on a narrow foot by 11 to 13 degrees before its other finger has come, and holds it then."""
 TURNED = math.radians(25.0)
 """The same for an object that fingers of both sides have touched: it turns in the hand and does not fall, and
 is set upright where it is put down. The Ability hand's fingers roll what is low up between them, while now
