@@ -151,7 +151,7 @@ def test_done_only_after_contacts_on_both_sides_and_a_still_hand(toy):
     [
         (WRIST_STRAINED, {"wrench": np.array([0, 0, 71.0, 0, 0, 0])}, 71.0, 60.0),
         (PUSHED_AWAY, {"move": [0.1, 0, 0, 0, 0, 0, 0]}, 0.1, 0.06),
-        (TIPPED_OVER, {"turn": 0.3}, 0.3, math.radians(10.0)),
+        (TIPPED_OVER, {"turn": 0.4}, 0.4, math.radians(20.0)),
     ],
 )
 def test_each_limit_says_which_it_is_and_by_how_much(toy, reason, changed, value, limit):
@@ -198,7 +198,7 @@ def test_what_both_sides_have_touched_may_turn_while_contacts_flicker(toy, touch
             changes = {"contacts": contacts, "closure": np.float64(0.31)}
             if len(ticks) == 3:
                 objects, i = stage.world.now.objects.copy(), stage.world.model.object_index("cup")
-                turned = np.array([math.cos(0.15), math.sin(0.15), 0.0, 0.0])
+                turned = np.array([math.cos(0.2), math.sin(0.2), 0.0, 0.0])
                 changes["objects"] = np.array(objects)
                 changes["objects"][i, 3:] = poses.quat_multiply(turned, objects[i, 3:])
             stage.world.put(**changes)
