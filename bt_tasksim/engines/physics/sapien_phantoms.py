@@ -16,6 +16,7 @@ that is thrown, by hundreds of newtons; it goes on as it went. Nothing feels suc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -67,16 +68,17 @@ class Phantoms:
     ) -> None:
         self._world, self._known = world, known
         self._articulation, self._arm = articulation, list(arm)
-        self._position = self._velocity = np.zeros(0)
+        self._position, self._velocity = np.zeros(0), list[float]()
 
     def look(self, near: Sequence[int]) -> list[Before]:
         """How these objects are before a step."""
-        found = []
+        objects, found = self._world.objects, []
         for k in near:
-            body = self._world.objects[k]
+            body = objects[k]
             found.append(Before(k, body.entity_pose, body.linear_velocity, body.angular_velocity))
         if found and self._articulation is not None:
-            self._position, self._velocity = self._articulation.get_qpos(), self._articulation.get_qvel()
+            self._position = self._articulation.get_qpos()
+            self._velocity = self._articulation.get_qvel().tolist()
         return found
 
     def undo(self, before: Sequence[Before], seconds: float) -> None:
@@ -84,7 +86,7 @@ class Phantoms:
         least = KICK[0] + KICK[1] * seconds
         for each in before:
             body = self._world.objects[each.which]
-            if float(np.linalg.norm(body.linear_velocity - each.linear)) < least:
+            if math.dist(body.linear_velocity.tolist(), each.linear.tolist()) < least:
                 continue
             met = list(self._met(body, each.pose))
             if not any(made_up for made_up, _, _ in met):
@@ -96,27 +98,27 @@ class Phantoms:
                 if true.depth > -TOUCHES:
                     without_nearing(self._world, bodies, true)
         if before and self._articulation is not None:
-            self._undo_robot(self._articulation, before, seconds)
+            velocity, was = self._articulation.get_qvel().tolist(), self._velocity
+            if any([abs(velocity[k] - was[k]) >= JOLT for k in self._arm]):
+                self._undo_robot(self._articulation, before, seconds)
 
     def _undo_robot(
         self, articulation: physx.PhysxArticulation, before: Sequence[Before], seconds: float
     ) -> None:
         """The same for the robot, which goes on as it went before the step, and for what threw it."""
-        position, velocity = articulation.get_qpos(), articulation.get_qvel()
-        if max(abs(velocity[k] - self._velocity[k]) for k in self._arm) < JOLT:
-            return
         near = {self._world.objects[each.which]: each for each in before}
         threw = [each for each in self._world.system.get_contacts() if self._is_suspect(each, near)]
         if not threw:
             return
+        position, velocity, was = articulation.get_qpos(), articulation.get_qvel(), np.array(self._velocity, np.float32)
         articulation.set_qpos(self._position)  # to look where its links were
         made_up = [contact for contact in threw if self._is_made_up(contact, near)]
         if not made_up:
             articulation.set_qpos(position)
             articulation.set_qvel(velocity)
             return
-        articulation.set_qpos(self._position + seconds * self._velocity)
-        articulation.set_qvel(self._velocity)
+        articulation.set_qpos(self._position + seconds * was)
+        articulation.set_qvel(was)
         for contact in made_up:
             for body in contact.bodies:
                 if body in near:

@@ -80,7 +80,7 @@ class Twist:
         hand, thing = _turn(self._hand), _turn(self._bodies[which])
         if which != self._held:
             self._held, self._turned, self._slipped = which, 0.0, 0.0
-            self._back = poses.turned(_back(thing), hand)
+            self._back = _back(_turned_in(self._hand, self._bodies[which]))
         self._limit = self._most * sum(sides)
         self._axis = poses.rotated(hand, self._across)
         frame, moments = self._inertia[which]
@@ -94,7 +94,7 @@ class Twist:
         bodies that overlap, too.
         """
         body = self._bodies[self._held]
-        w, x, y, z = poses.turned(poses.turned(_back(_turn(self._hand)), _turn(body)), self._back)
+        w, x, y, z = poses.turned(_turned_in(self._hand, body), self._back)
         a, b, c = self._across
         turned = (2.0 if w >= 0.0 else -2.0) * (x * a + y * b + z * c)
         stiffness, damping = STIFF * self._moment / (step * step), DAMPED * self._moment / step
@@ -111,6 +111,18 @@ class Twist:
 def _turn(body: physx.PhysxRigidBaseComponent) -> list[float]:
     """Quaternion of a body."""
     return list(floats(body.entity_pose)[3:])
+
+
+def _turned_in(hand: physx.PhysxRigidBaseComponent, thing: physx.PhysxRigidBaseComponent) -> list[float]:
+    """Quaternion of a body in the frame of another one."""
+    _, _, _, aw, ax, ay, az = floats(hand.entity_pose)
+    _, _, _, bw, bx, by, bz = floats(thing.entity_pose)
+    return [
+        aw * bw + ax * bx + ay * by + az * bz,
+        aw * bx - ax * bw - ay * bz + az * by,
+        aw * by + ax * bz - ay * bw - az * bx,
+        aw * bz - ax * by + ay * bx - az * bw,
+    ]
 
 
 def _back(turn: list[float]) -> list[float]:
