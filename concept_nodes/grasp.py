@@ -27,7 +27,6 @@ from bt_tasksim.concept_nodes.grasp_choice import (
     aims_of,
     goes_aside,
     rooms,
-    thorough,
 )
 from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, CLOSE, EAGER, HASTE, SCALE
 from bt_tasksim.concept_nodes.grasp_firmness import SLANTED
@@ -374,9 +373,7 @@ class Grasp(ConceptModel[GraspMemory]):
         try:
             return with_room(tried, find)
         except NoWayError:
-            if not thorough(view.robot):
-                raise
-        return find(tried[-1], thoroughly=True)
+            return find(tried[-1], thoroughly=True)
 
     def _as_given(self, tools: Array, view: WorldView) -> Array:
         """Whether ``(k,)`` tools ``(k, 7)`` have the approach and the closing axis that the author gave."""

@@ -240,6 +240,9 @@ class Chooser:
                 break
             if last is not None and _alike(goal, last.goal):
                 continue
+            if not self._has_room_later(goal, hand):
+                candidates.no_good(goal)
+                continue
             tried += 1
             at = hand.beside
             reached = self._reaches(goal, at)
@@ -279,9 +282,8 @@ class Chooser:
     def _with_room(self, tool: Array, width: float) -> Opening | None:
         """The hand that has room at a grasp ``(7,)`` of what is ``width`` metres wide, if any."""
         hand = self._opening(width)
-        if self._thoroughly and self._firm.asks and not hand.free(tool):
-            robot = self._view.robot
-            less = self._opened(robot.hand_position(closing_of(robot).about(width + 2 * SPARE)[None]))
+        if self._thoroughly and not self._slide and not hand.free(tool):
+            less = self._opened(partly_opened(self._view.robot, width + 2 * SPARE))
             if less.closure > hand.closure and less.free(tool):
                 return less
         if self._slide and self._close and not hand.free(tool):
@@ -355,13 +357,25 @@ class Chooser:
             return self._no(f"where the hand would touch {_other(at.collisions.touches(end.joints[0]))}")
         return True
 
+    def _has_room_later(self, goal: Array, hand: Opening) -> bool:
+        """Whether the hand alone has room at a grasp ``(7,)`` in all that comes after it."""
+        closed = self._closed(goal)
+        for aim in self._aims:
+            if not len(aim.tools(closed, hand.hand)):
+                return self._no(f"that cannot also {aim.words}")
+        return True
+
+    def _closed(self, goal: Array) -> Array:
+        """Where the tool is when the hand has closed at a grasp ``(7,)``."""
+        return poses.shifted(goal, self._slide * poses.to_matrix(goal[3:])[:, 1])
+
     def _serves(self, goal: Array, hand: Opening, at: WayFinder) -> _Begins | None:
         """Where the approach to a grasp may begin; None where the grasp is no good."""
         return self._begins(goal, hand, at) if self._fits(goal, hand) else None
 
     def _fits(self, goal: Array, hand: Opening) -> bool:
         """Whether a grasp serves all that comes after it."""
-        closed = poses.shifted(goal, self._slide * poses.to_matrix(goal[3:])[:, 1])
+        closed = self._closed(goal)
         for aim in self._aims:
             if not aim.by(closed, hand.hand, self._turns):
                 return self._no(f"that cannot also {aim.words}")
@@ -469,12 +483,13 @@ def goes_aside(aims: Sequence[Aim]) -> bool:
     return any(aim.aside is not None and len(aim.aside) > 0 for aim in aims)
 
 
-def thorough(robot: RobotDescription) -> bool:
-    """Where no grasp serves, it is looked for longer and with partly closed hands.
-
-    A hand of many fingers has so much less room, and so many more ways to hold, than what is asked at first.
-    """
-    return len(robot.tips) > TWO
+def partly_opened(robot: RobotDescription, wide: float) -> Array:
+    """Joints ``(n_hand,)`` of a hand that is open so many metres, of one without a jaw that swings."""
+    if len(robot.tips) > TWO:
+        return robot.hand_position(closing_of(robot).about(wide)[None])
+    share = min(1.0, wide / robot.opening)
+    found: Array = robot.hand_closed + share * (robot.hand_open - robot.hand_closed)
+    return found
 
 
 def loses(robot: RobotDescription) -> bool:
@@ -520,18 +535,17 @@ class _Served:
         falls = (0.0, *HIGHER) if higher and not aim.on_the_way else (0.0,)
         self._poses = np.concatenate([poses.shifted(ends, np.array([0.0, 0.0, above])) for above in falls])
         self.words = aim.words
+        self._asked, self._tools = (b"", b""), np.zeros((0, 7))
 
     def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
         """Whether a grasp at a tool pose ``(7,)`` serves it, also turned about the tool's x axis.
 
         The hand's joints ``(n_hand,)`` are those with which it comes: so it is going to be when it lets go.
         """
-        around = self._around
-        alone = around.alone(hand)
-        tools = poses.multiply(self._possible, poses.relative(around.now, goal)[None])
-        tools = np.array([tool for tool in tools if alone.free(tool)]).reshape(-1, 7)
+        around, tools = self._around, self.tools(goal, hand)
         if not len(tools):
             return False
+        alone = around.alone(hand)
         finder = around.finder(goal, hand, frozenset(self._aim.supports))
         leans = finder.leanings[-1] if self._aim.on_the_way else LEANS
 
@@ -543,6 +557,17 @@ class _Served:
             return all(alone.free(other) and reached(other) for other in others)
 
         return any(reached(tool) and turned(tool) for tool in tools)
+
+    def tools(self, goal: Array, hand: Array) -> Array:
+        """Tool poses ``(k, 7)`` at which it is served where the hand alone touches nothing, see `by`."""
+        asked = goal.tobytes(), hand.tobytes()
+        if asked != self._asked:
+            around = self._around
+            every = poses.multiply(self._possible, poses.relative(around.now, goal)[None])
+            alone = around.alone(hand)
+            free = np.array([tool for tool in every if alone.free(tool)]).reshape(-1, 7)
+            self._asked, self._tools = asked, free
+        return self._tools
 
     def far(self, tools: Array) -> Array:
         """How far ``(k,)`` the arm is from being there with grasps ``(k, 7)``, see `ReachMap.far`."""

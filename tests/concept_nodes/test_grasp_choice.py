@@ -249,15 +249,15 @@ def test_a_hand_of_many_fingers_takes_a_round_thing_about_its_middle_from_the_si
     assert firm.holds(poses.shifted(deepest, -0.03 * poses.z_axis(deepest[3:]))) != SURELY
 
 
-def between_walls(apart):
-    """The view of a xArm7 with the Ability hand on a bar that stands between walls so many metres apart."""
+def between_walls(apart, robot="xarm7_ability"):
+    """A robot's view of a bar that stands between walls so many metres apart."""
     from bt_tasksim import Scene
     from bt_tasksim.concept_nodes.view import WorldView
     from bt_tasksim.scene import ObjectSpec
 
-    robot = load_robot("xarm7_ability")
+    robot = load_robot(robot)
     bar = ObjectSpec(kinds=("box",), on="table", size=((0.1, 0.02, 0.03),) * 2)
-    model = Scene("xarm7_ability", objects={"bar": bar}).sample(0).world_model(["bar"], robot.opening)
+    model = Scene(robot.name, objects={"bar": bar}).sample(0).world_model(["bar"], robot.opening)
     walls = [
         Obstacle(
             pose=poses.pose([0.45, side * (apart + 0.02) / 2, 0.02]), size=(0.3, 0.02, 0.04), fixture="tray"
@@ -270,8 +270,9 @@ def between_walls(apart):
     return WorldView(robot, world, objects, tool, robot.rest, robot.hand_open)
 
 
-def test_a_hand_that_has_no_room_wide_open_comes_partly_closed_where_nothing_else_serves():
-    view = between_walls(apart=0.105)
+@pytest.mark.parametrize(("robot", "apart"), [("xarm7_ability", 0.105), ("panda", 0.08)])
+def test_a_hand_that_has_no_room_wide_open_comes_partly_closed_where_nothing_else_serves(robot, apart):
+    view = between_walls(apart, robot)
     neutral = poses.frame_from_axes(DOWN, np.array([0.0, 1.0, 0.0]))
     found = candidates(view, "bar", DOWN, neutral)
     lengthwise = abs(poses.to_matrix(found.tools[:, 3:])[:, 1, 1]) > 0.9
