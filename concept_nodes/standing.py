@@ -22,6 +22,8 @@ in a hand of fingers that swing. It stands up when it is let go. Less than `plac
 ASIDE = 0.01
 """Metres beside where something should stand at which it is put down where it cannot be put there itself:
 half of what `AtPose` tolerates; the rest is for errors of estimates and of the hand."""
+TURNED = 0.1
+"""Radians by which it is turned there then: the same of an angle."""
 FARTHER = 0.014
 """The same once it is held: a grasp is chosen for `ASIDE`, and what is held moves some millimetres in the
 hand as this closes."""
@@ -50,7 +52,7 @@ def standing_options(view: WorldView, target: str, reference: str, hover: float 
 
 
 def aside_options(view: WorldView, reference: str, options: Array, held: bool = False) -> Array:
-    """Poses ``(m, 7)`` aside of some ``(k, 7)`` over a place: nearer to the arm's base, farther, across.
+    """Poses ``(m, 7)`` aside of some ``(k, 7)`` over a place: nearer to the arm, farther, across, turned.
 
     None is over another object, whose top may be small, or in a container; nor beyond the place itself.
 
@@ -66,11 +68,25 @@ def aside_options(view: WorldView, reference: str, options: Array, held: bool = 
     frame = np.asarray(place.pose)
     towards = frame[:2] / max(float(np.linalg.norm(frame[:2])), 1e-9)
     ways = np.array([-towards, towards, (-towards[1], towards[0]), (towards[1], -towards[0])])
-    steps = [far * way for far in ((ASIDE, FARTHER) if held else (ASIDE,)) for way in ways]
-    moved = np.concatenate([options + np.array([*step, 0.0, 0.0, 0.0, 0.0, 0.0]) for step in steps])
-    there = abs(poses.localise(frame, moved[:, :3])[:, :2] - np.asarray(place.centre))
-    found: Array = moved[(there <= np.asarray(place.extent) / 2).all(axis=-1)]
+    moved = [_moved(options, ASIDE * way) for way in ways]
+    moved += [_turned(options, angle) for angle in (TURNED, -TURNED)]
+    moved += [_moved(options, FARTHER * way) for way in ways] if held else []
+    every = np.concatenate(moved)
+    there = abs(poses.localise(frame, every[:, :3])[:, :2] - np.asarray(place.centre))
+    found: Array = every[(there <= np.asarray(place.extent) / 2).all(axis=-1)]
     return found
+
+
+def _moved(options: Array, by: Array) -> Array:
+    """The same poses ``(k, 7)`` moved over the ground by ``(2,)`` metres."""
+    found: Array = options + np.array([*by, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return found
+
+
+def _turned(options: Array, angle: float) -> Array:
+    """The same poses ``(k, 7)`` turned about the upward axis, radians."""
+    turned = poses.quat_multiply(poses.yaw(angle)[None], options[:, 3:])
+    return np.concatenate([options[:, :3], turned], axis=-1)
 
 
 def emptiest(view: WorldView, target: str, container: str) -> Array:

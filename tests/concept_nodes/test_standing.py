@@ -11,6 +11,7 @@ from bt_tasksim.concept_nodes.standing import (
     ASIDE,
     HEADINGS,
     TIPPED,
+    TURNED,
     aside_options,
     emptiest,
     headings,
@@ -50,22 +51,26 @@ def test_what_is_round_may_have_any_heading_and_a_box_those_of_its_symmetry(view
     assert len(standing_options(view, "box", "goal")) == view.model("box").symmetry
 
 
-def test_a_little_aside_it_stands_nearer_to_the_arm_farther_or_to_either_side(view):
+def test_a_little_aside_it_stands_nearer_to_the_arm_farther_to_either_side_or_turned(view):
     options = standing_options(view, "box", "goal", 0.05)
-    found, place = aside_options(view, "goal", options), view.world.place("goal")
-    assert len(found) == 4 * len(options) and np.allclose(found[:, 2], options[0, 2])
+    every, place = aside_options(view, "goal", options), view.world.place("goal")
+    found, turned = np.split(every, [4 * len(options)])
+    assert len(turned) == 2 * len(options) and np.allclose(every[:, 2], options[0, 2])
+    assert np.allclose(turned[:, :3], options[0, :3])
+    angles = [poses.angle_between(options[:, 3:], each[None, 3:]).min() for each in turned]
+    assert np.allclose(angles, TURNED)
     moved = found[:, :2] - options[0, :2]
     assert np.allclose(np.linalg.norm(moved, axis=-1), ASIDE)
     far = np.linalg.norm(found[:, :2], axis=-1) - np.linalg.norm(options[0, :2])
     assert far.min() == pytest.approx(-ASIDE) and far.max() == pytest.approx(ASIDE)
     assert {tuple(r) for r in np.round(found[:, 3:], 6)} == {tuple(r) for r in np.round(options[:, 3:], 6)}
     both = aside_options(view, "goal", options, held=True)
-    assert np.array_equal(both[: len(found)], found) and len(both) == 2 * len(found)
+    assert np.array_equal(both[: len(every)], every) and len(both) == len(every) + len(found)
     small = dataclasses.replace(place, extent=(1.5 * ASIDE, 1.5 * ASIDE))
     container = dataclasses.replace(place, kind="bin")
-    for other in (small, container):
+    for other, left in ((small, turned), (container, turned[:0])):
         world = dataclasses.replace(view.world, places={**view.world.places, "goal": other})
-        assert len(aside_options(view._replace(world=world), "goal", options)) == 0
+        assert np.array_equal(aside_options(view._replace(world=world), "goal", options), left)
     assert len(aside_options(view, "cup", options)) == 0, "what it stands on may be no larger"
 
 

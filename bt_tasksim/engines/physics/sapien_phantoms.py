@@ -99,7 +99,7 @@ class Phantoms:
                     without_nearing(self._world, bodies, true)
         if before and self._articulation is not None:
             velocity, was = self._articulation.get_qvel().tolist(), self._velocity
-            if any([abs(velocity[k] - was[k]) >= JOLT for k in self._arm]):
+            if max([abs(velocity[k] - was[k]) for k in self._arm], default=0.0) >= JOLT:
                 self._undo_robot(self._articulation, before, seconds)
 
     def _undo_robot(
@@ -110,7 +110,8 @@ class Phantoms:
         threw = [each for each in self._world.system.get_contacts() if self._is_suspect(each, near)]
         if not threw:
             return
-        position, velocity, was = articulation.get_qpos(), articulation.get_qvel(), np.array(self._velocity, np.float32)
+        position, velocity = articulation.get_qpos(), articulation.get_qvel()
+        was = np.array(self._velocity, np.float32)
         articulation.set_qpos(self._position)  # to look where its links were
         made_up = [contact for contact in threw if self._is_made_up(contact, near)]
         if not made_up:
