@@ -54,7 +54,8 @@ class AtPose(Condition):
         target: The object.
         on: The place, or another object.
         tolerance: How far off it may be.
-        angle: How much it may be turned or tilted from the nearest pose that looks right.
+        angle: How much it may be turned or tilted from the nearest pose that looks right; on another object,
+            which may be turned anyhow itself, how much it may be tilted.
     """
 
     target: ObjectName
@@ -97,7 +98,9 @@ class AtPose(Condition):
         frame, _ = destination(seen, self.on)
         goal = standing_pose(frame, now, seen.model(self.target))
         gap = now[:, :3] - goal[:, :3]
-        return poses.norm(gap), poses.angle_between(now[:, 3:], goal[:, 3:])
+        if self.on in seen.world.place_columns:
+            return poses.norm(gap), poses.angle_between(now[:, 3:], goal[:, 3:])
+        return poses.norm(gap), poses.tilt(now[:, 3:], goal[:, 3:])
 
 
 @register("concept")

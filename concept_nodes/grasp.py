@@ -19,15 +19,9 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes import grasp_features
 from bt_tasksim.concept_nodes.closer import with_room
+from bt_tasksim.concept_nodes.grasp_aims import aims_of, goes_aside
 from bt_tasksim.concept_nodes.grasp_candidates import candidates, narrowest_grip
-from bt_tasksim.concept_nodes.grasp_choice import (
-    GENTLE,
-    Choice,
-    Chooser,
-    aims_of,
-    goes_aside,
-    rooms,
-)
+from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, rooms
 from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, CLOSE, EAGER, HASTE, SCALE
 from bt_tasksim.concept_nodes.grasp_firmness import SLANTED
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory

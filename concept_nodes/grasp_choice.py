@@ -13,28 +13,24 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from bt_tasksim.concept.aim import Aim
-from bt_tasksim.concept_nodes.closer import HIGHER, ROOMS
+from bt_tasksim.concept_nodes.closer import ROOMS
+from bt_tasksim.concept_nodes.grasp_aims import Around, Served
 from bt_tasksim.concept_nodes.grasp_candidates import HOLLOW, Candidates
 from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, TWO, Firm, deeper
-from bt_tasksim.concept_nodes.grasp_opening import Opening, wide_along
-from bt_tasksim.concept_nodes.holding import HOLDING
+from bt_tasksim.concept_nodes.grasp_opening import Closed, Opening, evenly_opened, wide_along
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.arm import LEANS
-from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.closing import closing_of
-from bt_tasksim.planning.hand_collision import HandCollisions
 from bt_tasksim.planning.reach import reach_of
 from bt_tasksim.planning.route import Pace, Route, followed, hurries
-from bt_tasksim.planning.surroundings import pieces_of
-from bt_tasksim.planning.things import Held, Leave
 from bt_tasksim.planning.ways import WayFinder
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.hand import SLIDE, opened_about, standing_side
@@ -58,7 +54,6 @@ ENOUGH = 3
 FROM_GRIP = 0.018
 """Metres that the usual grasp of a simple solid may be from a known grip of it; farther off, fingers that
 close on a rounded side squeeze it out."""
-STILL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 SAME_GRIP = (0.012, 0.02, 0.96)
 """Metres aside of a known grip, metres along its closing axis, and the cosine of the angle between the axes,
 within which a grasp is taken to hold as that grip does."""
@@ -71,8 +66,6 @@ FARTHEST = 400
 LONGER = 4
 """How many times as many where nothing has served: grasps from above that cannot be put down on a high tower
 use up all that are asked, before one that comes level has its turn."""
-ABOUT = 12
-"""Poses in what follows by which it is judged whether the arm comes near them."""
 LIKELIEST = 4000
 """Grasps that are looked at then; of some meshes there are 11,000."""
 USUAL, FAR = 0.3, 3.0
@@ -138,7 +131,7 @@ class Chooser:
         target: The object.
         standoff: Metres before the grasp from which the hand comes straight on.
         pace: How fast the tool may go.
-        aims: What is done with the target until it is let go, see `aims_of`.
+        aims: What is done with the target until it is let go, see `grasp_aims.aims_of`.
         closer: How much closer than usual what follows may come to things.
         firmly: Grasps that the fingers would hardly hold do not count.
         aside: It may be put down a little aside of where it should stand, see `Aim.aside`.
@@ -167,11 +160,9 @@ class Chooser:
         self._openings: dict[float, Opening] = {}
         if close:
             self._pace = pace = Pace(SLOWER * pace.speed, acceleration=SLOWER**2 * pace.acceleration)
-        around = _Around(view, target, closer)
+        around = Around(view, target, closer)
         higher = thoroughly and closer == ROOMS[-1]
-        self._aims = [
-            _Served(around, aim, aside, higher) for aim in reversed(aims)
-        ]  # the last is the hardest
+        self._aims = [Served(around, aim, aside, higher) for aim in reversed(aims)]  # the last is the hardest
         self._why: Counter[str] = Counter()
         self._gently = pace._replace(acceleration=GENTLE)
 
@@ -309,6 +300,8 @@ class Chooser:
             hand = self._with_room(goal, width)
             if hand is None:
                 continue
+            if not self._closes(goal, width):
+                continue
             asked += 1
             centred = self._firm.centred(goal)
             if centred is not goal and not hand.free(centred):
@@ -325,6 +318,17 @@ class Chooser:
                 yield centred, hand
         while waiting:
             yield heapq.heappop(waiting)[2:]
+
+    def _closes(self, goal: Array, width: float) -> bool:
+        """Whether fingers that close at a grasp ``(7,)`` of what is so wide touch nothing else."""
+        if self._slide or self._firm.asks:  # a jaw that swings comes from afar; of many fingers `Firm` knows
+            return True
+        touch = self._fingers.touch(goal, width)
+        return touch is None or self._no(f"where the fingers would close on {touch[1]}")
+
+    @cached_property
+    def _fingers(self) -> Closed:
+        return Closed(self._view, self._target, self._close)
 
     @cached_property
     def _firm(self) -> Firm:
@@ -470,7 +474,7 @@ def rooms(robot: RobotDescription, aside: bool = False) -> list[tuple[float, boo
 
     Args:
         robot: The robot.
-        aside: Things may be put down a little aside, see `goes_aside`.
+        aside: Things may be put down a little aside, see `grasp_aims.goes_aside`.
     """
     exactly = [(closer, False) for closer in ROOMS]
     tried = [*exactly, (ROOMS[-1], True)] if aside else exactly
@@ -478,134 +482,16 @@ def rooms(robot: RobotDescription, aside: bool = False) -> list[tuple[float, boo
     return [(closer, firm, beside) for firm in firmly for closer, beside in tried]
 
 
-def goes_aside(aims: Sequence[Aim]) -> bool:
-    """Whether a target may be put down a little aside of where it should stand, see `Aim.aside`."""
-    return any(aim.aside is not None and len(aim.aside) > 0 for aim in aims)
-
-
 def partly_opened(robot: RobotDescription, wide: float) -> Array:
     """Joints ``(n_hand,)`` of a hand that is open so many metres, of one without a jaw that swings."""
     if len(robot.tips) > TWO:
         return robot.hand_position(closing_of(robot).about(wide)[None])
-    share = min(1.0, wide / robot.opening)
-    found: Array = robot.hand_closed + share * (robot.hand_open - robot.hand_closed)
-    return found
+    return evenly_opened(robot, wide)
 
 
 def loses(robot: RobotDescription) -> bool:
     """A hand with a jaw that swings, or of many fingers: it pushes aside what it does not take well."""
     return standing_side(robot) is not None or len(robot.tips) > TWO
-
-
-class _Around:
-    """What stands around where the target is brought, for all that a grasp has to serve."""
-
-    def __init__(self, view: WorldView, target: str, closer: float) -> None:
-        self.view, self.target = view, target
-        self.things, self.now = view.things([target], closer=closer), view.objects[target]
-        self._hands: dict[float, HandCollisions] = {}
-        self._asked: tuple[bytes, float] | None = None
-        self._finders: dict[frozenset[str], WayFinder] = {}
-
-    def alone(self, hand: Array) -> HandCollisions:
-        """The open hand where the object is to be, without the object, which is looked at by itself."""
-        closure = float(self.view.robot.closure(hand))
-        if closure not in self._hands:
-            self._hands[closure] = HandCollisions(bodies_of(self.view.robot), hand, self.things)
-        return self._hands[closure]
-
-    def finder(self, goal: Array, hand: Array, supports: frozenset[str]) -> WayFinder:
-        """Ways with the target as a hand holds it that took it at a tool pose ``(7,)``."""
-        asked = goal.tobytes(), float(self.view.robot.closure(hand))
-        if asked != self._asked:
-            self._asked, self._finders = asked, {}
-        if supports not in self._finders:
-            view, grip = self.view, poses.relative(goal, self.now)
-            held, leave = view.held(self.target, grip), Leave(held=supports)
-            self._finders[supports] = WayFinder(view.robot, view.arm, hand, self.things, held, leave)
-        return self._finders[supports]
-
-
-class _Served:
-    """An aim that a grasp has to serve."""
-
-    def __init__(self, around: _Around, aim: Aim, aside: bool, higher: bool) -> None:
-        self._around, self._aim = around, aim
-        ends = aim.aside if aside and aim.aside is not None and len(aim.aside) else aim.poses
-        falls = (0.0, *HIGHER) if higher and not aim.on_the_way else (0.0,)
-        self._poses = np.concatenate([poses.shifted(ends, np.array([0.0, 0.0, above])) for above in falls])
-        self.words = aim.words
-        self._asked, self._tools = (b"", b""), np.zeros((0, 7))
-
-    def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
-        """Whether a grasp at a tool pose ``(7,)`` serves it, also turned about the tool's x axis.
-
-        The hand's joints ``(n_hand,)`` are those with which it comes: so it is going to be when it lets go.
-        """
-        around, tools = self._around, self.tools(goal, hand)
-        if not len(tools):
-            return False
-        alone = around.alone(hand)
-        finder = around.finder(goal, hand, frozenset(self._aim.supports))
-        leans = finder.leanings[-1] if self._aim.on_the_way else LEANS
-
-        def reached(tool: Array) -> bool:
-            return bool(finder.ends(tool[None], leans=leans).free[0])
-
-        def turned(tool: Array) -> bool:
-            others = [_turned(tool, angle) for angle in turns]
-            return all(alone.free(other) and reached(other) for other in others)
-
-        return any(reached(tool) and turned(tool) for tool in tools)
-
-    def tools(self, goal: Array, hand: Array) -> Array:
-        """Tool poses ``(k, 7)`` at which it is served where the hand alone touches nothing, see `by`."""
-        asked = goal.tobytes(), hand.tobytes()
-        if asked != self._asked:
-            around = self._around
-            every = poses.multiply(self._possible, poses.relative(around.now, goal)[None])
-            alone = around.alone(hand)
-            free = np.array([tool for tool in every if alone.free(tool)]).reshape(-1, 7)
-            self._asked, self._tools = asked, free
-        return self._tools
-
-    def far(self, tools: Array) -> Array:
-        """How far ``(k,)`` the arm is from being there with grasps ``(k, 7)``, see `ReachMap.far`."""
-        grips = poses.relative(self._around.now[None], tools)
-        some = self._possible[:: max(1, len(self._possible) // ABOUT)]
-        reach = reach_of(self._around.view.robot)
-        far = [reach.far(poses.multiply(pose[None], grips)) for pose in some]
-        return np.min(far, axis=0) if far else np.zeros(len(tools))
-
-    @cached_property
-    def _possible(self) -> Array:
-        """Poses ``(k, 7)`` of the aim in which the object alone touches nothing, whoever holds it."""
-        view, things, supports = self._around.view, self._around.things, self._aim.supports
-        robot, target = view.robot, self._around.target
-        alone = Held(target, STILL, pieces_of(view.model(target)))
-        leave = Leave(hand={thing.name for thing in things}, held=supports)
-        object_ = HandCollisions(bodies_of(robot), robot.hand_open, things, alone, leave)
-        return np.array([pose for pose in self._poses if object_.free(pose)]).reshape(-1, 7)
-
-
-def aims_of(view: WorldView, target: str, later: Sequence[Any]) -> list[Aim]:
-    """What is done with the target until it is let go.
-
-    Args:
-        view: The world.
-        target: The object.
-        later: The concepts that come after the grasp.
-    """
-    found: list[Aim] = []
-    for model in later:
-        if getattr(model, "actor", None) != target:
-            continue
-        aim = model.aim(view)
-        if aim is not None:
-            found.append(aim)
-        if HOLDING in model.ends:
-            break
-    return found
 
 
 def _straight(way: Sequence[Array], coming: WayFinder, at: WayFinder) -> tuple[Array, Array] | None:
@@ -624,13 +510,6 @@ def _straight(way: Sequence[Array], coming: WayFinder, at: WayFinder) -> tuple[A
     if there is None or on is None:
         return None
     return np.concatenate([coming.start[None], there]), np.concatenate([there[-1:], on])
-
-
-def _turned(tool: Array, angle: float) -> Array:
-    """A tool pose ``(7,)`` turned about its own x axis, radians."""
-    half = angle / 2
-    turn = np.array([np.cos(half), np.sin(half), 0.0, 0.0])
-    return np.concatenate([tool[:3], poses.quat_multiply(tool[3:], turn)])
 
 
 def _alike(a: Array, b: Array) -> bool:

@@ -1,7 +1,8 @@
-"""A hand as wide open as it comes to a grasp, among what stands around: what it would touch, and its ways."""
+"""A hand at a grasp among what stands around: as wide open as it comes, and when it has closed."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -15,8 +16,9 @@ from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.collision import OWN
 from bt_tasksim.planning.hand_collision import HandCollisions
 from bt_tasksim.planning.surroundings import pieces_of
-from bt_tasksim.planning.things import Leave
+from bt_tasksim.planning.things import Leave, Touch
 from bt_tasksim.planning.ways import WayFinder
+from bt_tasksim.robot.description import RobotDescription
 
 ASIDE = (0.004, 0.003)
 """Metres across and along the closing axis by which a hand should be able to come beside where it is meant
@@ -25,6 +27,10 @@ there is not so much room a share of it."""
 TIGHT = 0.008
 """Metres beside where it is meant to be at which a hand with little room would touch something: four times
 the standard deviation of good estimates, since an arm is beside its path, too."""
+
+
+WIDTHS = 0.004
+"""Metres between the widths for which it is looked where fingers are when they have closed."""
 
 
 class Opening:
@@ -96,6 +102,39 @@ class Opening:
         things = self._view.things(closer=TOUCHING, taken=self._target, palm=False)
         hand = HandCollisions(bodies_of(self._view.robot), self.hand, things)
         return not all(hand.free(tool) for tool in _beside(goal, TIGHT, TIGHT))
+
+
+class Closed:
+    """The fingers of a hand in one world when they have closed.
+
+    An open hand may have room where they have none: of a ring that lies over the edge of a board one finger
+    comes below, and meets the board as it closes.
+
+    Args:
+        view: The world.
+        target: What it takes.
+        close: It comes closer to things than usual.
+    """
+
+    def __init__(self, view: WorldView, target: str, close: bool = False) -> None:
+        self._view, self._target, self._closer = view, target, VERY_CLOSE if close else CLOSER
+        self._hands: dict[int, HandCollisions] = {}
+
+    def touch(self, goal: Array, width: float) -> Touch | None:
+        """What they touch beside the target, which is ``width`` metres wide, at a tool pose ``(7,)``."""
+        number = math.ceil(width / WIDTHS)
+        if number not in self._hands:
+            robot, things = self._view.robot, self._view.things([self._target], closer=self._closer)
+            hand = evenly_opened(robot, number * WIDTHS)
+            self._hands[number] = HandCollisions(bodies_of(robot), hand, things)
+        return self._hands[number].first(goal)
+
+
+def evenly_opened(robot: RobotDescription, wide: float) -> Array:
+    """Joints ``(n_hand,)`` of a hand that is open so many metres, where its fingers part evenly."""
+    share = min(1.0, wide / robot.opening)
+    found: Array = robot.hand_closed + share * (robot.hand_open - robot.hand_closed)
+    return found
 
 
 def wide_along(view: WorldView, target: str, axis: Array) -> float:

@@ -52,19 +52,23 @@ def standing_options(view: WorldView, target: str, reference: str, hover: float 
 
 
 def aside_options(view: WorldView, reference: str, options: Array, held: bool = False) -> Array:
-    """Poses ``(m, 7)`` aside of some ``(k, 7)`` over a place: nearer to the arm, farther, across, turned.
+    """Poses ``(m, 7)`` beside some ``(k, 7)`` over a place: nearer to the arm, farther, across, turned.
 
-    None is over another object, whose top may be small, or in a container; nor beyond the place itself.
+    Over another object, whose top may be small, it is only turned, and by any angle. None is in a container,
+    nor beyond the place itself.
 
     Args:
         view: The world.
-        reference: The place.
+        reference: The place, or the other object.
         options: The poses.
         held: They are for what is in the hand; else for the choice of a grasp.
     """
     place = view.world.places.get(reference)
-    if place is None or place.kind == "bin" or not len(options):
+    if not len(options) or (place is not None and place.kind == "bin"):
         return np.zeros((0, 7))
+    if place is None:
+        turns = 2.0 * np.pi * np.arange(1, HEADINGS) / HEADINGS
+        return _unlike(np.concatenate([_turned(options[:1], turn) for turn in turns]), options)
     frame = np.asarray(place.pose)
     towards = frame[:2] / max(float(np.linalg.norm(frame[:2])), 1e-9)
     ways = np.array([-towards, towards, (-towards[1], towards[0]), (towards[1], -towards[0])])
@@ -75,6 +79,12 @@ def aside_options(view: WorldView, reference: str, options: Array, held: bool = 
     there = abs(poses.localise(frame, every[:, :3])[:, :2] - np.asarray(place.centre))
     found: Array = every[(there <= np.asarray(place.extent) / 2).all(axis=-1)]
     return found
+
+
+def _unlike(found: Array, options: Array) -> Array:
+    """Those of some poses ``(k, 7)`` that are turned from all of others ``(m, 7)``."""
+    angles = poses.angle_between(found[:, None, 3:], options[None, :, 3:])
+    return found[angles.min(axis=1) > TURNED]
 
 
 def _moved(options: Array, by: Array) -> Array:

@@ -106,6 +106,19 @@ def test_on_another_object(toy):
     assert asked(toy, AtPose("cup", on="box")).status == Status.FAILURE
 
 
+@pytest.mark.parametrize(
+    ("axis", "degrees", "yes"), [((0, 0, 1), 50, True), ((0, 1, 0), 11, True), ((0, 1, 0), 12, False)]
+)
+def test_on_another_object_it_may_be_turned_anyhow_and_not_tilted(toy, axis, degrees, yes):
+    world = toy(TimePassed(0.0)).world
+    cup, height = world.now.objects[0], world.model.object("box").extent[2]
+    turn = poses.from_rotation_vector(math.radians(degrees) * np.array(axis, float))
+    up = np.array([*cup[:2], cup[2] + (world.model.object("cup").extent[2] + height) / 2])
+    objects = np.stack([cup, np.concatenate([up, poses.quat_multiply(cup[3:], turn)])])
+    found = asked(toy, AtPose("box", on="cup"), objects=objects)
+    assert found.status == (Status.SUCCESS if yes else Status.FAILURE)
+
+
 @pytest.mark.parametrize(("time", "yes"), [(1.95, False), (2.0, True)])
 def test_time_passed(toy, time, yes):
     found = asked(toy, TimePassed(2.0), time=np.float64(time))

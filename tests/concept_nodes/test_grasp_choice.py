@@ -10,14 +10,13 @@ from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp, grasp_choice
 from bt_tasksim.concept_nodes.closer import CLOSER, ROOMS
-from bt_tasksim.concept_nodes.grasp_candidates import candidates
+from bt_tasksim.concept_nodes.grasp_aims import aims_of
+from bt_tasksim.concept_nodes.grasp_candidates import Candidates, candidates
 from bt_tasksim.concept_nodes.grasp_choice import (
     FARTHEST,
     NARROWER,
     Chooser,
     _straight,
-    aims_of,
-    goes_aside,
     rooms,
 )
 from bt_tasksim.concept_nodes.grasp_firmness import HARDLY
@@ -133,8 +132,6 @@ def test_where_no_grasp_serves_exactly_it_may_be_put_down_a_little_aside(view):
     aim = Aim(away[None], "be put down there", aside=aside[None])
     after = [later("box", aim)]
     aims = aims_of(view, "box", after)
-    assert goes_aside(aims) and not goes_aside(aims_of(view, "cup", after))
-    assert not goes_aside(aims_of(view, "box", [later("box", aim._replace(aside=None))]))
     tools = candidates(view, "box", DOWN, view.tool[3:])
     exactly = Chooser(view, "box", 0.1, Pace(0.5), aims, CLOSER)
     with pytest.raises(NoWayError, match="that cannot also be put down there"):
@@ -284,6 +281,29 @@ def test_a_hand_that_has_no_room_wide_open_comes_partly_closed_where_nothing_els
     with pytest.raises(NoWayError, match="touch tray"):
         asked(thoroughly=False)
     assert 0.1 < asked(thoroughly=True).closure < 0.9
+
+
+def over_an_edge():
+    """The Panda's view of a bar 3 cm high of which 4 cm lie over the front edge of a board, at x = 0.56 m."""
+    board = Obstacle(pose=poses.pose([0.71, 0.0, 0.44]), size=(0.3, 0.3, 0.02), fixture="board")
+    view = with_obstacles(between_walls(0.6, "panda"), board)
+    return view._replace(objects={"bar": poses.pose([0.57, 0.0, 0.465])})
+
+
+@pytest.mark.parametrize(("forward", "closes"), [(0.535, True), (0.55, False)])
+def test_fingers_that_would_meet_something_as_they_close_do_not_take_hold_there(forward, closes):
+    view = over_an_edge()
+    level = poses.frame_from_axes(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    goal = np.array([forward, 0.0, 0.465, *level])
+    opening = Opening(view, "bar", view.robot.hand_open, close=True, beside=0.0)
+    assert opening.free(goal), "wide open they have room"
+    chooser = Chooser(view, "bar", 0.1, Pace(0.5), (), ROOMS[-1])
+    only = Candidates(goal[None], np.zeros(1), np.array([0.03]))
+    if closes:
+        assert np.allclose(chooser.other(only).goal, goal)
+    else:
+        with pytest.raises(NoWayError, match="close on board"):
+            chooser.other(only)
 
 
 def test_grasps_with_which_the_arm_comes_to_what_follows_have_their_turn_where_nothing_else_serves(view):

@@ -71,7 +71,18 @@ def test_a_little_aside_it_stands_nearer_to_the_arm_farther_to_either_side_or_tu
     for other, left in ((small, turned), (container, turned[:0])):
         world = dataclasses.replace(view.world, places={**view.world.places, "goal": other})
         assert np.array_equal(aside_options(view._replace(world=world), "goal", options), left)
-    assert len(aside_options(view, "cup", options)) == 0, "what it stands on may be no larger"
+
+
+def test_on_another_object_which_may_be_no_larger_it_is_only_turned_by_any_angle(view):
+    options = standing_options(view, "box", "cup")
+    found = aside_options(view, "cup", options)
+    assert np.allclose(found[:, :3], options[0, :3])
+    every = np.concatenate([options, found])
+    assert len(every) == HEADINGS
+    turns = [poses.angle_between(every[i, 3:], every[j, 3:]) for i in range(len(every)) for j in range(i)]
+    assert min(turns) > 0.9 * 2 * np.pi / HEADINGS
+    round_ones = standing_options(view, "cup", "box")
+    assert len(aside_options(view, "box", round_ones)) == 0, "it has every heading already"
 
 
 def test_on_another_object_it_stands_on_its_top(view):

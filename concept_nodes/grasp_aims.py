@@ -1,0 +1,150 @@
+"""What is done with an object after it is grasped, and whether a grasp serves that, too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim.concept.aim import Aim
+from bt_tasksim.concept_nodes.closer import HIGHER
+from bt_tasksim.concept_nodes.holding import HOLDING
+from bt_tasksim.concept_nodes.view import WorldView
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.arm import LEANS
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.hand_collision import HandCollisions
+from bt_tasksim.planning.reach import reach_of
+from bt_tasksim.planning.surroundings import pieces_of
+from bt_tasksim.planning.things import Held, Leave
+from bt_tasksim.planning.ways import WayFinder
+
+STILL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+ABOUT = 12
+"""Poses in what follows by which it is judged whether the arm comes near them."""
+
+
+class Around:
+    """What stands around where the target is brought, for all that a grasp has to serve."""
+
+    def __init__(self, view: WorldView, target: str, closer: float) -> None:
+        self.view, self.target = view, target
+        self.things, self.now = view.things([target], closer=closer), view.objects[target]
+        self._hands: dict[float, HandCollisions] = {}
+        self._asked: tuple[bytes, float] | None = None
+        self._finders: dict[frozenset[str], WayFinder] = {}
+
+    def alone(self, hand: Array) -> HandCollisions:
+        """The open hand where the object is to be, without the object, which is looked at by itself."""
+        closure = float(self.view.robot.closure(hand))
+        if closure not in self._hands:
+            self._hands[closure] = HandCollisions(bodies_of(self.view.robot), hand, self.things)
+        return self._hands[closure]
+
+    def finder(self, goal: Array, hand: Array, supports: frozenset[str]) -> WayFinder:
+        """Ways with the target as a hand holds it that took it at a tool pose ``(7,)``."""
+        asked = goal.tobytes(), float(self.view.robot.closure(hand))
+        if asked != self._asked:
+            self._asked, self._finders = asked, {}
+        if supports not in self._finders:
+            view, grip = self.view, poses.relative(goal, self.now)
+            held, leave = view.held(self.target, grip), Leave(held=supports)
+            self._finders[supports] = WayFinder(view.robot, view.arm, hand, self.things, held, leave)
+        return self._finders[supports]
+
+
+class Served:
+    """An aim that a grasp has to serve."""
+
+    def __init__(self, around: Around, aim: Aim, aside: bool, higher: bool) -> None:
+        self._around, self._aim = around, aim
+        ends = aim.aside if aside and aim.aside is not None and len(aim.aside) else aim.poses
+        falls = (0.0, *HIGHER) if higher and not aim.on_the_way else (0.0,)
+        self._poses = np.concatenate([poses.shifted(ends, np.array([0.0, 0.0, above])) for above in falls])
+        self.words = aim.words
+        self._asked, self._tools = (b"", b""), np.zeros((0, 7))
+
+    def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
+        """Whether a grasp at a tool pose ``(7,)`` serves it, also turned about the tool's x axis.
+
+        The hand's joints ``(n_hand,)`` are those with which it comes: so it is going to be when it lets go.
+        """
+        around, tools = self._around, self.tools(goal, hand)
+        if not len(tools):
+            return False
+        alone = around.alone(hand)
+        finder = around.finder(goal, hand, frozenset(self._aim.supports))
+        leans = finder.leanings[-1] if self._aim.on_the_way else LEANS
+
+        def reached(tool: Array) -> bool:
+            return bool(finder.ends(tool[None], leans=leans).free[0])
+
+        def turned(tool: Array) -> bool:
+            others = [_turned(tool, angle) for angle in turns]
+            return all(alone.free(other) and reached(other) for other in others)
+
+        return any(reached(tool) and turned(tool) for tool in tools)
+
+    def tools(self, goal: Array, hand: Array) -> Array:
+        """Tool poses ``(k, 7)`` at which it is served where the hand alone touches nothing, see `by`."""
+        asked = goal.tobytes(), hand.tobytes()
+        if asked != self._asked:
+            around = self._around
+            every = poses.multiply(self._possible, poses.relative(around.now, goal)[None])
+            alone = around.alone(hand)
+            free = np.array([tool for tool in every if alone.free(tool)]).reshape(-1, 7)
+            self._asked, self._tools = asked, free
+        return self._tools
+
+    def far(self, tools: Array) -> Array:
+        """How far ``(k,)`` the arm is from being there with grasps ``(k, 7)``, see `ReachMap.far`."""
+        grips = poses.relative(self._around.now[None], tools)
+        some = self._possible[:: max(1, len(self._possible) // ABOUT)]
+        reach = reach_of(self._around.view.robot)
+        far = [reach.far(poses.multiply(pose[None], grips)) for pose in some]
+        return np.min(far, axis=0) if far else np.zeros(len(tools))
+
+    @cached_property
+    def _possible(self) -> Array:
+        """Poses ``(k, 7)`` of the aim in which the object alone touches nothing, whoever holds it."""
+        view, things, supports = self._around.view, self._around.things, self._aim.supports
+        robot, target = view.robot, self._around.target
+        alone = Held(target, STILL, pieces_of(view.model(target)))
+        leave = Leave(hand={thing.name for thing in things}, held=supports)
+        object_ = HandCollisions(bodies_of(robot), robot.hand_open, things, alone, leave)
+        return np.array([pose for pose in self._poses if object_.free(pose)]).reshape(-1, 7)
+
+
+def aims_of(view: WorldView, target: str, later: Sequence[Any]) -> list[Aim]:
+    """What is done with the target until it is let go.
+
+    Args:
+        view: The world.
+        target: The object.
+        later: The concepts that come after the grasp.
+    """
+    found: list[Aim] = []
+    for model in later:
+        if getattr(model, "actor", None) != target:
+            continue
+        aim = model.aim(view)
+        if aim is not None:
+            found.append(aim)
+        if HOLDING in model.ends:
+            break
+    return found
+
+
+def goes_aside(aims: Sequence[Aim]) -> bool:
+    """Whether a target may be put down a little aside of where it should stand, see `Aim.aside`."""
+    return any(aim.aside is not None and len(aim.aside) > 0 for aim in aims)
+
+
+def _turned(tool: Array, angle: float) -> Array:
+    """A tool pose ``(7,)`` turned about its own x axis, radians."""
+    half = angle / 2
+    turn = np.array([np.cos(half), np.sin(half), 0.0, 0.0])
+    return np.concatenate([tool[:3], poses.quat_multiply(tool[3:], turn)])
