@@ -242,7 +242,7 @@ def main() -> None:
 
     try:
         result = runner.run(0, record=moving)
-        print("result", result.status.name, result.why, flush=True)
+        print("result", result.status.name, result.reason, result.why, flush=True)
     except KeyboardInterrupt as stop:
         running = [n.name for n in runner.tree.iterate() if n.status.name == "RUNNING"]
         print("stopped", type(stop).__name__, str(stop), running, flush=True)
