@@ -35,20 +35,20 @@ Results = dict[str, Any]
 def any_tree(results: Results) -> str:
     """Successes of the draws that are possible, and what trees said that was not so."""
     lines = [
-        "| with | draws | succeeded | impossible | time was over | of the possible (95 % interval) "
+        "| with | block | draws | succeeded | impossible | time was over | of the possible (95 % interval) "
         "| SUCCESS, goals missed | bodies overlapped |",
-        "|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, label in _shown(results):
         found = results.get(name)
         if found is None:
-            lines.append(f"| {label} | {NOT_YET} | | | | | | |")
+            lines.append(f"| {label} | | {NOT_YET} | | | | | | |")
             continue
         low, high = found["confidence_interval"]
         rate = f"{100 * found['possible_rate']:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
-        impossible = found["episodes"] - found["possible"]
+        impossible, block = found["episodes"] - found["possible"], found.get("block") or ""
         lines.append(
-            f"| {label} | {found['episodes']} | {found['successes']} | {impossible} "
+            f"| {label} | {block} | {found['episodes']} | {found['successes']} | {impossible} "
             f"| {found['unended']} | {rate} | {found['lies']} | {found['overlaps']} |"
         )
     return "\n".join(lines)
