@@ -125,6 +125,8 @@ FEELING = 0.05
 edge at 0.18 m/s presses 78 N before it can be stopped."""
 DEEP = 0.04
 """Metres before the grasp from which on fingers may meet an edge."""
+BOUNCING = 0.0015
+"""Metres by which a hand of which a finger has touched something is held up: it waits."""
 SURELY_ABOVE = 0.008
 """The same above an object's top, for the ends of a jaw that swings: they go far down beside what is tall."""
 SLOWEST = 0.05
@@ -501,8 +503,12 @@ class Grasp(ConceptModel[GraspMemory]):
         feeling = FEELING * xp.where(near, share, xp.ones_like(share))
         share = poses.clip(feeling * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), SLOWEST, 1.0)
         pace = (share - CAREFUL) / EAGER
-        slower = xp.minimum(pace, xp.zeros_like(pace))
+        slower, stands = xp.minimum(pace, xp.zeros_like(pace)), xp.full_like(pace, -CAREFUL / EAGER)
         pace = xp.where(xp.any(seen.contacts, axis=-1), slower, pace)
+        # A finger that stands on an edge bounces: it must not be pressed down while it does not touch.
+        held_up = poses.localise(memory.target, seen.tool[:, :3])[:, 2] < -BOUNCING
+        comes_down = (memory.closing < 0.0) & xp.any(memory.touched > 0.0, axis=-1)
+        pace = xp.where(held_up & comes_down, stands, pace)
         aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)
         return xp.concat([aside + self._yielding(seen, memory), pace[:, None]], axis=-1)
 

@@ -312,6 +312,27 @@ def test_a_finger_that_stands_on_something_goes_outwards(near):
         assert np.sign(action[0, ACROSS]) == np.sign(open_tips[finger])
 
 
+@pytest.mark.parametrize(
+    ("behind", "touched", "closing", "waits"),
+    [
+        (0.002, True, -1.0, True),
+        (0.001, True, -1.0, False),
+        (0.002, False, -1.0, False),
+        (0.002, True, 0.1, False),
+    ],
+)
+def test_a_finger_that_bounces_on_an_edge_is_not_pressed_down_in_between(
+    near, behind, touched, closing, waits
+):
+    """It has touched, does not at this instant, and the hand is held up."""
+    seen, memory = approaching(near, within=0.2, behind=behind)
+    so_far = np.zeros_like(memory.touched)
+    so_far[:, 0] = touched
+    memory = memory._replace(tight=np.array([True]), touched=so_far, closing=np.array([closing]))
+    action = near.model.programmed_motion(without_contacts(seen), memory)
+    assert (scaling_of(action, seen, memory) == 0.0) == waits
+
+
 def test_what_touches_goes_on_no_faster_than_what_feels_its_way(near, monkeypatch):
     """Near the base of a stiff arm that is slower than the careful pace."""
     monkeypatch.setattr(grasp, "gentler", lambda tool: np.full(len(tool), 0.02))
