@@ -79,6 +79,9 @@ def any_tree_pairs(results: Results) -> str:
             lines.append(f"| {ROWS[name]} | {NOT_YET} | | | | | |")
             continue
         pair = Paired("any_tree", name, usual, other)
+        if not pair.draws:
+            lines.append(f"| {ROWS[name]} | {NOT_YET} on this block | | | | | |")
+            continue
         lost, won = len(pair.only_old), len(pair.only_new)
         lines.append(
             f"| {ROWS[name]} | {pair.draws} | {pair.successes('old')} | {pair.successes('new')} "

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bt_tasksim.concept_nodes.grasp_firmness import TWO
 from bt_tasksim.concept_nodes.grasp_pose import beside_standing
 from bt_tasksim.concept_nodes.view import PALM, WorldView
 from bt_tasksim.core import poses
@@ -161,7 +160,7 @@ def candidates(view: WorldView, target: str, approach: Array, neutral: Array) ->
         tips = TIPS
     less = (0.0, *tips) if model.kind == HOLLOW else tips
     # The palm of a hand of many fingers is no plane: the hand itself says later what it would touch.
-    many = len(view.robot.tips) > TWO
+    many = view.robot.many_fingers
     deep = many and model.kind != HOLLOW
     deeper = [np.maximum(buried - more, 0.0) for more in DEEPER if deep]
     shifts = np.stack([*deeper, buried, *(first + more for more in less)], axis=-1)[:, None]

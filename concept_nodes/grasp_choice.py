@@ -21,7 +21,7 @@ from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept_nodes.closer import ROOMS
 from bt_tasksim.concept_nodes.grasp_aims import Around, Served
 from bt_tasksim.concept_nodes.grasp_candidates import HOLLOW, Candidates
-from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, TWO, Firm, deeper
+from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, Firm, deeper
 from bt_tasksim.concept_nodes.grasp_opening import Closed, Opening, evenly_opened, wide_along
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
@@ -484,14 +484,14 @@ def rooms(robot: RobotDescription, aside: bool = False) -> list[tuple[float, boo
 
 def partly_opened(robot: RobotDescription, wide: float) -> Array:
     """Joints ``(n_hand,)`` of a hand that is open so many metres, of one without a jaw that swings."""
-    if len(robot.tips) > TWO:
+    if robot.many_fingers:
         return robot.hand_position(closing_of(robot).about(wide)[None])
     return evenly_opened(robot, wide)
 
 
 def loses(robot: RobotDescription) -> bool:
     """A hand with a jaw that swings, or of many fingers: it pushes aside what it does not take well."""
-    return standing_side(robot) is not None or len(robot.tips) > TWO
+    return standing_side(robot) is not None or robot.many_fingers
 
 
 def _straight(way: Sequence[Array], coming: WayFinder, at: WayFinder) -> tuple[Array, Array] | None:

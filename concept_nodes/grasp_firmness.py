@@ -19,8 +19,6 @@ from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import box_corners
 from bt_tasksim.scene.hulls import convex
 
-TWO = 2
-"""Fingertips of a hand that holds between two pads."""
 SLANTED = 0.01
 """Metres by which the middle of an action is deeper for a horizontal approach than for one from above: where
 a slanted hand meets an object's edge first, its fingers are still before the object's middle. Not at a known
@@ -73,7 +71,7 @@ class Firm:
     """
 
     def __init__(self, view: WorldView, target: str) -> None:
-        self._closing = closing_of(view.robot) if len(view.robot.tips) > TWO else None
+        self._closing = closing_of(view.robot) if view.robot.many_fingers else None
         self._pose, self._pieces = view.objects[target], pieces_of(view.model(target))
         self._others = () if self._closing is None else _beside(view, target)
         self._asked: tuple[Array, Squeeze | None] | None = None  # the last one, which is asked about again

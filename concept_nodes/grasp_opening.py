@@ -132,9 +132,7 @@ class Closed:
 
 def evenly_opened(robot: RobotDescription, wide: float) -> Array:
     """Joints ``(n_hand,)`` of a hand that is open so many metres, where its fingers part evenly."""
-    share = min(1.0, wide / robot.opening)
-    found: Array = robot.hand_closed + share * (robot.hand_open - robot.hand_closed)
-    return found
+    return robot.hand_position(np.array([1.0 - min(1.0, wide / robot.opening)]))
 
 
 def wide_along(view: WorldView, target: str, axis: Array) -> float:

@@ -9,7 +9,8 @@ from bt_tasksim.core.poses import Array, clip, norm
 from bt_tasksim.core.units import NEWTONS
 
 FAR = 0.5
-"""Metres between the arm's base and its tool within which a hand meets things more slowly, see `gentler`."""
+"""Metres over the ground between the arm's base and its tool within which a hand meets things more slowly,
+see `gentler`."""
 FORCE_LIMIT = 60.0
 """N at the wrist: well above what carrying and placing take, well below what breaks a cup or a finger."""
 WRIST_STRAINED = register_reason(
@@ -20,9 +21,9 @@ WRIST_STRAINED = register_reason(
 def gentler(tool: Array) -> Array:
     """Share ``(N,)`` of the usual speed at which an arm should come upon things, from 0 to 1.
 
-    It falls with the square of the distance between the arm's base and its tool, as the stiffness of the same
-    drives grows. A jaw of the SO-100 that meets a ring at 50 mm/s, 0.27 m from its base, presses 115 N before
-    it can be stopped.
+    It falls with the square of the distance over the ground between the arm's base and its tool, as the
+    stiffness of the same drives grows. A jaw of the SO-100 that meets a ring at 50 mm/s, 0.27 m from its
+    base, presses 115 N before it can be stopped.
 
     Args:
         tool: Tool poses ``(N, 7)``, robot base frame.

@@ -17,7 +17,6 @@ from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, Obje
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING
-from bt_tasksim.concept_nodes.grasp_firmness import TWO
 from bt_tasksim.concept_nodes.holding import HOLDING
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.retreat import Retreat, clear_retreat, little_retreat, retreat_path
@@ -250,7 +249,7 @@ def _opened(view: WorldView, target: str) -> Array:
     its way, so there each amount has to be clear up to the last.
     """
     robot, closure = view.robot, float(view.robot.closure(view.hand))
-    if len(robot.tips) > TWO:
+    if robot.many_fingers:
         return robot.hand_open
     walls = _other_walls(view, target)
     if standing_side(robot) is None:

@@ -124,10 +124,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--perception", default="state")
     options = parser.parse_args(arguments)
     warnings.simplefilter("ignore", BtTasksimWarning)
+    kinds = ("tree", "engines", "perception", "noise")
+    unusual = [said for kind in kinds if (said := getattr(options, kind)) != parser.get_default(kind)]
     engines = EngineOptions(engines=options.engines, perception=options.perception, noise=options.noise)
     try:
         for name in options.only:
-            measure = f"five/five-{name}-{options.robot}"
+            measure = "-".join([f"five/five-{name}", options.robot, *unusual])
             seeds = sealed.choose(options.block, options.seed, measure, options.episodes)
             found = measured(FIVE[name](options.robot), engines, seeds, options.tree)
             path = sealed.keep(options.block, measure, found.to_json())

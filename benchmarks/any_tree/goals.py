@@ -61,7 +61,7 @@ class Step:
     drop: bool = False
 
 
-def draw_wish(target: str, form: str, room: Room, rng: np.random.Generator) -> Wish:
+def draw_wish(target: str, room: Room, rng: np.random.Generator) -> Wish:
     """Where an object should go in this room."""
     ways: dict[Wish, float] = {Wish(target, "spot", "table"): 5.0, Wish(target, "object"): 1.5}
     for stand in room.stands:

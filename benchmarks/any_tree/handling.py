@@ -16,7 +16,6 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks.any_tree.fine_grips import fine_grips
-from bt_tasksim.concept_nodes.grasp_firmness import TWO
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import WorldModel
@@ -61,7 +60,7 @@ SKETCHED = 24
 """Goals by which grasps are put in order."""
 WAYS = (1, 2, 3, 4)
 """Seeds of the search for a way."""
-LEANS = float(np.deg2rad(9.9))
+TILT = float(np.deg2rad(9.9))
 """Radians by which an object may lean as it is put down, a hair less than the judge allows in the end."""
 DEEPEST = (
     "no grip fits the hand",
@@ -249,7 +248,7 @@ class Mover:
 
         Held back from a grip, the curled fingers of a hand of many may close before the object.
         """
-        if len(self._robot.tips) <= TWO:  # it meets whatever is between its pads
+        if not self._robot.many_fingers:  # it meets whatever is between its pads
             return True
         closing = closing_of(self._robot)
         return closing.squeeze(closing.met(grip, self._pieces)) is not None
@@ -302,7 +301,7 @@ class Mover:
         for i in dict.fromkeys(int(k) for each in rounds for k in each if able[k]):
             ends = poses.multiply(goals, poses.relative(pose, every[i])[None])
             unease = self._unease(ends) + self._rng.uniform(0.0, 0.4, len(ends))
-            able_there = self._plane.holds(ends, LEANS)
+            able_there = self._plane.holds(ends, TILT)
             likely = [int(k) for k in np.argsort(unease) if able_there[k]]
             if likely:
                 yield every[i], widths[i], likely[:GOALS]
@@ -451,11 +450,11 @@ class Mover:
         above = np.array([0.0, 0.0, LIFT if lowered else 0.0])
         down = poses.multiply(poses.shifted(goal, above), back)
         # What is let go above a container may lean; so may an arm of few joints on its way.
-        for q in self._postures(held, down, 2, 4, LEANS if lowered else SWAYS):
+        for q in self._postures(held, down, 2, 4, TILT if lowered else SWAYS):
             tool = self._arm.tool(q)
             final = poses.multiply(tool, poses.inverse(back))
             off = float(np.linalg.norm(final[:3] - goal[:3] - above))
-            if off > 0.005 or (lowered and abs(poses.tilt(final[3:], goal[3:])) > LEANS):
+            if off > 0.005 or (lowered and abs(poses.tilt(final[3:], goal[3:])) > TILT):
                 self._no(4)
                 continue
             if not after.free(q):

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from py_trees.behaviour import Behaviour
 
 from benchmarks.any_tree.furniture import Room, draw_room
 from benchmarks.any_tree.goals import Step, Wish, draw_wish, in_order, settled
@@ -66,7 +67,7 @@ class Task:
     gap: float
     words: str
 
-    def tree(self, kind: str = "obvious", grasp: str | None = None):  # type: ignore[no-untyped-def]
+    def tree(self, kind: str = "obvious", grasp: str | None = None) -> Behaviour:
         """A fresh tree, see `benchmarks.any_tree.trees.tree_of`."""
         return tree_of(self.steps, self.scene.goals, kind, grasp)
 
@@ -132,7 +133,7 @@ def _drawn(plan: _Try, rng: np.random.Generator) -> Task:
     things = {thing.name: thing for thing in plan.things[: min(total, len(plan.things))]}
     movers = list(things)[: plan.count]
     specs = _starts(things, movers, room, plan, rng)
-    wishes = [draw_wish(name, things[name].form, room, rng) for name in movers]
+    wishes = [draw_wish(name, room, rng) for name in movers]
     spots = [_spot(wish, number, plan.setting) for number, wish in enumerate(_on_spots(wishes), 1)]
     scene = Scene(plan.robot, fixtures=room.fixtures, objects=specs, spots=spots, name="any tree")
     drawn = scene.sample(plan.seed, plan.stream)

@@ -77,8 +77,6 @@ class Pairs:
         """
         leave = self._leave
         for thing in things:
-            if thing.name in leave.robot:
-                continue
             shapes = shapes_of(thing)
             for shape in shapes:
                 shape.setSweptSphereRadius(thing.margin)

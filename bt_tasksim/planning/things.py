@@ -73,13 +73,11 @@ class Leave:
     Attributes:
         hand: Names of things that the hand may touch.
         held: Names of things that what is held may touch.
-        robot: Names of things that nothing is compared with.
         pairs: Names of a link, or of what is held, and of what it may touch, by its name or its key.
     """
 
     hand: Collection[str] = field(default_factory=frozenset)
     held: Collection[str] = field(default_factory=frozenset)
-    robot: Collection[str] = field(default_factory=frozenset)
     pairs: Collection[Touch] = field(default_factory=frozenset)
 
 

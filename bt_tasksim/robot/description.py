@@ -164,6 +164,11 @@ class RobotDescription:
         """All joints in the order of every joint array: arm, then hand."""
         return self.arm_joints + self.hand_joints
 
+    @property
+    def many_fingers(self) -> bool:
+        """The hand has more than two fingertips: it holds by more points than two pads."""
+        return len(self.tips) > 2
+
     def drive_array(self, what: str) -> Array:
         """A field of `Drive` for every joint ``(n_joints,)``, in the order of `joints`.
 

@@ -42,6 +42,10 @@ def test_pairs_are_of_the_draws_that_both_had():
     other["draws"][3]["success"] = False
     lines = any_tree_tables.any_tree_pairs({"any_tree-panda": usual, "any_tree-panda-mujoco": other})
     assert "| Panda, MuJoCo | 4 | 4 | 3 | 1 | 0 | 1 |" in lines
+    for draw in other["draws"]:
+        draw["seed"] += 10_000
+    lines = any_tree_tables.any_tree_pairs({"any_tree-panda": usual, "any_tree-panda-mujoco": other})
+    assert "MuJoCo | not measured yet on this block" in lines, "no draw in common"
 
 
 def test_all_of_the_five_trees_have_a_row():

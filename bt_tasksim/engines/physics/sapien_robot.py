@@ -10,7 +10,7 @@ import numpy as np
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.sapien_solving import Solving
-from bt_tasksim.engines.physics.sapien_twist import PADS, Twist
+from bt_tasksim.engines.physics.sapien_twist import Twist
 from bt_tasksim.engines.physics.sapien_world import CONTACT_OFFSET, World, array, sapien_pose
 from bt_tasksim.engines.physics.sapien_wrist import wrist_frame
 from bt_tasksim.robot.description import RobotDescription
@@ -144,8 +144,7 @@ class Robot:
         self.lever, self.to_tool = wrist_frame(articulation, links[robot.wrist_link], tool)
         closing = poses.rotate(self.tool_pose[3:], np.array([0.0, 1.0, 0.0]))
         self.twist = Twist(robot.pads, robot.opposition, tool_link, closing, world.objects, world.inertia)
-        many = len(robot.tips) > PADS
-        self.solving = Solving(tool_link, self.tool_pose[:3], world.objects, many)
+        self.solving = Solving(tool_link, self.tool_pose[:3], world.objects, robot.many_fingers)
 
     def _set_drives(self, robot: RobotDescription, joint_position: Array) -> None:
         articulation = self.articulation

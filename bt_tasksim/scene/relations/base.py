@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import abc
-import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import ClassVar
@@ -11,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.fact_making import rotations
 from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, ObjectModel, PlaceModel, WorldModel
@@ -203,15 +203,4 @@ def turn(rotation: Array, model: ObjectModel) -> float:
     """Smallest angle in radians from no rotation at all to ``rotation (4,)``, over an object's symmetries."""
     if model.symmetry == 0:
         return float(poses.tilt(rotation))
-    if model.cubic:
-        m = poses.to_matrix(rotation)
-        rows = np.argmax(np.abs(m), axis=1)
-        snapped = np.zeros((3, 3))
-        snapped[np.arange(3), rows] = np.sign(m[np.arange(3), rows])
-        if len(set(rows.tolist())) == 3:
-            cosine = (np.trace(snapped.T @ m) - 1) / 2
-            return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    return min(
-        float(poses.angle_between(rotation, poses.yaw(2 * math.pi * k / model.symmetry)))
-        for k in range(max(model.symmetry, 1))
-    )
+    return float(poses.angle_between(rotation[None], rotations(model)).min())

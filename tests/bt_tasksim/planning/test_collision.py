@@ -33,7 +33,7 @@ def test_what_is_held_counts_and_may_be_allowed_to_touch(panda):
     assert among(panda, board).free(q)
     touching = among(panda, board, held=panda.held())
     assert not touching.free(q) and touching.touches(q) == [("held", "board")]
-    for leave in (Leave(held={"board"}), Leave(robot={"board"}), Leave(pairs={("held", "board")})):
+    for leave in (Leave(held={"board"}), Leave(pairs={("held", "board")})):
         assert among(panda, board, held=panda.held(), leave=leave).free(q)
     assert not among(panda, board, held=panda.held(), leave=Leave(hand={"board"})).free(q)
 

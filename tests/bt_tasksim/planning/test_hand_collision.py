@@ -24,7 +24,6 @@ def test_one_thing_inside_another_touches(each, aside):
         None,
         Leave(hand={"near"}),
         Leave(held={"near", "far"}),
-        Leave(robot={"far"}),
         Leave(pairs={("held", "near")}),
     ],
 )
