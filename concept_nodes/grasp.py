@@ -362,7 +362,7 @@ class Grasp(ConceptModel[GraspMemory]):
             swings = firmly and standing_side(view.robot) is not None
             others = others.keeping(~others.poor) if swings else others
             given = self._as_given(others.tools, view)
-            chooser.leave_out(int(np.sum(~given)), "that do not have the approach and the closing axis given")
+            chooser.leave_out(int(np.sum(~given)), f"that do not have the {self._given} given")
             return chooser.other(others.keeping(given), asked.failed, usual)
 
         tried = rooms(view.robot, goes_aside(aims))
@@ -370,6 +370,12 @@ class Grasp(ConceptModel[GraspMemory]):
             return with_room(tried, find)
         except NoWayError:
             return find(tried[-1], thoroughly=True)
+
+    @property
+    def _given(self) -> str:
+        """What the author gave, in words."""
+        given = {"approach": self.approach, "closing axis": self.closing}
+        return " and the ".join(word for word, value in given.items() if value is not None)
 
     def _as_given(self, tools: Array, view: WorldView) -> Array:
         """Whether ``(k,)`` tools ``(k, 7)`` have the approach and the closing axis that the author gave."""

@@ -249,7 +249,7 @@ class Chooser:
         if last is not None:
             return last
         said = ", ".join(f"{count} {why}" for why, count in self._why.most_common()) or "none fits the hand"
-        raise NoWayError(f"no grasp of {self._target} serves: of {sum(self._why.values())} {said}")
+        raise NoWayError(f"no grasp of {self._target} serves: of {sum(self._why.values())}, {said}")
 
     def leave_out(self, count: int, why: str) -> None:
         """So many candidates were not even asked about; the reason counts them."""

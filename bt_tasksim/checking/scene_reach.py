@@ -94,8 +94,10 @@ def check_goals(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repo
         where = f"goal of '{goal.object}'"
         if small:
             what = f"asks for '{goal.object}' on '{goal.place}', which is too small for it in {small} of "
-            level = ERROR if small == known else WARNING
-            report.add(level, scene.name, where, f"{what}{known} draws", "name a larger place")
+            marked = any(place.name == goal.place and place.kind == "spot" for place in worlds[0].places)
+            level = ERROR if small == known and not marked else WARNING  # a mark bears nothing
+            how = "give the spot a larger extent" if marked else "name a larger place"
+            report.add(level, scene.name, where, f"{what}{known} draws", how)
         if far:
             what = f"is out of reach on '{goal.place}' in {far} of {known} draws, from "
             level = ERROR if far == known else WARNING

@@ -128,7 +128,7 @@ def check_size(what: str, size: tuple[float, float, float]) -> None:
 def _read(path: str, version: tuple[int, ...]) -> tuple[TriangleMesh, tuple[TriangleMesh, ...]]:
     """The surface of all that is in this version of a file, and its bodies."""
     if not Path(path).is_file():
-        raise InputError(f"no mesh file '{path}'")
+        raise InputError(f"no mesh file '{path}'" + ("" if Path(path).is_absolute() else f" in {Path.cwd()}"))
     try:
         import trimesh
     except ImportError:

@@ -36,7 +36,10 @@ def object_file(name: str, folder: Path | None = None) -> Path:
         return own
     known = [path.name for path in sorted(asset("objects").glob("*.yaml"))]
     if name not in known:
-        raise InputError(f"no object file '{name}'{nearest(name, known)}")
+        where = Path.cwd() if folder is None else folder
+        raise InputError(
+            f"no object file '{name}'{nearest(name, known)} (in {where} and among the bundled ones)"
+        )
     return asset("objects", name)
 
 

@@ -205,7 +205,7 @@ class SpotSpec:
         name: The spot's name, a place like any other.
         on: Name of the place it lies on.
         centre: Centre ``(2,)`` of the rectangle in which it is drawn, in that place's frame, metres.
-        area: Half sizes ``(2,)`` of that rectangle, metres.
+        area: Half sizes ``(2,)`` of that rectangle, metres; by default it is always at its centre.
         extent: Full size ``(2,)`` of the spot, metres.
         yaw: Half width in radians of the range of its heading.
 
@@ -216,7 +216,7 @@ class SpotSpec:
     name: str
     on: str
     centre: tuple[float, float]
-    area: tuple[float, float]
+    area: tuple[float, float] = (0.0, 0.0)
     extent: tuple[float, float] = (0.12, 0.12)
     yaw: float = 0.0
 
