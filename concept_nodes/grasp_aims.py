@@ -14,7 +14,7 @@ from bt_tasksim.concept_nodes.holding import HOLDING
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
-from bt_tasksim.planning.arm import LEANS
+from bt_tasksim.planning.arm import FULL, LEANS, SWAYS
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.hand_collision import HandCollisions
 from bt_tasksim.planning.reach import reach_of
@@ -57,7 +57,14 @@ class Around:
 
 
 class Served:
-    """An aim that a grasp has to serve."""
+    """An aim that a grasp has to serve.
+
+    Attributes:
+        words: What is done.
+        screens: Poses that are far from all that the arm can have are left out beforehand, see `reach`: worth
+            its map where many grasps are asked.
+        too_far: The arm can have none of those that were asked about last.
+    """
 
     def __init__(self, around: Around, aim: Aim, aside: bool, higher: bool) -> None:
         self._around, self._aim = around, aim
@@ -65,6 +72,9 @@ class Served:
         falls = (0.0, *HIGHER) if higher and not aim.on_the_way else (0.0,)
         self._poses = np.concatenate([poses.shifted(ends, np.array([0.0, 0.0, above])) for above in falls])
         self.words = aim.words
+        full = len(around.view.arm) >= FULL
+        self._leans = LEANS if full or not aim.on_the_way else SWAYS
+        self.screens = self.too_far = False
         self._asked, self._tools = (b"", b""), np.zeros((0, 7))
 
     def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
@@ -77,10 +87,9 @@ class Served:
             return False
         alone = around.alone(hand)
         finder = around.finder(goal, hand, frozenset(self._aim.supports))
-        leans = finder.leanings[-1] if self._aim.on_the_way else LEANS
 
         def reached(tool: Array) -> bool:
-            return bool(finder.ends(tool[None], leans=leans).free[0])
+            return bool(finder.ends(tool[None], leans=self._leans).free[0])
 
         def turned(tool: Array) -> bool:
             others = [_turned(tool, angle) for angle in turns]
@@ -94,6 +103,9 @@ class Served:
         if asked != self._asked:
             around = self._around
             every = poses.multiply(self._possible, poses.relative(around.now, goal)[None])
+            if self.screens and len(every):
+                every = every[~reach_of(around.view.robot).beyond(every, self._leans)]
+                self.too_far = not len(every)
             alone = around.alone(hand)
             free = np.array([tool for tool in every if alone.free(tool)]).reshape(-1, 7)
             self._asked, self._tools = asked, free

@@ -223,6 +223,8 @@ class Chooser:
             NoWayError: None does; says how many were excluded by what.
         """
         served, tried, last = 0, 0, usual
+        for aim in self._aims:
+            aim.screens = True
         skipped -= usual is not None
         if self._thoroughly:
             candidates = self._in_reach(candidates)
@@ -366,7 +368,8 @@ class Chooser:
         closed = self._closed(goal)
         for aim in self._aims:
             if not len(aim.tools(closed, hand.hand)):
-                return self._no(f"that cannot also {aim.words}")
+                far = ", which is out of reach" if aim.too_far else ""
+                return self._no(f"that cannot also {aim.words}{far}")
         return True
 
     def _closed(self, goal: Array) -> Array:

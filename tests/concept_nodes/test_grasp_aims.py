@@ -12,6 +12,7 @@ from bt_tasksim.concept_nodes.grasp_aims import Around, Served, aims_of, goes_as
 from bt_tasksim.concept_nodes.holding import HOLDING
 from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
+from bt_tasksim.planning.ways import WayFinder
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -50,3 +51,17 @@ def test_the_tools_at_which_an_aim_is_served_are_where_the_hand_has_room_and_in_
         assert len(served.tools(goal, hand)) == tools and served.by(goal, hand) == (tools > 0)
     far = Served(around, Aim((now + np.array([2.0, 0, 0.3, 0, 0, 0, 0]))[None], "go"), False, False)
     assert len(far.tools(goal, hand)) == 1 and not far.by(goal, hand), "room there, and out of reach"
+
+
+def test_where_many_grasps_are_asked_no_joints_are_looked_for_where_the_arm_surely_is_not(view, monkeypatch):
+    now, hand = view.objects["box"], view.robot.hand_open
+    goal = np.concatenate([now[:3], poses.frame_from_axes(DOWN, np.array([0.0, 1.0, 0.0]))])
+    moved = [np.array([x, 0.0, 0.1, 0, 0, 0, 0]) for x in (0.0, 2.0)]
+    monkeypatch.setattr(WayFinder, "ends", lambda *asked, **more: pytest.fail("joints are looked for"))
+    for some, left in ((moved, 1), (moved[1:], 0)):
+        served = Served(
+            Around(view, "box", 1.0), Aim(np.array([now + by for by in some]), "go"), False, False
+        )
+        served.screens = True
+        assert len(served.tools(goal, hand)) == left and served.too_far == (left == 0)
+    assert not served.by(goal, hand)

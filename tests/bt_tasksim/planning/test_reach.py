@@ -27,6 +27,27 @@ def test_where_the_arm_can_be_it_is_near_and_elsewhere_it_is_far(robot):
     assert np.quantile(far(there), 0.9) < np.quantile(far(away[beyond]), 0.1)
 
 
+@pytest.mark.parametrize("name", ["panda", "xarm7_ability", "so100"])
+def test_what_it_says_to_be_beyond_reach_is(name):
+    """Hardly any posture is, and no pose for which joints are found at the edge of what the arm reaches."""
+    robot, rng = load_robot(name), np.random.default_rng(11)
+    arm, reach = arm_of(robot), reach_of(robot)
+    lower, upper = np.maximum(robot.arm_lower, -np.pi), np.minimum(robot.arm_upper, np.pi)
+    there = arm.tools(rng.uniform(lower, upper, (1000, len(robot.arm_joints))))
+    assert np.mean(reach.beyond(there)) < 0.005
+    edge = float(np.hypot(there[:, 0], there[:, 1]).max())
+    tools, found = [], []
+    for _ in range(150):
+        bearing, lean, away = rng.uniform([-0.8, 0.0, 0.8 * edge], [0.8, 1.2, 1.4 * edge])
+        approach = np.array([np.sin(lean) * np.cos(bearing), np.sin(lean) * np.sin(bearing), -np.cos(lean)])
+        side = np.array([-np.sin(bearing), np.cos(bearing), 0.0])
+        at = [away * np.cos(bearing), away * np.sin(bearing), 0.15 * edge]
+        tools.append(np.concatenate([at, poses.frame_from_axes(approach, side)]))
+        found.append(any(arm.joints(tools[-1], seed) is not None for seed in (robot.rest, *arm.seeds)))
+    beyond = reach.beyond(np.array(tools), 0.12)
+    assert not (beyond & found).any() and beyond.mean() > 0.3
+
+
 def test_a_turn_of_the_first_joint_makes_no_difference(robot):
     tool = poses.pose(
         [0.4, 0.1, 0.3], poses.frame_from_axes(np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
