@@ -236,6 +236,9 @@ class Chooser:
             if not self._has_room_later(goal, hand):
                 candidates.no_good(goal)
                 continue
+            if self._firmly and not self._firm.steady(self._closed(goal)):
+                self._no("that would hardly be held")
+                continue
             tried += 1
             at = hand.beside
             reached = self._reaches(goal, at)

@@ -82,6 +82,9 @@ class HandClosing:
 
     Args:
         robot: The robot.
+
+    Attributes:
+        moves: Booleans ``(n_tips,)``: the fingertip moves when the hand closes.
     """
 
     def __init__(self, robot: RobotDescription) -> None:
@@ -99,6 +102,7 @@ class HandClosing:
         self._between = np.stack([one[:, 1], other[:, 1]], axis=-1)
         self._middles = (one + other) / 2 * [0.0, 1.0, 1.0]
         way = np.linalg.norm(tips[-1] - tips[0], axis=1)
+        self.moves: Array = way > 1e-6
         self._forces = _spring_forces(robot) / np.maximum(way, 1e-6)
 
     @cached_property

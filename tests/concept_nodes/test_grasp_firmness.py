@@ -8,7 +8,7 @@ import pytest
 from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SLIPS, SURELY, Firm, deeper
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
-from bt_tasksim.planning.things import Thing
+from bt_tasksim.planning.things import Thing, box_corners
 from bt_tasksim.robot.description import load_robot
 
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])
@@ -100,3 +100,28 @@ def test_what_is_below_the_fingers_does_not_turn_in_them_wherever_the_hand_comes
     for tool in (above(0.02), above(0.05), level(0.0, 0.02), level(0.0, 0.05)):
         assert found.features(tool)[1] == pytest.approx(0.0, abs=1e-6)
     assert found.features(level(-0.03, 0.04))[1] == pytest.approx(0.03, abs=1e-6)
+
+
+def upside_down_t(robot):
+    """A stem 13 mm wide and 35 mm high on a bar 48 mm long and 13 mm high, in the middle of its box."""
+    bar, stem = (
+        poses.transform(poses.pose([0.0, 0.0, z]), box_corners(size))
+        for z, size in ((-0.0175, (0.048, 0.014, 0.013)), (0.0065, (0.013, 0.009, 0.035)))
+    )
+    model = SimpleNamespace(solid=SimpleNamespace(pieces=(bar, stem)), extent=np.array([0.048, 0.014, 0.048]))
+    objects = {"tee": poses.pose([0.0, 0.0, 0.024])}
+    view = SimpleNamespace(
+        robot=load_robot(robot), objects=objects, model=lambda name: model, things=lambda without: ()
+    )
+    return Firm(view, "tee")
+
+
+def test_a_jaw_that_would_meet_something_else_three_millimetres_lower_is_not_steady():
+    """Its tip closes above the bar of a T, or just above it, where the hand may come lower than it should."""
+    found = upside_down_t("so100")
+    across = poses.frame_from_axes(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
+    steady = {z: found.steady(np.array([-0.0065, 0.0, z, *across])) for z in np.arange(0.02, 0.045, 0.001)}
+    heights = [z for z, is_so in steady.items() if not is_so]
+    assert heights and max(heights) - min(heights) < 0.004, "about the height of the bar alone"
+    assert all(steady[z] for z in steady if z > max(heights) + 1e-9)
+    assert all(upside_down_t("panda").steady(np.array([0.0, 0.0, z, *across])) for z in steady), "no jaw"
