@@ -38,6 +38,9 @@ HAND_SOLREF = (0.012, 1.0)
 some 0.6 mm deep; an arm that hits something at 0.3 m/s comes to rest within a millimetre or two. Harder,
 and every brush of a finger with a cup's rim is a blow of 150 N; softer, and the judge's 2 mm of overlap
 come near."""
+TIP_SOLREF = (0.0075, 1.0)
+"""The same of fingertips on objects: two that close at 0.18 m/s on the wall of a mug, 3 mm thick, met 3.1 mm
+deep at 12 ms, and meet 1.6 mm deep at this; of 60 random tasks 60 succeed, and 58 at 12 ms."""
 SOLIMP = (0.99, 0.998, 0.001, 0.5, 2.0)
 """Impedance of contacts among objects and fixtures: nearly that of rigid bodies. MuJoCo measures it by the
 masses that touch, so that it must carry a light cup which a heavy arm sets down."""
@@ -127,7 +130,8 @@ def add_pair(spec: mj.MjSpec, a: Solid, b: Solid) -> None:
     pair.condim = (4 if patch > 0.0 else 3) if robot else 6
     pair.friction = [friction, friction, max(friction * patch, _NO_TWIST), ROLLING, ROLLING]
     pair.solreffriction = list(FRICTION_SOLREF)
-    pair.solref = list(HAND_SOLREF if robot else SOLREF)
+    grips = max(a.body.tip, b.body.tip) >= 0 and "object" in (a.body.role, b.body.role)
+    pair.solref = list(TIP_SOLREF if grips else HAND_SOLREF if robot else SOLREF)
     pair.solimp = list(HAND_SOLIMP if robot else SOLIMP)
     pair.margin = 0.0
     pair.gap = REACH

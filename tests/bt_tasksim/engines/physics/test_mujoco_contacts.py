@@ -37,15 +37,8 @@ def test_pairs_are_those_that_can_touch_whatever_their_order():
     assert pairs(list(BODIES)) == pairs(list(BODIES)[::-1]) == expected
 
 
-@pytest.mark.parametrize(
-    ("a", "b", "friction", "twist", "condim"),
-    [
-        (("left", 1.2, 0.01), ("cup", 0.6, 0.0), 0.9, 0.009, 4),
-        (("palm", 0.5, 0.0), ("cup", 0.7, 0.0), 0.6, 1e-5, 3),
-        (("cup", 0.4, 0.0), ("table", 0.6, 0.0), 0.5, 1e-5, 6),
-    ],
-)
-def test_friction_is_the_mean_and_pads_resist_twisting(a, b, friction, twist, condim):
+def compiled(a, b):
+    """The model of one pair: each a body's name, its friction and its patch."""
     mujoco = pytest.importorskip("mujoco")
     spec = mujoco.MjSpec()
     solids = []
@@ -56,7 +49,31 @@ def test_friction_is_the_mean_and_pads_resist_twisting(a, b, friction, twist, co
         body.add_geom(name=name, size=[0.1, 0.1, 0.1], contype=0, conaffinity=0)
         solids.append(Solid(name, BODIES[name], ContactSurface(mu, patch)))
     add_pair(spec, *solids)
-    model = spec.compile()
+    return spec.compile()
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "friction", "twist", "condim"),
+    [
+        (("left", 1.2, 0.01), ("cup", 0.6, 0.0), 0.9, 0.009, 4),
+        (("palm", 0.5, 0.0), ("cup", 0.7, 0.0), 0.6, 1e-5, 3),
+        (("cup", 0.4, 0.0), ("table", 0.6, 0.0), 0.5, 1e-5, 6),
+    ],
+)
+def test_friction_is_the_mean_and_pads_resist_twisting(a, b, friction, twist, condim):
+    model = compiled(a, b)
     assert model.npair == 1 and model.pair_dim[0] == condim
     assert model.pair_friction[0, :2] == pytest.approx([friction, friction])
     assert model.pair_friction[0, 2] == pytest.approx(twist)
+
+
+def test_fingertips_give_way_less_than_the_rest_of_the_hand_and_more_than_what_stands_on_something():
+    cup = ("cup", 0.6, 0.0)
+    tip, palm, table = (
+        float(compiled((name, 0.5, 0.0), cup).pair_solref[0][0]) for name in ("left", "palm", "table")
+    )
+    assert table < tip < palm
+    board = ("shelf", 0.5, 0.0)
+    assert float(compiled(("left", 0.5, 0.0), board).pair_solref[0][0]) == palm, (
+        "on furniture they are the hand"
+    )
