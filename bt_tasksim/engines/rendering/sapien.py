@@ -20,7 +20,6 @@ from bt_tasksim.engines.base import EngineSetup, RenderingEngine
 from bt_tasksim.engines.cameras import CAMERAS, CameraSpec
 from bt_tasksim.engines.images import CameraModel, Image
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
-from bt_tasksim.engines.physx import start_physx
 from bt_tasksim.engines.rendering import materials
 from bt_tasksim.engines.rendering.sapien_camera import SceneCamera
 from bt_tasksim.engines.vulkan import use_software_driver
@@ -58,7 +57,6 @@ class SapienRendering(RenderingEngine):
             raise MachineError(
                 "rendering needs the package sapien: install bt-tasksim with its extra 'sim'"
             ) from None
-        start_physx()
         render.set_log_level("error")
         try:
             self._system = render.RenderSystem()
