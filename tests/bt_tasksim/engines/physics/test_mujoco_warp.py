@@ -63,7 +63,9 @@ def cases():
     high = np.array(around(box, height=0.08).joint_position)
     high[n:] = 0.0
     hold = [shut] * CLOSING + ramp(shut, high, LIFTING - CLOSING) + [high] * (PERIODS - LIFTING)
-    low = around(scene("box", MASS).sample(5), height=0.01)  # so that it slides: when what tips falls is chance
+    low = around(
+        scene("box", MASS).sample(5), height=0.01
+    )  # so that it slides: when what tips falls is chance
     aside = np.array(around(low, height=0.01, aside=0.06).joint_position)
     push = ramp(np.array(low.joint_position), aside, 20) + [aside] * (PERIODS - 20)
     still = np.concatenate([robot.rest, robot.hand_open])
