@@ -63,13 +63,11 @@ def cases():
     high = np.array(around(box, height=0.08).joint_position)
     high[n:] = 0.0
     hold = [shut] * CLOSING + ramp(shut, high, LIFTING - CLOSING) + [high] * (PERIODS - LIFTING)
-    low = around(
-        scene("box", MASS).sample(5), height=0.01
-    )  # so that it slides: when what tips falls is chance
-    aside = np.array(around(low, height=0.01, aside=0.06).joint_position)
-    push = ramp(np.array(low.joint_position), aside, 20) + [aside] * (PERIODS - 20)
+    # It leans by 15 degrees. Pushed on, it falls over, at 19; when it does is chance, and unlike by 12 mm.
+    aside = np.array(around(box, aside=0.04).joint_position)
+    push = ramp(open_hand, aside, 20) + [aside] * (PERIODS - 20)
     still = np.concatenate([robot.rest, robot.hand_open])
-    return [box, low, rest, fall], np.array([hold, push, [still] * PERIODS, [still] * PERIODS])
+    return [box, box, rest, fall], np.array([hold, push, [still] * PERIODS, [still] * PERIODS])
 
 
 @dataclasses.dataclass
@@ -124,7 +122,7 @@ def assert_same(one, row, other, its_row):
 def test_states_stay_near_mujocos():
     for mine, its in zip(warp().states, plain().states, strict=True):
         off = np.linalg.norm(mine.objects[:, 0, :3] - its.objects[:, 0, :3], axis=-1)
-        assert off[RESTING] < 1e-5 and off[HELD] < 1e-4 and off[PUSHED] < 1e-4
+        assert off[RESTING] < 1e-5 and off[HELD] < 1e-4 and off[PUSHED] < 1e-3
         assert mine.time[0] > 0.06 or off[FALLING] < 1e-5, "until it lands: then it rolls as it likes"
         for name in ("joint_position", "tool_pose", "tips"):
             assert np.abs(getattr(mine, name) - getattr(its, name)).max() < 1e-3, name
@@ -283,7 +281,7 @@ def test_a_world_with_too_many_contacts_fails_alone_as_in_company(monkeypatch, c
         )
     _, alone = until_full((HELD,))
     assert alone.keys() == {HELD} and 0 < alone[HELD][0] < CLOSING and "too many" in alone[HELD][1]
-    for shown in ((RESTING,), (RESTING, HELD), (HELD, RESTING, RESTING), (FALLING, HELD, RESTING)):
+    for shown in ((RESTING,), (RESTING, HELD), (HELD, RESTING, RESTING), (PUSHED, HELD, RESTING)):
         batch, failed = until_full(shown)
         assert failed == (alone if HELD in shown else {}), shown
         for row, case in enumerate(shown):
