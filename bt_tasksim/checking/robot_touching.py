@@ -87,8 +87,7 @@ def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Rep
 
 def link_part(shape: LinkVisual) -> LinkPart | None:
     """A shape as coal has it."""
-    import coal
-
+    from bt_tasksim.core.narrow_phase import coal
     from bt_tasksim.engines.physics.mujoco_robot import mesh_hull
 
     match shape.kind:
@@ -134,7 +133,7 @@ def _overlaps(
     kinematics: PinocchioKinematics, arm: Array, parts: list[LinkPart], pairs: list[tuple[int, int]]
 ) -> dict[tuple[str, str], float]:
     """Metres by which links overlap in a posture, by their names, where it is more than `DEEP`."""
-    import coal
+    from bt_tasksim.core.narrow_phase import coal
 
     joints = np.concatenate([arm, kinematics.robot.hand_open])
     at = kinematics.link_poses(joints, sorted({part.link for part in parts}))

@@ -61,8 +61,7 @@ def in_robot(robot: RobotDescription, world: ActorConfiguration) -> str:
 
 def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
     """The parts of its links, and where they are at rest."""
-    import coal
-
+    from bt_tasksim.core.narrow_phase import coal
     from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 
     parts = [part for shape in load_collisions(robot.urdf) if (part := link_part(shape)) is not None]
@@ -84,7 +83,7 @@ def _deepest(
     links: Sequence[tuple[LinkPart, Any]], pose: Array, pieces: Sequence[Piece]
 ) -> tuple[str, float]:
     """The link that pieces of a body at ``pose (7,)`` overlap most, and by how many metres."""
-    import coal
+    from bt_tasksim.core.narrow_phase import coal
 
     request, found = coal.DistanceRequest(), ("", 0.0)
     for piece in pieces:

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
+from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.models import full_model

@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
-import coal
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.hand_collision import hand_shapes

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-import coal
 import numpy as np
 
+from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 
 _KEPT = 1024

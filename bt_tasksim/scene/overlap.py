@@ -37,7 +37,7 @@ def check_configuration(configuration: ActorConfiguration) -> None:
         MachineError: The package that checks collisions is not installed.
     """
     try:
-        import coal
+        from bt_tasksim.core.narrow_phase import coal
     except ImportError:
         raise MachineError("collision checks need the package coal: install bt-tasksim with 'plan'") from None
     objects = [

@@ -177,7 +177,7 @@ def mesh_hull(path: str, scale: tuple[float, float, float]) -> Array:
     Raises:
         InputError: The file cannot be read.
     """
-    import coal
+    from bt_tasksim.core.narrow_phase import coal
 
     try:
         mesh = coal.MeshLoader().load(path, np.array(scale))

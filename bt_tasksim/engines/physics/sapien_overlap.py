@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import coal
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.sapien_world import array, floats
 from bt_tasksim.scene.hulls import convex

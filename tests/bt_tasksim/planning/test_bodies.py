@@ -1,9 +1,9 @@
 """A robot's bodies: all are convex, those of the hand are known, and which are to be kept apart."""
 
-import coal
 import numpy as np
 import pytest
 
+from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.collision import Collisions
 from bt_tasksim.planning.things import box_corners
