@@ -14,6 +14,7 @@ from bt_tasksim.core.errors import InputError, MachineError, nearest
 from bt_tasksim.core.plain import shown
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.maniskill.schema import EnvironmentFile
+from bt_tasksim.engines.physx import start_physx
 from bt_tasksim.engines.vulkan import use_software_driver
 
 CONTROL_MODE = "pd_joint_pos"
@@ -141,6 +142,7 @@ def _open(file: EnvironmentFile, robot: str, drawn: bool) -> Any:
     _check_assets(spec.id, REGISTERED_ENVS[spec.id].asset_download_ids)
     if robot in REGISTERED_AGENTS:
         _check_assets(robot, REGISTERED_AGENTS[robot].asset_download_ids)
+    start_physx()
     with _quiet():
         try:
             return gymnasium.make(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physx import start_physx
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.shapes import BoxPiece
 
@@ -88,6 +89,7 @@ def build_world(configuration: ActorConfiguration, solver_iterations: int) -> Wo
     import sapien
     from sapien import physx
 
+    start_physx()
     physx.set_scene_config(enable_enhanced_determinism=False, bounce_threshold=2.0)
     physx.set_body_config(solver_position_iterations=solver_iterations, solver_velocity_iterations=0)
     physx.set_shape_config(contact_offset=CONTACT_OFFSET["object"], rest_offset=0.0)

@@ -22,6 +22,7 @@ from bt_tasksim.engines.images import CameraModel, Image
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.rendering import materials
 from bt_tasksim.engines.rendering.sapien_camera import SceneCamera
+from bt_tasksim.engines.physx import start_physx
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.robot.urdf_visuals import LinkVisual, load_visuals
@@ -57,6 +58,7 @@ class SapienRendering(RenderingEngine):
             raise MachineError(
                 "rendering needs the package sapien: install bt-tasksim with its extra 'sim'"
             ) from None
+        start_physx()
         render.set_log_level("error")
         try:
             self._system = render.RenderSystem()
