@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from bt_tasksim.engines.physx import start_physx
 from bt_tasksim.engines.vulkan import use_software_driver
 
 EPISODE = 50
@@ -66,6 +67,7 @@ def environment() -> Any:
     import gymnasium
     import mani_skill.envs  # noqa: F401
 
+    start_physx()  # a process has one: with the same tolerances, whoever comes first
     return gymnasium.make(
         "PickCube-v1", obs_mode="state", control_mode="pd_joint_delta_pos", num_envs=1, sim_backend="cpu"
     )

@@ -40,6 +40,20 @@ TOUCHES = 0.0003
 """Metres within which shapes truly meet."""
 
 
+def among_meshes(world: World) -> list[int]:
+    """The objects that contacts are made up of: all, but boxes in a world where fingertips are boxes, too."""
+    tips = [body for body, (kind, tip) in world.bodies.items() if kind == "hand" and tip >= 0]
+    boxes = [all(map(_is_box, body.get_collision_shapes())) for body in [*tips, *world.objects]]
+    bare = all(boxes[: len(tips)])
+    return [k for k, box in enumerate(boxes[len(tips) :]) if not (bare and box)]
+
+
+def _is_box(shape: physx.PhysxCollisionShape) -> bool:
+    from sapien import physx
+
+    return isinstance(shape, physx.PhysxCollisionShapeBox)
+
+
 class Before(NamedTuple):
     """An object before a step: its number, where it was, and how it moved ``(3,)``, in m/s and rad/s."""
 

@@ -11,7 +11,7 @@ from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.layout import body_column
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
 from bt_tasksim.engines.physics.sapien_overlap import Solids
-from bt_tasksim.engines.physics.sapien_phantoms import Before, Phantoms
+from bt_tasksim.engines.physics.sapien_phantoms import Before, Phantoms, among_meshes
 from bt_tasksim.engines.physics.sapien_readings import SapienReadings
 from bt_tasksim.engines.physics.sapien_robot import Robot
 from bt_tasksim.engines.physics.sapien_sinking import Sinking
@@ -101,6 +101,7 @@ class SapienWorld:
         self._hand = [body for body, (kind, _) in world.bodies.items() if kind == "hand"]
         self._solids: Solids = {}
         self._phantoms, self._near = Phantoms(world, self._solids, articulation, robot.arm), list[int]()
+        self._watched = [(k, world.radius[k] + NEAR) for k in among_meshes(world)]
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
 
@@ -240,9 +241,8 @@ class SapienWorld:
             for k, body in enumerate(bodies):
                 out.objects[row, k] = floats(body.entity_pose)
                 out.linear[row, k], out.angular[row, k] = body.linear_velocity, body.angular_velocity
-        tool, radii = out.frames[row][0], self.world.radius
-        places = out.objects[row, : self.n_objects, :3]
-        self._near = [k for k, at in enumerate(places) if math.dist(at, tool[:3]) < radii[k] + NEAR]
+        tool, places = out.frames[row, 0, :3], out.objects[row]
+        self._near = [k for k, way in self._watched if math.dist(places[k, :3], tool) < way]
 
     def _write_touch(self) -> None:
         out, row, n, now, before = self._readings, self._row, self.n_objects, self._touch, self._written

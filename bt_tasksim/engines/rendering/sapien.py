@@ -20,9 +20,9 @@ from bt_tasksim.engines.base import EngineSetup, RenderingEngine
 from bt_tasksim.engines.cameras import CAMERAS, CameraSpec
 from bt_tasksim.engines.images import CameraModel, Image
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+from bt_tasksim.engines.physx import start_physx
 from bt_tasksim.engines.rendering import materials
 from bt_tasksim.engines.rendering.sapien_camera import SceneCamera
-from bt_tasksim.engines.physx import start_physx
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.robot.urdf_visuals import LinkVisual, load_visuals

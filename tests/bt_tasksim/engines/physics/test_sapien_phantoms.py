@@ -8,7 +8,7 @@ from sapien import physx
 from bt_tasksim.core import poses
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader
 from bt_tasksim.engines.physics.sapien_overlap import TOO_DEEP
-from bt_tasksim.engines.physics.sapien_phantoms import JOLT, KICK, Phantoms
+from bt_tasksim.engines.physics.sapien_phantoms import JOLT, KICK, Phantoms, among_meshes
 from bt_tasksim.engines.physics.sapien_world import PARTING, World
 from bt_tasksim.engines.physx import start_physx
 
@@ -163,3 +163,12 @@ def test_what_is_hit_goes_on_as_it_was_hit(watched):
     for _ in range(2):
         speeds(world, watched)
     assert plate.linear_velocity[1] < -0.2 and finger.linear_velocity[1] > -0.9
+
+
+def test_a_box_is_watched_only_where_a_fingertip_is_a_mesh():
+    world, _ = with_arm(0)
+    box, mesh = world_of(1).objects
+    world.objects.append(box)
+    assert among_meshes(world) == [0], "a plate, and a box"
+    world.bodies[mesh] = ("hand", 1)
+    assert among_meshes(world) == [0, 1]
