@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,7 @@ from bt_tasksim.core.errors import InputError
 MOST_EPISODES = 1_000_000
 MOST_WORKERS = 1024
 MOST_STEPS = 10**12
+MOST_SECONDS = 86_400
 SEEDS = 2**64
 """How many seeds there are: logs hold them as 64 bits."""
 SHOWN = 40
@@ -61,6 +63,23 @@ def steps(text: str | int) -> int:
     return whole(text, 1, MOST_STEPS)
 
 
+def seconds(text: str | float) -> float:
+    """A time that is not too long to be meant.
+
+    Raises:
+        BadParameter: It is none.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value <= MOST_SECONDS:
+        raise typer.BadParameter(
+            f"should be a number of seconds above 0 and at most {MOST_SECONDS}, found {_shown(text)}"
+        )
+    return value
+
+
 def port(text: str | int) -> int:
     """A TCP port; 0 for a free one."""
     return whole(text, 0, 65535)
@@ -82,7 +101,7 @@ def picture(path: Path) -> Path:
     return path
 
 
-def _shown(text: str | int) -> str:
+def _shown(text: str | float) -> str:
     said = str(text)
     return repr(said if len(said) <= SHOWN else f"{said[:SHOWN]}...")
 
@@ -91,5 +110,14 @@ Seed = Annotated[
     int,
     typer.Option(
         parser=seed, metavar="S", help="Seed of the draw; of the first one, where there are several."
+    ),
+]
+Longest = Annotated[
+    float | None,
+    typer.Option(
+        parser=seconds,
+        metavar="SECONDS",
+        help="Stop an episode after so much of its own time.",
+        show_default="120",
     ),
 ]

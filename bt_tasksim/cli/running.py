@@ -27,6 +27,7 @@ def run_into(
     engines: EngineOptions,
     name: str,
     film: Film | None = None,
+    longest: float | None = None,
 ) -> Result:
     """Run a tree once, keep everything of it in a folder, and print what became of it.
 
@@ -38,22 +39,23 @@ def run_into(
         engines: Which engines; where they say rendering and this machine cannot draw, the run is not filmed.
         name: What is run: a scenario's name or the tree's file.
         film: How it is filmed, where engines say rendering; None as by default.
+        longest: Seconds of the episode after which it is stopped; None as by default.
 
     Raises:
         InputError: The folder, the tree or the scene is no good.
         MachineError: An engine failed, or the disk is full or not writable.
     """
-    from bt_tasksim.execution.runner import Runner
+    from bt_tasksim.execution.runner import LONGEST, Runner
     from bt_tasksim.report.report import NO_VIDEO
     from bt_tasksim.report.write import filming_runner, write_run
 
-    why = ""
+    why, longest = "", longest or LONGEST
     if engines.rendering:
-        runner, why = filming_runner(tree, scene, engines)
+        runner, why = filming_runner(tree, scene, engines, longest)
         if why:
             print(f"(without video: {why})", file=sys.stderr)
     else:
-        runner = Runner(tree, scene, engines)
+        runner = Runner(tree, scene, engines, longest=longest)
     try:
         with progress("running", None):
             result, files = write_run(

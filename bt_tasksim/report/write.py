@@ -17,7 +17,7 @@ from bt_tasksim.demos_decomp.log import Video
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.run_log import RunRecorder, about
-from bt_tasksim.execution.runner import Runner, Step
+from bt_tasksim.execution.runner import LONGEST, Runner, Step
 from bt_tasksim.report.report import NO_VIDEO, write_report
 from bt_tasksim.report.tree_picture import tree_svg
 from bt_tasksim.report.video import Film, VideoRecorder
@@ -112,7 +112,10 @@ def write_run(
 
 
 def filming_runner(
-    tree: Behaviour, scene: WorldSource, options: EngineOptions | None = None
+    tree: Behaviour,
+    scene: WorldSource,
+    options: EngineOptions | None = None,
+    longest: float = LONGEST,
 ) -> tuple[Runner, str]:
     """A runner that can draw; where this machine cannot, one that does not.
 
@@ -120,6 +123,7 @@ def filming_runner(
         tree: The tree's root.
         scene: The scene.
         options: Which engines.
+        longest: Seconds of an episode after which it is stopped.
 
     Returns:
         The runner, and one sentence that says why it cannot draw; empty where it can.
@@ -130,9 +134,9 @@ def filming_runner(
     """
     options = options or EngineOptions()
     try:
-        return Runner(tree, scene, dataclasses.replace(options, rendering=True)), ""
+        return Runner(tree, scene, dataclasses.replace(options, rendering=True), longest=longest), ""
     except MachineError as error:
-        without = Runner(tree, scene, dataclasses.replace(options, rendering=False))
+        without = Runner(tree, scene, dataclasses.replace(options, rendering=False), longest=longest)
         return without, f"No video: {error}."
 
 

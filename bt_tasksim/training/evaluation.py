@@ -40,7 +40,7 @@ from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.execution.result import Result
-from bt_tasksim.execution.runner import Runner
+from bt_tasksim.execution.runner import LONGEST, Runner
 from bt_tasksim.execution.worlds import check_memory, most_processes, most_worlds, why_alone
 from bt_tasksim.scene.configuration import check_seed
 from bt_tasksim.training.evaluation_file import EvaluationFile, KeptEvaluation
@@ -71,6 +71,7 @@ class Job:
         batch: How many worlds are run at once in each process, by default `usual_batch`. Outcomes do not
             depend on it.
         threads: How many threads step them.
+        longest: Seconds of an episode after which it is stopped.
 
     Raises:
         InputError: There is no world or thread, or these engines have no worlds in batches.
@@ -84,6 +85,7 @@ class Job:
     plugins: tuple[str, ...] = field(default_factory=loaded)
     batch: int | None = None
     threads: int = 1
+    longest: float = LONGEST
 
     def __post_init__(self) -> None:
         batch = 1 if self.batch is None else self.batch
@@ -306,7 +308,7 @@ class Player(Closing):
         load_all(job.plugins)
         source = load_source(job.tree, job.robot, job.scene, job.policies, job.options.own_world())
         self._job, self._build = job, source.build
-        self.runner = Runner(source.build, source.scene, job.options)
+        self.runner = Runner(source.build, source.scene, job.options, longest=job.longest)
         self._batch: BatchRunner | None = None
         context = self.runner.context
         tree = BatchTree(self.runner.tree, 1, lambda leaf: leaf_in_batch(leaf, context))
@@ -343,7 +345,7 @@ class Player(Closing):
         if self._batch is None:
             job, scene = self._job, self.runner.scene
             worlds = min(batch, len(seeds))
-            self._batch = BatchRunner(self._build, scene, job.options, worlds, job.threads)
+            self._batch = BatchRunner(self._build, scene, job.options, worlds, job.threads, job.longest)
         index_of = {seed: index for index, seed in enumerate(seeds)}
         for seed, found in self._batch.run(seeds, stream):
             if isinstance(found, InputError) and not isinstance(found, NoDrawError | NotToldApartError):
@@ -410,6 +412,8 @@ def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
     from bt_tasksim.training.subject import evaluation_subject, own_code
 
     code = own_code(runner.tree, job.tree, job.plugins, runner.scene)
+    if job.longest != LONGEST:
+        code = {**code, "longest time of an episode": f"{job.longest:g} s"}
     return evaluation_subject(runner.tree, runner.scene, job.options, policies_of(runner), code, stream)
 
 

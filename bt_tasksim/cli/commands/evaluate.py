@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bt_tasksim.cli import arguments
-from bt_tasksim.cli.arguments import Seed
+from bt_tasksim.cli.arguments import Longest, Seed
 from bt_tasksim.cli.options.engines import EngineFlags, policies
 from bt_tasksim.cli.options.tree import TreeOptions
 from bt_tasksim.cli.progress import progress
@@ -60,10 +60,12 @@ def evaluate(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the file of --json, after an interrupt or a kill.")
     ] = False,
+    longest: Longest = None,
 ) -> None:
     """Run a tree on many seeded draws and count successes."""
     from bt_tasksim.core.files import alone, check_targets
     from bt_tasksim.core.identity import identity
+    from bt_tasksim.execution.runner import LONGEST
     from bt_tasksim.training import evaluation
     from bt_tasksim.training.evaluation_file import EvaluationFile, check_ended, read_kept
 
@@ -86,6 +88,7 @@ def evaluate(
         chosen,
         batch=batch,
         threads=os.cpu_count() or 1 if alone_here else 1,
+        longest=longest or LONGEST,
     )
     keep = None if json_ is None else EvaluationFile(json_)
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bt_tasksim.cli.arguments import Seed
+from bt_tasksim.cli.arguments import Longest, Seed
 from bt_tasksim.cli.options.engines import EngineFlags, policies
 from bt_tasksim.cli.options.film import FilmFlags
 from bt_tasksim.cli.options.tree import TreeOptions
@@ -29,6 +29,7 @@ def run(
     real_time: Annotated[
         bool, typer.Option("--real-time", help="Keep the control rate in simulation, too.")
     ] = False,
+    longest: Longest = None,
 ) -> int:
     """Run a tree once."""
     from bt_tasksim.cli.running import run_into
@@ -42,7 +43,7 @@ def run(
     if options.perception != "state":
         parts.insert(2, options.perception.partition(":")[0])
     folder = out or Path("runs") / "-".join(parts)
-    result = run_into(folder, source.build(), source.scene, seed, options, source.name, film.film())
+    result = run_into(folder, source.build(), source.scene, seed, options, source.name, film.film(), longest)
     if result.timing is not None:
         say(result.timing)
     return 0 if result.success else 1

@@ -46,6 +46,8 @@ def test_old_command_lines_mean_what_they_meant(line):
             was["workers"] = None  # which is 1, but on a cluster
     if "connect_timeout" in found:
         was = {"device": "cpu", "laws": "auto", **was}
+    if shlex.split(line)[0] in ("run", "evaluate"):
+        was = {"longest": None, **was}
     if line.startswith("run "):
         was = {"video_camera": "overview", "video_size": "", "video_fps": 10.0, **was}
     if line.startswith("new "):

@@ -158,11 +158,11 @@ def test_a_run_that_the_log_cannot_hold_is_written_without(tmp_path):
 def test_no_rendering_device(tmp_path, monkeypatch):
     made = []
 
-    def build(tree, scene, options):
+    def build(tree, scene, options, longest):
         made.append(options.rendering)
         if options.rendering:
             raise MachineError("SAPIEN finds no Vulkan device")
-        return Runner(tree, scene, options)
+        return Runner(tree, scene, options, longest=longest)
 
     monkeypatch.setattr(write, "Runner", build)
     runner, why = filming_runner(pick_and_place.build(), pick_and_place.scene(), EngineOptions())

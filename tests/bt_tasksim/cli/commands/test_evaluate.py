@@ -68,3 +68,19 @@ def test_a_machine_without_the_simulator_says_what_to_install(call, monkeypatch)
     code, _, err = call("evaluate", "pick_and_place", "--episodes", 1)
     assert code == 1 and err.count("\n") == 1
     assert "SAPIEN physics cannot start" in err and "pip install 'bt-tasksim[sim]'" in err
+
+
+@pytest.mark.parametrize("batch", [1, 2])
+def test_an_episode_is_as_long_as_is_asked_for(call, batch):
+    words = ("evaluate", "pick_and_place", "--episodes", 2, "--batch", batch, "--json", "e.json")
+    code, out, _ = call(*words, "--longest", 1.5)
+    assert code == 0
+    found = json.loads(Path("e.json").read_text())
+    assert found["failures"] == {"time_over": 2} and "1.5 s" in out
+    assert [outcome["control_steps"] for outcome in found["outcomes"]] == [30, 30]
+
+
+@pytest.mark.parametrize("time", [0, -1, "nan", "inf", "soon", 1e9])
+def test_a_length_that_is_none_is_refused(call, time):
+    code, out, err = call("evaluate", "pick_and_place", "--longest", time)
+    assert code == 2 and out == "" and "number of seconds" in err

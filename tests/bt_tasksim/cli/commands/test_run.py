@@ -106,3 +106,12 @@ def test_a_run_is_replayed_with_any_kind_of_tree(call, kind):
 def test_laws_of_batches_are_refused_for_a_single_run(call):
     code, _, err = call("run", "pick_and_place", "--laws", "torch")
     assert code == 2 and "evaluate" in err and not Path("runs").exists()
+
+
+@pytest.mark.parametrize("more", [(), ("--video",)])
+def test_a_run_is_as_long_as_is_asked_for(call, until, more):
+    out, _ = until(1, "run", "pick_and_place", "--longest", "1.5", "--out", "short", *more)
+    assert "1.5 s" in out
+    result = json.loads(Path("short/result.json").read_text())
+    assert result["reason"] == "time_over" and result["control_steps"] == 30
+    assert call("replay", "short")[0] == 0
