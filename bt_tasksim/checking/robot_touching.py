@@ -89,6 +89,7 @@ def link_part(shape: LinkVisual) -> LinkPart | None:
     """A shape as coal has it."""
     from bt_tasksim.core.narrow_phase import coal
     from bt_tasksim.engines.physics.mujoco_robot import mesh_hull
+    from bt_tasksim.scene.hulls import convex
 
     match shape.kind:
         case "box":
@@ -100,10 +101,7 @@ def link_part(shape: LinkVisual) -> LinkPart | None:
         case _:
             assert shape.mesh is not None
             x, y, z = shape.size
-            points = coal.StdVec_Vec3s()
-            for vertex in mesh_hull(shape.mesh, (x, y, z)):
-                points.append(np.asarray(vertex, float))
-            form = coal.Convex.convexHull(points, False, "")
+            form = convex(mesh_hull(shape.mesh, (x, y, z)))
     return LinkPart(shape.link, form, np.array(shape.pose))
 
 

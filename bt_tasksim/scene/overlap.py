@@ -64,16 +64,15 @@ def check_configuration(configuration: ActorConfiguration) -> None:
 
 
 def _body(coal: Any, name: str, pose: Array, pieces: Sequence[Piece]) -> _Body:
+    from bt_tasksim.scene.hulls import convex
+
     parts = []
     corners = []
     for piece in pieces:
         if isinstance(piece, BoxPiece):
             frame, form = poses.multiply(pose, piece.pose), coal.Box(*(2 * piece.half_size).tolist())
         else:
-            points = coal.StdVec_Vec3s()
-            for vertex in piece.vertices:
-                points.append(np.asarray(vertex, float))
-            frame, form = pose, coal.Convex.convexHull(points, False, "")
+            frame, form = pose, convex(piece.vertices)
         parts.append((form, coal.Transform3s(poses.to_matrix(frame[3:]), frame[:3])))
         corners.append(poses.transform(pose, piece.corners()))
     every = np.concatenate(corners)

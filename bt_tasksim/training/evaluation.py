@@ -412,9 +412,10 @@ def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
     from bt_tasksim.training.subject import evaluation_subject, own_code
 
     code = own_code(runner.tree, job.tree, job.plugins, runner.scene)
-    if job.longest != LONGEST:
-        code = {**code, "longest time of an episode": f"{job.longest:g} s"}
-    return evaluation_subject(runner.tree, runner.scene, job.options, policies_of(runner), code, stream)
+    subject = evaluation_subject(runner.tree, runner.scene, job.options, policies_of(runner), code, stream)
+    if job.longest != LONGEST:  # earlier files say nothing of it
+        subject["longest time of an episode"] = f"{job.longest:g} s"
+    return subject
 
 
 def _name(job: Job) -> str:

@@ -78,6 +78,10 @@ def test_an_episode_is_as_long_as_is_asked_for(call, batch):
     found = json.loads(Path("e.json").read_text())
     assert found["failures"] == {"time_over": 2} and "1.5 s" in out
     assert [outcome["control_steps"] for outcome in found["outcomes"]] == [30, 30]
+    assert call(*words, "--resume", "--longest", 1.5)[0] == 0
+    for other in ((), ("--longest", 2)):
+        code, _, err = call(*words, "--resume", *other)
+        assert code == 2 and "longest time of an episode" in err
 
 
 @pytest.mark.parametrize("time", [0, -1, "nan", "inf", "soon", 1e9])
