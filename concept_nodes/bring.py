@@ -29,13 +29,12 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
 from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, DROPPED, HIGHER, NARROWLY, TOUCHING, with_room
+from bt_tasksim.concept_nodes.drops import preferred_options
 from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, resting_place
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.spots import GAP, Spots, spots_beside, spots_on
 from bt_tasksim.concept_nodes.standing import (
     aside_options,
-    nearest_first,
-    standing_options,
     supports_of,
     tipped,
 )
@@ -199,7 +198,7 @@ class Bring(Carry):
         via = self._via(now, goal, origin, grip)
         arrays = [tool_goal, goal[:, 2] - self.hover, middle, turns, *self._exits(seen), *via]
         goals, floors, middles, turned, outs, intos, *vias = host_numbers(arrays)
-        put_down = self._put_down(seen)
+        put_down, later = self._put_down(seen), self._later(seen)
         ways: list[list[Array]] = []
         routes: dict[int, list[Route]] = {}
         for k, view in enumerate(found):
@@ -208,7 +207,7 @@ class Bring(Carry):
             else:
                 supports = supports_of(view, self.to) if self.to is not None else frozenset()
                 floor = float(floors[k]) if put_down else None
-                options = self._options(view)
+                options = self._options(view, later)
                 aside = None
                 if self.to is not None and options is not None and put_down:
                     aside = aside_options(view, self.to, options, held=True)
@@ -285,13 +284,22 @@ class Bring(Carry):
         after = next((model for model in seen.later if getattr(model, "actor", None) == self.target), None)
         return after is not None and self.to is not None and after.values.get("on") == self.to
 
-    def _options(self, view: WorldView) -> Array | None:
-        """Poses ``(k, 7)`` in which the object may end; None where it may end in one alone."""
+    def _options(self, view: WorldView, later: Sequence[str] = ()) -> Array | None:
+        """Poses ``(k, 7)`` in which the object may end; None where it may end in one alone.
+
+        Args:
+            view: The world.
+            later: Objects that go there, too, after it.
+        """
         if self.to is None:
             return None
-        heights = [standing_options(view, self.target, self.to, share * self.hover) for share in LOWER]
-        now = view.objects[self.target][3:]
-        return np.concatenate([nearest_first(options, now) for options in heights])
+        heights = [share * self.hover for share in LOWER]
+        return np.concatenate([preferred_options(view, self.target, self.to, h, later) for h in heights])
+
+    def _later(self, seen: Seen) -> list[str]:
+        """Objects that the tree brings to the same place, after this one."""
+        found = [getattr(model, "actor", None) for model in seen.later if model.values.get("to") == self.to]
+        return [name for name in dict.fromkeys(found) if name is not None and name != self.target]
 
     def _emptier(self, view: WorldView, goals: _Goals) -> _Goals:
         """Low over the emptiest part of a container with something in it: what falls far bounces off."""

@@ -29,13 +29,12 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.closer import DROPPED, HIGHER, PUT_DOWN, TOUCHING, with_room
+from bt_tasksim.concept_nodes.drops import preferred_options
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
 from bt_tasksim.concept_nodes.standing import (
     aside_options,
-    nearest_first,
-    standing_options,
     supports_of,
     tipped,
 )
@@ -328,7 +327,7 @@ class Place(ConceptModel[PlaceMemory]):
             spots = spots_on(view, self.target, self.on).poses
             nearest = np.argsort(np.linalg.norm(spots[:, :2] - now[:2], axis=-1), kind="stable")
             return poses.multiply(spots[nearest[:OTHERS]], grip[None]) + self.overshoot * self._along
-        options = nearest_first(standing_options(view, self.target, self.on), now[3:])
+        options = preferred_options(view, self.target, self.on)
         leaning = tipped(options[:1], grip) if len(view.arm) >= FULL else options[:0]
         aside = aside_options(view, self.on, options[:1], held=True)
         nearest = np.argsort(np.linalg.norm(aside[:, :2] - now[:2], axis=-1), kind="stable")
@@ -418,8 +417,7 @@ class Place(ConceptModel[PlaceMemory]):
         if self.on is None and self.beside is None:
             return None
         if self.on is not None and not self.anywhere:
-            options = standing_options(view, self.target, self.on)
-            options = nearest_first(options, view.objects[self.target][3:])
+            options = preferred_options(view, self.target, self.on)
             aside = aside_options(view, self.on, options)
             return Aim(options, f"be put down on {self.on}", supports_of(view, self.on), aside=aside)
         if self.on is not None:

@@ -164,7 +164,7 @@ def spots_beside(view: WorldView, target: str, other: str, gap: float = GAP) -> 
     Raises:
         NoWayError: There is no room.
     """
-    corners = _corners(view, other)
+    corners = corners_of(view, other)
     surfaces = _surfaces_below(view, corners, (target, other))
     if not surfaces:
         raise NoWayError(f"{other} stands on nothing that is known, so {target} cannot be put beside it")
@@ -186,7 +186,7 @@ def spots_beside(view: WorldView, target: str, other: str, gap: float = GAP) -> 
 
 def supports_beside(view: WorldView, target: str, other: str) -> frozenset[str]:
     """Names of what an object touches that stands next to another one."""
-    surfaces = _surfaces_below(view, _corners(view, other), (target, other))
+    surfaces = _surfaces_below(view, corners_of(view, other), (target, other))
     return frozenset().union(*(supports_of(view, surface.name) for surface in surfaces))
 
 
@@ -242,7 +242,7 @@ class _Search:
         self.outlines = [hull(poses.rotate(turned[None], pieces)[:, :2]) for turned in self._rotations]
         self._things = _things(view, target, float(frame[2]), 2.0 * self._height)
         self._reserved = [
-            _outline_of(surface_of(view, name))
+            outline_of(surface_of(view, name))
             for name, place in view.world.places.items()
             if place.kind == "spot" and name not in own and abs(place.pose[2] - frame[2]) < LEVEL
         ]
@@ -366,17 +366,18 @@ def _things(view: WorldView, target: str, floor: float, height: float) -> list[t
     furniture = [("", poses.transform(box.pose, box_corners(box.size))) for box in view.world.obstacles]
     seen = [n for n, pose in view.objects.items() if n != target and bool(np.isfinite(pose).all())]
     found = []
-    for name, corners in (*furniture, *((n, _corners(view, n)) for n in seen)):
+    for name, corners in (*furniture, *((n, corners_of(view, n)) for n in seen)):
         if float(corners[:, 2].max()) > floor + TOUCHING and float(corners[:, 2].min()) < floor + height:
             found.append((name, hull(corners[:, :2])))
     return found
 
 
-def _corners(view: WorldView, name: str) -> Array:
+def corners_of(view: WorldView, name: str) -> Array:
     """Corners ``(n, 3)`` of an object's pieces where it is."""
     pose = poses.unit_pose(view.objects[name])
     return np.concatenate([poses.transform(pose, piece) for piece in pieces_of(view.model(name))])
 
 
-def _outline_of(surface: FreeSurface) -> Array:
+def outline_of(surface: FreeSurface) -> Array:
+    """Corners ``(4, 2)`` of a surface from above, base frame, metres."""
     return rectangle(surface.frame, surface.centre, 2.0 * surface.half)

@@ -13,8 +13,6 @@ from bt_tasksim.core.world import ObjectModel
 
 HEADINGS = 12
 """Headings that are tried where any will do."""
-ROUND = 0.6
-"""Share of its larger side from above that something keeps from the walls of what it is to fall into."""
 TIPPED = (0.07, 0.14)
 """Radians by which something may lean that is put down where it cannot stand upright at once: what has turned
 in a hand of fingers that swing. It stands up when it is let go. Less than `place.LEANING`."""
@@ -30,25 +28,20 @@ hand as this closes."""
 
 
 def standing_options(view: WorldView, target: str, reference: str, hover: float = 0.0) -> Array:
-    """Poses ``(k, 7)`` of an object that stands over a place or on another object.
+    """Poses ``(k, 7)`` of an object that stands over a place that is no container, or on another object.
 
     Args:
         view: The world.
         target: The object.
         reference: The place, or the other object.
-        hover: Free height below it, metres; over a container, above its rim.
+        hover: Free height below it, metres.
     """
     model = view.model(target)
-    frame, rim = reference_frame(view, reference)
-    place = view.world.places.get(reference)
-    free = place is not None and place.kind == "bin"
-    height = standing_height(model) + hover + rim
-    turns = headings() if free or (model.symmetry == 0 and not model.cubic) else rotations(model)
-    offsets = emptiest(view, target, reference) if free else np.zeros((1, 2))
-    positions = poses.transform(frame, np.column_stack([offsets, np.full(len(offsets), height)]))
+    frame, _ = reference_frame(view, reference)
+    turns = headings() if model.symmetry == 0 and not model.cubic else rotations(model)
+    position = poses.transform(frame, np.array([0.0, 0.0, standing_height(model) + hover]))
     turned = poses.quat_multiply(frame[None, 3:], turns)
-    many, few = len(offsets), len(turned)
-    return np.concatenate([np.tile(positions, (few, 1)), np.repeat(turned, many, axis=0)], axis=-1)
+    return np.concatenate([np.tile(position, (len(turned), 1)), turned], axis=-1)
 
 
 def aside_options(view: WorldView, reference: str, options: Array, held: bool = False) -> Array:
@@ -97,27 +90,6 @@ def _turned(options: Array, angle: float) -> Array:
     """The same poses ``(k, 7)`` turned about the upward axis, radians."""
     turned = poses.quat_multiply(poses.yaw(angle)[None], options[:, 3:])
     return np.concatenate([options[:, :3], turned], axis=-1)
-
-
-def emptiest(view: WorldView, target: str, container: str) -> Array:
-    """Where something may fall into a container ``(k, 2)``, in its frame: the emptiest places first.
-
-    Its middle, where nothing is in it yet. A spot that is marked in it counts as taken: something else is to
-    stand there.
-    """
-    place, model = view.world.places[container], view.model(target)
-    middle, half = np.asarray(place.centre), np.asarray(place.extent) / 2
-    room = np.maximum(half - ROUND * max(model.extent[:2]), 0.0)
-    offsets = middle + room * np.array([(0.0, 0.0), *((x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0))])
-    others = [pose for name, pose in view.objects.items() if name != target and np.isfinite(pose).all()]
-    others += [spot.pose for spot in view.world.places.values() if spot.kind == "spot"]
-    there = poses.localise(np.asarray(place.pose), np.array(others).reshape(-1, 7)[:, :3])
-    inside = there[(abs(there[:, :2] - middle) < half).all(axis=-1), :2]
-    if not len(inside):
-        return offsets
-    apart = np.linalg.norm(offsets[:, None] - inside[None], axis=-1).min(axis=-1)
-    found: Array = offsets[np.argsort(-apart, kind="stable")]
-    return found
 
 
 def supports_of(view: WorldView, reference: str) -> frozenset[str]:

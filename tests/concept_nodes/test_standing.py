@@ -13,7 +13,6 @@ from bt_tasksim.concept_nodes.standing import (
     TIPPED,
     TURNED,
     aside_options,
-    emptiest,
     headings,
     nearest_first,
     standing_height,
@@ -132,31 +131,3 @@ def test_tipped_poses_lean_about_the_tools_x_axis_the_least_first(view):
         assert np.allclose(poses.angle_between(leaning[:, 3:], options[:, 3:]), angle)
         for before, after in zip(tools, turned, strict=True):
             assert np.allclose(poses.to_matrix(before[3:])[:, 0], poses.to_matrix(after[3:])[:, 0])
-
-
-def test_into_a_container_things_fall_where_least_is_in_it(view):
-    size, middle = (0.2, 0.16), np.array([0.01, -0.02])
-    place = dataclasses.replace(
-        view.world.place("goal"), name="bin", kind="bin", extent=size, centre=tuple(middle)
-    )
-    world = dataclasses.replace(view.world, places={"bin": place})
-    empty = view._replace(world=world, objects={"box": view.objects["box"]})
-    found = emptiest(empty, "box", "bin")
-    assert np.allclose(found[0], middle), "over the middle of an empty one"
-    assert (abs(found - middle) <= np.array(size) / 2 - 0.6 * max(view.model("box").extent[:2]) + 1e-9).all()
-    lies = poses.transform(np.asarray(place.pose), np.array([middle[0] + 0.05, middle[1] + 0.04, 0.02]))
-    full = empty._replace(objects={**empty.objects, "cup": poses.pose(lies)})
-    there = emptiest(full, "box", "bin")
-    assert (there[0] < middle).all() and (there[-1] > middle).all()
-    assert sorted(map(tuple, there.round(9))) == sorted(map(tuple, found.round(9)))
-    options = standing_options(full, "box", "bin", 0.05)
-    assert len(options) == len(found) * HEADINGS
-
-
-def test_into_a_container_things_fall_beside_the_spots_that_are_marked_in_it(view):
-    spot = dataclasses.replace(view.world.place("goal"), kind="spot")
-    place = dataclasses.replace(spot, name="bin", kind="bin", extent=(0.3, 0.24), centre=(0.0, 0.0))
-    at = poses.pose(poses.transform(np.asarray(place.pose), np.array([0.06, -0.05, 0.0])))
-    places = {"bin": place, "goal": dataclasses.replace(spot, pose=at)}
-    marked = view._replace(world=dataclasses.replace(view.world, places=places), objects={})
-    assert emptiest(marked, "box", "bin")[0] @ [1.0, -1.0] < 0.0, "on the other side"
