@@ -11,10 +11,8 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.mesh_surface import nearest_on_triangles, sampled
 from bt_tasksim.scene.meshes import TriangleMesh, mass_properties
+from bt_tasksim.scene.shape_kind import looks_alike
 
-ALIKE = (0.0002, 0.01, 0.001)
-"""Distance between a mesh and itself turned up to which the two look the same: at least 0.2 mm, which finding
-nearest points costs; else a hundredth of its size; at most 1 mm, as much as a depth camera is wrong by."""
 ASIDE = 0.005
 """Metres that the axis of a symmetry may be beside the frame's origin: a star's bounding box has another
 middle than the star, and goals allow for more than twice that."""
@@ -38,8 +36,7 @@ def symmetry_about_z(mesh: TriangleMesh) -> int:
         return 1
     points = mesh.vertices - centre
     few = points[:: -(-len(points) // _POINTS)]
-    least, share, most = ALIKE
-    alike = min(max(least, share * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))), most)
+    alike = looks_alike(np.ptp(mesh.vertices, axis=0))
 
     to_surface = _distances(mesh)
 

@@ -14,6 +14,7 @@ from bt_tasksim.scene.geometry import polygon
 from bt_tasksim.scene.kinds.cup import WALL
 from bt_tasksim.scene.kinds.diamond import diamond_width
 from bt_tasksim.scene.mesh_file import mesh_extent
+from bt_tasksim.scene.mesh_symmetry import symmetry_about_z
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.shapes import KINDS, BoxPiece, ShapeSize, object_model, resting_height, shape
 from tests.bt_tasksim.scene.solids import MADE, solids
@@ -219,6 +220,27 @@ def test_mesh_file_is_scaled_centred_and_made_of_convex_pieces():
     assert all(len(piece.corners()) <= 64 for piece in geometry.collision)
     model = object_model("bottle", "mesh", ShapeSize(size, mesh=path))
     assert model.grasp_widths == pytest.approx((0.042, 0.056)) and model.symmetry == 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "order"),
+    [
+        ("box", (0.06, 0.04, 0.1), 2),
+        ("box", (0.06, 0.0602, 0.1), 4),
+        ("diamond", (0.05, 0.05, 0.1), 4),
+        ("diamond", (0.05, 0.04, 0.1), 2),
+        ("superellipsoid", (0.05, 0.05, 0.08), 4),
+        ("oval", (0.06, 0.0599, 0.1), 0),
+        ("oval", (0.06, 0.05, 0.1), 2),
+    ],
+)
+def test_what_is_as_wide_as_long_looks_the_same_after_a_quarter_turn(kind, size, order):
+    solid = ShapeSize(size, (0.5, 0.5))
+    model, mesh = object_model("it", kind, solid), shape(kind, solid).visual
+    assert model.symmetry == order
+    # The mesh itself agrees, as far as its facets allow.
+    found = symmetry_about_z(mesh)
+    assert found == order or (order in (0, 4) and found % 4 == 0)
 
 
 def test_same_arguments_give_the_same_object_and_nobody_can_change_it():
