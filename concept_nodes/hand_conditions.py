@@ -78,7 +78,7 @@ class Lifted(Condition):
     @classmethod
     def from_goal(cls, goal: Goal) -> dict[str, Any]:
         """See `Condition.from_goal`."""
-        return {"target": goal.object, "above": goal.place, "height": goal.height}
+        return {"target": goal.object, "above": goal.place or None, "height": goal.height}
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""

@@ -191,7 +191,7 @@ def _stage(goal: Goal, below: Goal | None = None) -> Behaviour:
         goal: The goal.
         below: The goal of what the object is to stand on or beside, where that comes first.
     """
-    wanted, title = _asked(goal), f"{goal.object} {goal.relation} {goal.place}"
+    wanted, title = _asked(goal), f"{goal.object} {goal.relation} {goal.place}".strip()
     chain = _chain(goal, wanted)
     needs = [condition_leaf(need) for need in chain.given]
     if below is not None:

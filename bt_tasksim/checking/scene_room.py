@@ -19,7 +19,7 @@ from bt_tasksim.scene.hulls import convex
 from bt_tasksim.scene.shapes import BoxPiece, Piece
 
 if TYPE_CHECKING:
-    from bt_tasksim.scene.scene import Scene
+    from bt_tasksim.scene.scene import Scene, WorldSource
 
 
 def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Report) -> None:
@@ -51,6 +51,32 @@ def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repor
             what = f"is in '{link}' of {robot.name} {often}, by {1000 * depth:.0f} mm"
             level = ERROR if len(deep) == len(worlds) else WARNING
             report.add(level, scene.name, name, what, "draw it from an area beside the robot")
+
+
+def refuse_in_robot(scene: WorldSource, seed: int) -> None:
+    """Refuse a draw in which an object begins in the robot: physics would throw both apart.
+
+    Worlds that are not drawn from a `Scene`, and robots whose shapes are not there, are not looked at.
+
+    Raises:
+        InputError: One does; it says which and by how much.
+    """
+    from bt_tasksim.scene.scene import Scene
+
+    if not isinstance(scene, Scene):
+        return
+    robot, world = load_robot(scene.robot), scene.sample(seed)
+    try:
+        links = robot.derived("links at rest", _links)
+    except InputError:
+        return
+    for name in scene.object_names:
+        link, depth = _of_object(links, world, name)
+        if depth > DEEP:
+            raise InputError(
+                f"with seed {seed} '{name}' begins {1000 * depth:.0f} mm in '{link}' of {robot.name}: draw "
+                f"it from an area beside the robot, see 'bt-tasksim check'"
+            )
 
 
 def in_robot(robot: RobotDescription, world: ActorConfiguration) -> str:

@@ -58,6 +58,9 @@ def test_what_is_to_be_lifted_stays_in_the_hand_as_high_as_asked():
     tree = tidy([Goal("cup", "table", relation="lifted", height=0.25)])
     assert acts(tree) == ["Grasp(target='cup')", "Pick(target='cup', distance=0.25)"]
     assert tree.children[0].model == Lifted.value("cup", above="table", height=0.25)
+    anywhere = tidy([Goal("cup", relation="lifted", height=0.25)])
+    assert acts(anywhere) == acts(tree) and anywhere.children[0].model == Lifted.value("cup", height=0.25)
+    assert anywhere.children[0].name == "lifted cup"
 
 
 def test_a_goal_is_asked_before_and_after():

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import resource
+import shlex
 import signal
 import subprocess
 import sys
@@ -169,8 +170,11 @@ def test_the_version_is_that_of_the_package(call):
 
 
 def test_a_shell_gets_a_script_and_completes_words():
-    script = start("--show-completion", "bash", capture_output=True, env={"SHELL": "/bin/bash"}).stdout
-    assert "_BT_TASKSIM_COMPLETE" in script
+    # Which shell it is for is asked of the processes above, so there has to be one.
+    line = f"{shlex.quote(sys.executable)} -m bt_tasksim.cli --show-completion; true"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    script = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True, env=environment)
+    assert "_BT_TASKSIM_COMPLETE" in script.stdout, script.stderr
     ask = {"_BT_TASKSIM_COMPLETE": "complete_bash", "COMP_CWORD": "1"}
     found = start(capture_output=True, env={**ask, "COMP_WORDS": "bt-tasksim ev"})
     assert found.stdout.split() == ["evaluate"], found.stderr
