@@ -10,7 +10,7 @@ from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.functions import booleans
 from bt_tasksim.concept.parameters import Flag, Metres, ObjectName, PlaceName, Radians
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.concept_nodes.bring import destination, standing_pose
+from bt_tasksim.concept_nodes.destination import destination, standing_pose
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
 from bt_tasksim.concept_nodes.hand_conditions import height_above
 from bt_tasksim.concept_nodes.spots import has_room

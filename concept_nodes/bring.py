@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +26,10 @@ from bt_tasksim.concept.parameters import (
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept.task import Task
+from bt_tasksim.concept_nodes.carried_way import CarriedWay, ProposedWay, WayEnds, way_over
 from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
-from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, DROPPED, HIGHER, NARROWLY, TOUCHING, with_room
+from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, TOUCHING
+from bt_tasksim.concept_nodes.destination import destination, standing_pose
 from bt_tasksim.concept_nodes.drops import preferred_options
 from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, resting_place
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
@@ -36,59 +37,24 @@ from bt_tasksim.concept_nodes.spots import GAP, Spots, spots_beside, spots_on
 from bt_tasksim.concept_nodes.standing import (
     aside_options,
     supports_of,
-    tipped,
 )
-from bt_tasksim.concept_nodes.surface import top_frame, upright
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
-from bt_tasksim.core.fact_arrays import ObjectFacts, take_rows
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
-from bt_tasksim.planning.arm import FULL, LEANS, SET_DOWN, arm_of
+from bt_tasksim.planning.arm import arm_of
 from bt_tasksim.planning.reference_motion import plan
-from bt_tasksim.planning.route import Pace, Route, followed
-from bt_tasksim.planning.routes import EVERY, SAMPLES, in_postures, joints_along, with_routes
-from bt_tasksim.planning.things import Leave
-from bt_tasksim.robot.kinematics.hand import opened_about, wide_at
+from bt_tasksim.planning.route import Pace, Route
+from bt_tasksim.planning.routes import SAMPLES, in_postures, joints_along, with_routes
 
 HOVERS = (0.03, 0.12)
 """Metres between which the height lies that is taken over from a demonstration."""
-RAISED = 0.05
-"""Metres by which a way over things goes higher than its ends."""
-ENOUGH = 6
-"""Postures at the end of a way from which a search may choose."""
-SLOW, SLOWER = 0.6, 0.4
-"""Shares of the usual speed at which things are carried closely past others: an arm that lags cuts corners
-less."""
-ROOMS = (
-    (CARRIED, 1.0, BROUGHT, 0.0),
-    (NARROWLY, SLOW, BROUGHT, 0.0),
-    (BROUGHT, SLOWER, BROUGHT, 0.0),
-    (BROUGHT, SLOWER, TOUCHING, 0.0),
-    (BROUGHT, SLOWER, TOUCHING, DROPPED),
-)
-"""What is tried one after the other: how much closer than usual one may come to things on the way, the share
-of the usual speed, the same closeness where it is put down, and metres above its support where that ends."""
-BESIDE = ((BROUGHT, SLOWER, TOUCHING, 0.0),)
-"""The same for what is put down a little aside of where it should stand, see `aside_options`."""
-SLANTED = (CARRIED, 1.0, BROUGHT, 0.0), (BROUGHT, SLOWER, TOUCHING, 0.0)
-"""The same for an arm of few joints where nothing else serves: what has turned in its hand it sets down
-slanted."""
-TIPPING = ((BROUGHT, SLOWER, TOUCHING, DROPPED),)
-"""The same for other arms, which lean it on purpose, see `tipped`."""
-FROM_HIGHER = tuple((BROUGHT, SLOWER, TOUCHING, above) for above in HIGHER)
-"""The same at last: it falls a little when it is let go."""
 SPOT_ROOMS = (CARRIED, CARRIED), (CARRIED, BROUGHT), (BROUGHT, BROUGHT), (BROUGHT, TOUCHING)
 """The same two closenesses over and on free spots, for all of which one is tried before the next."""
 LOWER = (1.0, 0.4, 0.15)
 """Shares of the hover that are tried, the next one where there is no room or no reach for the one before."""
-BLENDS = (0.04, 0.02, 0.005)
-"""Metres from a corner of a way at which it may begin to be rounded, tried one after the other."""
-BRISK = 2.5
-"""How much harder than on a way that was searched for the tool may be accelerated on straight lines."""
-POSTURES = 3
-"""Postures from which it is tried whether something can be put down on a free spot."""
+
 ENDS = 4
 """How many free spots a way may end over."""
 LONG_TURN = 2.3
@@ -211,14 +177,14 @@ class Bring(Carry):
                 aside = None
                 if self.to is not None and options is not None and put_down:
                     aside = aside_options(view, self.to, options, held=True)
-                ends = self._emptier(view, _Goals(goals[k], options, floor, supports, aside))
+                ends = self._emptier(view, WayEnds(goals[k], options, floor, supports, aside))
             turn = middles[k] if bool(turned[k]) else None
-            way, route = _found(
+            way, route = way_over(
                 view,
                 self.target,
                 ends,
                 self.speed,
-                _Proposed([v[k] for v in vias], turn, (outs[k], intos[k])),
+                ProposedWay([v[k] for v in vias], turn, (outs[k], intos[k])),
             )
             if route is not None:
                 routes[k] = [route]
@@ -257,7 +223,7 @@ class Bring(Carry):
         assert self.to is not None
         return spots_on(view, self.target, self.to)
 
-    def _chosen(self, view: WorldView) -> _Goals:
+    def _chosen(self, view: WorldView) -> WayEnds:
         """Free spots over which the way may end, and on which the arm can put the object from there.
 
         Raises:
@@ -266,8 +232,8 @@ class Bring(Carry):
         spots = self._spots(view)
         over = np.concatenate([_over(spots, share * self.hover) for share in LOWER])
         tools = poses.multiply(over, poses.relative(view.objects[self.target], view.tool)[None])
-        goals = _Goals(tools[0], None, float(spots.poses[0, 2]), spots.supports)
-        ways = [_Way(view, self.target, goals, Pace(self.speed), *closer) for closer in SPOT_ROOMS]
+        goals = WayEnds(tools[0], None, float(spots.poses[0, 2]), spots.supports)
+        ways = [CarriedWay(view, self.target, goals, Pace(self.speed), *closer) for closer in SPOT_ROOMS]
         reached = ways[-1].reached(tools, len(spots.poses))
         for way in ways:
             serving = (k for k, tool in enumerate(tools) if reached(k) and way.serves(tool))
@@ -301,7 +267,7 @@ class Bring(Carry):
         found = [getattr(model, "actor", None) for model in seen.later if model.values.get("to") == self.to]
         return [name for name in dict.fromkeys(found) if name is not None and name != self.target]
 
-    def _emptier(self, view: WorldView, goals: _Goals) -> _Goals:
+    def _emptier(self, view: WorldView, goals: WayEnds) -> WayEnds:
         """Low over the emptiest part of a container with something in it: what falls far bounces off."""
         place = None if self.to is None else view.world.places.get(self.to)
         if goals.options is None or place is None or place.kind != "bin":
@@ -356,233 +322,6 @@ def _over(spots: Spots, hover: float) -> Array:
     return found
 
 
-class _Goals(NamedTuple):
-    """Where a way may end.
-
-    Attributes:
-        first: The tool pose ``(7,)`` that is preferred.
-        options: Poses ``(k, 7)`` of the object; None: there is no other.
-        floor: Height in metres of the object's middle once it is put down from there; None where it is not.
-        supports: Names of what it then touches.
-        aside: Other poses ``(m, 7)`` where none of these will do; None: there are none.
-    """
-
-    first: Array
-    options: Array | None
-    floor: float | None
-    supports: frozenset[str]
-    aside: Array | None = None
-
-
-class _Proposed(NamedTuple):
-    """What straight ways may go by.
-
-    Attributes:
-        via: Poses that the way should go through.
-        turn: A pose on the way where the tool should turn by, or None.
-        exits: Displacements ``(3,)`` that take the tool out of the fixture it starts in and out of the one it
-            ends in.
-    """
-
-    via: Sequence[Array]
-    turn: Array | None
-    exits: tuple[Array, Array]
-
-
-def _found(
-    view: WorldView, target: str, goals: _Goals, speed: float, proposed: _Proposed
-) -> tuple[list[Array], Route | None]:
-    """Tool poses ``(7,)`` of a straight way, or the ends of one that was searched for, and that one.
-
-    Where things stand so close that nothing leads there with the usual room around, less will do, slowly.
-
-    Raises:
-        NoWayError: There is no way.
-    """
-    few = len(view.arm) < FULL
-    leaning = None if few else _leaning(view, target, goals)
-
-    grip = poses.relative(view.objects[target], view.tool)
-
-    def find(room: tuple[_Goals, float, float, float, float, float]) -> tuple[list[Array], Route | None]:
-        ends, closer, share, down, above, leans = room
-        pace = Pace(share * speed)
-        pace = pace._replace(acceleration=share**2 * pace.acceleration)
-        way = _Way(view, target, ends, pace, closer, down, above, leans)
-        straight = way.straight(proposed)
-        if straight is not None and proposed.via and share == 1.0:
-            return straight, None
-        rounded = None if straight is None else way.rounded(straight)
-        return [view.tool, ends.first], way.searched() if rounded is None else rounded
-
-    tried = [(goals, *room, LEANS) for room in ROOMS]
-    if goals.aside is not None and len(goals.aside):
-        aside = goals._replace(first=poses.multiply(goals.aside[0], grip), options=goals.aside)
-        tried += [(aside, *room, LEANS) for room in BESIDE]
-    if few:
-        tried += [(goals, *room, SET_DOWN) for room in SLANTED]
-    elif leaning is not None:
-        tried += [(leaning, *room, SET_DOWN) for room in TIPPING]
-    if goals.floor is not None:
-        tried += [(goals, *room, LEANS) for room in FROM_HIGHER]
-    return with_room(tried, find)
-
-
-def _leaning(view: WorldView, target: str, goals: _Goals) -> _Goals | None:
-    """The same goals with the object leaning in them; None where it may end in one pose alone."""
-    if goals.options is None:
-        return None
-    grip = poses.relative(view.objects[target], view.tool)
-    leaning = tipped(goals.options, grip)
-    return goals._replace(first=poses.multiply(leaning[0], grip), options=leaning)
-
-
-class _Way:
-    """The way of a held object in one world."""
-
-    def __init__(
-        self,
-        view: WorldView,
-        target: str,
-        goals: _Goals,
-        pace: Pace,
-        closer: float,
-        down: float = BROUGHT,
-        above: float = 0.0,
-        leans: float = LEANS,
-    ) -> None:
-        self._view, self._pace, self._leans = view, pace, leans
-        self._floor = None if goals.floor is None else goals.floor + above
-        held = view.held(target)
-        self._finder = view.finder([target], held=held, closer=closer)
-        leave = Leave(held=goals.supports)
-        # Where it is put down the hand opens.
-        wide = wide_at(view.robot, float(view.robot.closure(view.hand)))
-        opened = opened_about(view.robot, wide)
-        self._down = view.finder([target], held=held, leave=leave, closer=down, hand=opened)
-        others = np.zeros((0, 7)) if goals.options is None else goals.options
-        self._grip = poses.relative(view.objects[target], view.tool)
-        self._goals = np.concatenate([goals.first[None], poses.multiply(others, self._grip[None])])
-
-    def straight(self, proposed: _Proposed) -> list[Array] | None:
-        """Tool poses ``(7,)`` joined by straight lines that are clear; None where no such way is."""
-        start, goal = self._view.tool, self._goals[0]
-        if not self._finder.goes_straight or not self._finder.ends(goal[None]).free[0]:
-            return None
-        ways = [[start, *proposed.via, goal]] if proposed.via else []
-        if proposed.turn is not None:
-            ways.append([start, proposed.turn, goal])
-        ways += [[start, goal], *_by_exits(start, goal, proposed.exits)]
-        for way in ways:
-            joints = self._finder.straight(way)
-            if joints is not None and self._put_down(goal, joints[-1]):
-                return way
-        return None
-
-    def rounded(self, way: Sequence[Array]) -> Route | None:
-        """The motion along straight lines through tool poses ``(7,)``, rounded; None where that is not clear.
-
-        It is no faster than the joints can follow: a hand that lags behind leaves its way.
-        """
-        finder, pace = self._finder, self._pace._replace(acceleration=BRISK * self._pace.acceleration)
-        for blend in BLENDS:
-            path = plan([tool[None] for tool in way], self._pace.speed, blend=blend, samples=SAMPLES)
-            joints = finder.arm.along(finder.start, path.table[0, ::EVERY])
-            if joints is not None and finder.clear(joints):
-                return followed(finder.arm, np.concatenate([finder.start[None], joints]), pace)
-        return None
-
-    def searched(self) -> Route:
-        """A way that is searched for, to whichever of the goals can be reached.
-
-        Raises:
-            NoWayError: There is none.
-        """
-        good: list[Array] = []
-        for leans in self._finder.leanings:
-            for goal in () if good else self._goals:
-                good += self._postures(goal, leans)
-                if len(good) >= ENOUGH:
-                    break
-        if not good:
-            raise NoWayError(self._why_not())
-        return self._finder.search_posture(np.array(good), self._pace)
-
-    def reached(self, goals: Array, spots: int) -> Callable[[int], bool]:
-        """Which of tool poses ``(k, 7)`` the arm reaches, there and where the object stands below it.
-
-        Args:
-            goals: The poses.
-            spots: After how many of them they are over the same spots again, only lower.
-        """
-
-        @cache
-        def stands(spot: int) -> bool:
-            return bool(self._down.ends(self._below(goals[spot])[None], leans=self._leans).free[0])
-
-        @cache
-        def over(k: int) -> bool:
-            widest = self._finder.leanings[-1]
-            return bool(self._finder.ends(goals[k][None], leans=widest).free[0])
-
-        return lambda k: stands(k % spots) and over(k)
-
-    def serves(self, goal: Array) -> bool:
-        """Whether the object can be at a tool pose ``(7,)``, and be put down from there."""
-        return any(next(self._postures(goal, leans), None) is not None for leans in self._finder.leanings)
-
-    def _postures(self, goal: Array, leans: float) -> Iterator[Array]:
-        """Postures ``(n_arm,)`` at a tool pose ``(7,)`` from which the object can be put down.
-
-        Where the arm cannot go straight down from where it is easily, it may come straight up from where it
-        can be down there.
-        """
-        some = False
-        for joints in itertools.islice(self._finder.postures(goal, leans), POSTURES):
-            if self._put_down(goal, joints):
-                some = True
-                yield joints
-        if some or self._floor is None:
-            return
-        down = self._below(goal)
-        for joints in itertools.islice(self._down.postures(down, self._leans), POSTURES):
-            up = self._down.straight([down, goal], start=joints, leans=max(leans, self._leans))
-            if up is not None and self._finder.collisions.free(up[-1]) and self._put_down(goal, up[-1]):
-                yield up[-1]
-
-    def _put_down(self, goal: Array, joints: Array) -> bool:
-        """Whether the object can be put down from a tool pose ``(7,)``, the arm at ``joints (n_arm,)``."""
-        if self._floor is None:
-            return True
-        down = self._below(goal)
-        if self._down.straight([goal, down], start=joints, leans=self._leans) is None:
-            return False
-        return bool(self._down.ends(down[None], joints, self._leans).free[0])
-
-    def _below(self, goal: Array) -> Array:
-        """The tool pose ``(7,)`` in which the object stands, below one ``(7,)`` in which it is held over."""
-        assert self._floor is not None
-        held = poses.transform(goal, poses.inverse(self._grip)[:3])
-        found: Array = goal - (float(held[2]) - self._floor) * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-        return found
-
-    def _why_not(self) -> str:
-        if self._floor is None or not self._finder.ends(self._goals).free.any():
-            return self._finder.no_end(self._goals)
-        return self._down.no_end(np.array([self._below(goal) for goal in self._goals]))
-
-
-def _by_exits(start: Array, goal: Array, exits: tuple[Array, Array]) -> list[list[Array]]:
-    """Ways out of and into fixtures along their access, level and raised."""
-    out, into = start.copy(), goal.copy()
-    out[:3] += exits[0]
-    into[:3] += exits[1]
-    middle = [p for p, e in ((out, exits[0]), (into, exits[1])) if float(np.abs(e).sum()) > 0]
-    high = max(float(p[2]) for p in (start, *middle, goal)) + RAISED
-    raised = [np.concatenate([p[:2], [high], p[3:]]) for p in middle or (start, goal)]
-    return [[start, *middle, goal], [start, *raised, goal]]
-
-
 def _by_neutral(seen: Seen, goal: Array) -> tuple[Array, Array]:
     """The poses ``(N, 7)`` half way of the longer turn, and booleans ``(N,)``: it is the one to take.
 
@@ -597,47 +336,3 @@ def _by_neutral(seen: Seen, goal: Array) -> tuple[Array, Array]:
     hindmost = poses.angle_between(neutral, middle[:, 3:]) > math.pi / 2
     turned = poses.quat_multiply(middle[:, 3:], constant([0.0, 0.0, 0.0, 1.0], middle))
     return xp.concat([middle[:, :3], turned], axis=-1), far & hindmost
-
-
-def destination(seen: Seen, name: str) -> tuple[Array, Array]:
-    """Frames ``(N, 7)`` of a place or of the top of an object, and their rims' heights ``(N,)`` in metres."""
-    if name in seen.world.place_columns:
-        place = seen.place(name)
-        return place.pose, place.rim
-    frame = top_frame(seen.object(name), seen.model(name).standing_height)
-    return frame, array_namespace(frame).zeros_like(frame[:, 0])
-
-
-def standing_pose(
-    frame: Array, now: Array, model: ObjectFacts, height: Array | float = 0.0, towards: Array | None = None
-) -> Array:
-    """Poses ``(N, 7)`` of an object that stands above a frame, turned as its symmetry allows.
-
-    Args:
-        frame: Poses ``(N, 7)`` of the place.
-        now: Present poses ``(N, 7)`` of the object.
-        model: The object.
-        height: Free height below it, metres, one for all or ``(N,)``.
-        towards: Rotations ``(N, 4)`` of the object that are preferred; by default the present ones.
-    """
-    towards = now[:, 3:] if towards is None else towards
-    xp = array_namespace(now)
-    centre = model.standing_height + height
-    nothing = xp.zeros_like(centre)
-    position = poses.transform(frame, xp.stack([nothing, nothing, centre], axis=-1))
-    nearest = _nearest_rotation(frame[:, 3:], model, towards)
-    best = xp.where(model.revolved[:, None], upright(frame, now), nearest)
-    return xp.concat([position, best], axis=-1)
-
-
-def _nearest_rotation(frame: Array, model: ObjectFacts, towards: Array) -> Array:
-    """Of the rotations ``(N, 4)`` in which an object looks the same, the one that is the shortest turn away.
-
-    Of equal ones it is the first.
-    """
-    xp = array_namespace(towards)
-    ways = poses.quat_multiply(frame[:, None, :], model.rotations)
-    # Alike as rotations where q and -q are: the larger |q . r|, the shorter the turn.
-    nearness = abs(poses.dot(ways, towards[:, None, :]))
-    counts = xp.where(model.rotation_counts, xp.round(nearness * 1e9), -xp.ones_like(nearness))
-    return take_rows(ways, xp.argmax(counts, axis=1))

@@ -7,7 +7,7 @@ from typing import Any
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.parameters import Metres, ObjectName, PlaceName, Radians, Seconds
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.concept_nodes.bring import destination, standing_pose
+from bt_tasksim.concept_nodes.destination import destination, standing_pose
 from bt_tasksim.concept_nodes.holding import holding, tool_distance
 from bt_tasksim.concept_nodes.whereabouts import Estimates
 from bt_tasksim.core import poses

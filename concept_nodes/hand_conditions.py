@@ -7,7 +7,7 @@ from typing import Any
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.parameters import Flag, Metres, ObjectName, PlaceName, Ratio
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.concept_nodes.bring import destination
+from bt_tasksim.concept_nodes.destination import destination
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
 from bt_tasksim.concept_nodes.holding import holding, tool_distance
 from bt_tasksim.concept_nodes.surface import NEAR, apart, carrying, edges

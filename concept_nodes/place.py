@@ -27,8 +27,8 @@ from bt_tasksim.concept.parameters import (
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
-from bt_tasksim.concept_nodes.bring import destination, standing_pose
 from bt_tasksim.concept_nodes.closer import DROPPED, HIGHER, PUT_DOWN, TOUCHING, with_room
+from bt_tasksim.concept_nodes.destination import destination, standing_pose
 from bt_tasksim.concept_nodes.drops import preferred_options
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain

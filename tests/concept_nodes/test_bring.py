@@ -9,8 +9,9 @@ from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Bring, Place
-from bt_tasksim.concept_nodes.bring import _Goals, standing_pose
+from bt_tasksim.concept_nodes.carried_way import WayEnds
 from bt_tasksim.concept_nodes.closer import HIGHER
+from bt_tasksim.concept_nodes.destination import standing_pose
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.concept_nodes.standing import ASIDE, FARTHER
 from bt_tasksim.concept_nodes.view import views
@@ -256,7 +257,7 @@ def test_over_a_container_that_has_something_in_it_it_ends_beside_that(toy):
         there = poses.pose(middle + np.array([beside, 0.0, 0.02]))
         now = view._replace(world=world, objects={**view.objects, "box": there})
         model = stage.tree.model
-        goals = model._emptier(now, _Goals(view.tool, model._options(now), None, frozenset()))
+        goals = model._emptier(now, WayEnds(view.tool, model._options(now), None, frozenset()))
         assert np.array_equal(goals.first, view.tool) is empty
         ends = poses.multiply(goals.first, poses.inverse(poses.relative(now.objects["cup"], now.tool)))
         assert empty or 0.05 < abs(ends[:2] - middle[:2]).max() < 0.15

@@ -10,7 +10,7 @@ import pytest
 from bt_tasksim.checking.bundles import frozen
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Bring, Grasp, Pick, Place
-from bt_tasksim.concept_nodes.bring import destination
+from bt_tasksim.concept_nodes.destination import destination
 from bt_tasksim.concept_nodes.grasp_pose import (
     grasp_pose,
     half_extent,

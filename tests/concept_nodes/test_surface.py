@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp
-from bt_tasksim.concept_nodes.bring import destination
+from bt_tasksim.concept_nodes.destination import destination
 from bt_tasksim.concept_nodes.standing import reference_frame
 from bt_tasksim.concept_nodes.surface import heading_of, top_frame, upright
 from bt_tasksim.concept_nodes.view import views
