@@ -63,14 +63,20 @@ SPENT = 50_000
 
 
 def load(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
-    """Results by name; those of a later block before those of an earlier one, and of none."""
-    files = [*sorted(folder.glob("*.json")), *sorted(folder.glob("B[0-9][0-9][0-9][0-9]/*.json"))]
-    return {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in files}
+    """Results by name; those of a later block before those of an earlier one, and of none.
+
+    Those of blocks are there by block and name, too, such as ``B0003/any_tree-panda``.
+    """
+    blocks = sorted(folder.glob("B[0-9][0-9][0-9][0-9]/*.json"))
+    found = {p: json.loads(p.read_text(encoding="utf-8")) for p in (*sorted(folder.glob("*.json")), *blocks)}
+    return {p.stem: found[p] for p in found} | {f"{p.parent.name}/{p.stem}": found[p] for p in blocks}
 
 
 def names(results: dict[str, Any]) -> list[str]:
     """Names of the rows, in order."""
-    others = (n for n in results if n not in ROWS and n not in OTHER and not n.startswith(APART))
+    others = (
+        n for n in results if n not in ROWS and n not in OTHER and not n.startswith(APART) and "/" not in n
+    )
     return [*ROWS, *others]
 
 

@@ -34,10 +34,7 @@ from bt_tasksim.concept_nodes.drops import preferred_options
 from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, resting_place
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.spots import GAP, Spots, spots_beside, spots_on
-from bt_tasksim.concept_nodes.standing import (
-    aside_options,
-    supports_of,
-)
+from bt_tasksim.concept_nodes.standing import aside_options, supports_of
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
@@ -177,7 +174,7 @@ class Bring(Carry):
                 aside = None
                 if self.to is not None and options is not None and put_down:
                     aside = aside_options(view, self.to, options, held=True)
-                ends = self._emptier(view, WayEnds(goals[k], options, floor, supports, aside))
+                ends = self._low(view, WayEnds(goals[k], options, floor, supports, aside))
             turn = middles[k] if bool(turned[k]) else None
             way, route = way_over(
                 view,
@@ -267,10 +264,10 @@ class Bring(Carry):
         found = [getattr(model, "actor", None) for model in seen.later if model.values.get("to") == self.to]
         return [name for name in dict.fromkeys(found) if name is not None and name != self.target]
 
-    def _emptier(self, view: WorldView, goals: WayEnds) -> WayEnds:
-        """Low over the emptiest part of a container with something in it: what falls far bounces off."""
+    def _low(self, view: WorldView, goals: WayEnds) -> WayEnds:
+        """Low over a container, unless over its middle: what falls far bounces off what is there."""
         place = None if self.to is None else view.world.places.get(self.to)
-        if goals.options is None or place is None or place.kind != "bin":
+        if goals.options is None or place is None or not place.container:
             return goals
         middle = poses.transform(np.asarray(place.pose), np.array([*place.centre, 0.0]))[:2]
         if np.linalg.norm(goals.options[0, :2] - middle) < 1e-6:

@@ -1,8 +1,6 @@
 """Where an object may fall into a container, in one world, so that what is in there stays low.
 
-What falls on other things may come to rest with its middle above the rim, or roll over it. So it is let go
-where it falls on the floor, or else on what is lowest; where more is to come, where that finds room, too; and
-else over the middle, far from the walls.
+What falls on other things may come to rest with its middle above the rim, or roll over it.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bt_tasksim.concept_nodes.spots import corners_of, outline_of, surface_of
+from bt_tasksim.concept_nodes.spots import corners_of, outline_of, outline_turned, surface_of
 from bt_tasksim.concept_nodes.standing import (
     headings,
     nearest_first,
@@ -25,23 +23,22 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.planning.room import Room
-from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.scene.outlines import hull
 
 WALL = 0.008
-"""Metres from the walls, where the container is large enough for that: hands open unevenly."""
-ROUND = 0.6
-"""Share of its larger side from above that something keeps from the walls, too: it may turn as it falls."""
-BY = 0.004
-"""Metres between two outlines from which on one thing falls beside the other."""
-FAR = 0.03
-"""Metres between two outlines beyond which more of them is no better."""
+"""Metres that an outline keeps from the walls, where the container is large enough for that."""
+TUMBLES = 0.6
+"""Share of its larger side from above that an object's middle keeps from the walls: it may turn meanwhile."""
+CLEAR = 0.004
+"""Smallest gap in metres at which an object falls beside another one rather than on it."""
+AMPLE = 0.03
+"""Metres of gap beyond which a wider one counts no more."""
 STEP = 0.01
-"""Metres of height, and of room, that make a difference."""
+"""Metres of height, and of gap, that make a difference."""
 GRID = np.stack(np.meshgrid([0.0, -1.0, 1.0], [0.0, -1.0, 1.0], indexing="ij"), axis=-1).reshape(-1, 2)
 """Where in a container things are let go: shares of the way from its middle to its walls."""
-LATER = (0.0, np.pi / 2)
-"""Headings along the walls in which room is sought for what is to come."""
+ALONG_WALLS = (0.0, np.pi / 2)
+"""Headings in which room is sought for what is to come."""
 
 
 class _Lying(NamedTuple):
@@ -71,13 +68,22 @@ def preferred_options(
         later: Objects that are put there, too, after this one.
     """
     place, now = view.world.places.get(reference), view.objects[target][3:]
-    if place is None or place.kind != "bin":
+    if place is None or not place.container:
         return nearest_first(standing_options(view, target, reference, hover), now)
     return drops(view, target, place, hover, later)
 
 
 def drops(view: WorldView, target: str, place: PlaceModel, hover: float, later: Sequence[str] = ()) -> Array:
     """Poses ``(k, 7)`` over a container in which an object may be let go, the best first.
+
+    Of two, the one is better that
+
+    1. reaches less far over the walls, seen from above;
+    2. is over the floor, or else over what is lower;
+    3. leaves room on the floor for more of what is to come;
+    4. is farther from what it does not fall on;
+    5. is turned less from how the object is now; and
+    6. is nearer to the middle.
 
     Args:
         view: The world.
@@ -89,36 +95,43 @@ def drops(view: WorldView, target: str, place: PlaceModel, hover: float, later: 
     frame, rim = reference_frame(view, place.name)
     model, now = view.model(target), view.objects[target][3:]
     height = standing_height(model) + hover + rim
-    turns = headings()
-    outlines, offsets = [], []
-    for turn in turns:
-        outlines.append(_outline(view, target, turn))
-        offsets.append(_offsets(place, outlines[-1], ROUND * max(model.extent[:2])))
-    points, count = np.concatenate(offsets), len(GRID)
-    there = _lying(view, target, place)
-    falls = np.concatenate([_falls(o, p, there) for o, p in zip(outlines, offsets, strict=True)])
+    turns, tumbles = headings(), TUMBLES * max(model.extent[:2])
+    outlines = [outline_turned(model, turn) for turn in turns]
+    offsets = [_offsets(place, outline, tumbles) for outline in outlines]
+    beyond = np.repeat([_beyond(place, outline) for outline in outlines], len(GRID))
+    points, there = np.concatenate(offsets), _lying(view, target, place)
+    falls = [_falls(outline, some, there) for outline, some in zip(outlines, offsets, strict=True)]
+    on, gap = np.concatenate(falls).T
     rooms = _rooms(view, place, outlines, offsets, there, [n for n in later if n in view.objects])
-    rotations = poses.quat_multiply(frame[None, 3:], np.repeat(turns, count, axis=0))
+    rotations = poses.quat_multiply(frame[None, 3:], np.repeat(turns, len(GRID), axis=0))
     angles = np.round(poses.angle_between(rotations, now[None]), 6)
-    middle = np.round(np.linalg.norm(points - np.asarray(place.centre), axis=-1), 6)
-    order = np.lexsort([middle, angles, -falls[:, 1], -rooms, falls[:, 0]])
+    aside = np.round(np.linalg.norm(points - np.asarray(place.centre), axis=-1), 6)
+    order = np.lexsort([aside, angles, -gap, -rooms, on, beyond])
     positions = poses.transform(frame, np.column_stack([points, np.full(len(points), height)]))
     found: Array = np.concatenate([positions, rotations], axis=-1)[order]
     return found
 
 
-def _outline(view: WorldView, name: str, turn: Array) -> Array:
-    """Corners ``(n, 2)`` of an object's outline about its middle, as it stands turned by ``(4,)``."""
-    pieces = np.concatenate(pieces_of(view.model(name)))
-    return hull(poses.rotate(turn[None], pieces)[:, :2])
+def _offsets(place: PlaceModel, outline: Array, apart: float) -> Array:
+    """Points ``(9, 2)`` in a container's frame at which an outline about its origin is within the walls.
 
+    Along an axis on which it does not fit, they are over the middle.
 
-def _offsets(place: PlaceModel, outline: Array, round_: float) -> Array:
-    """Points ``(9, 2)`` in a container's frame where an outline about its origin is within the walls."""
+    Args:
+        place: The container.
+        outline: Corners ``(n, 2)`` of the outline, metres.
+        apart: Metres that the points keep from the walls at least.
+    """
     middle, half = np.asarray(place.centre), np.asarray(place.extent) / 2
-    room = half - np.maximum(np.abs(outline).max(axis=0) + WALL, round_)
+    room = half - np.maximum(np.abs(outline).max(axis=0) + WALL, apart)
     found: Array = middle + np.maximum(room, 0.0) * GRID
     return found
+
+
+def _beyond(place: PlaceModel, outline: Array) -> float:
+    """Metres by which an outline ``(n, 2)`` about a container's middle reaches over its walls, in steps."""
+    over = np.abs(outline).max(axis=0) - np.asarray(place.extent) / 2
+    return STEP * float(np.ceil(max(0.0, *over) / STEP - 1e-6))
 
 
 def _lying(view: WorldView, target: str, place: PlaceModel) -> list[_Lying]:
@@ -142,15 +155,16 @@ def _lying(view: WorldView, target: str, place: PlaceModel) -> list[_Lying]:
 
 
 def _falls(outline: Array, points: Array, there: Sequence[_Lying]) -> Array:
-    """On what an outline at ``points (k, 2)`` falls, and its gap to what it does not fall on ``(k, 2)``.
+    """How high it is what an outline at ``points (k, 2)`` falls on, and its gap to the others ``(k, 2)``.
 
-    Both in metres and in steps of `STEP`; on the floor it is 0.
+    Both in metres, in steps of `STEP`; the floor has height 0.
     """
-    on, gap = np.zeros(len(points)), np.full(len(points), FAR)
+    on, gap = np.zeros(len(points)), np.full(len(points), AMPLE)
     for each in there:
         apart = Room(outline, [each.outline]).gaps(points)
-        on = np.where(apart < BY, np.maximum(on, each.top), on)
-        gap = np.minimum(gap, np.maximum(apart, 0.0))
+        below = apart < CLEAR
+        on = np.where(below, np.maximum(on, each.top), on)
+        gap = np.where(below, gap, np.minimum(gap, apart))
     return STEP * np.stack([np.ceil(on / STEP - 1e-6), np.round(gap / STEP)], axis=-1)
 
 
@@ -162,19 +176,19 @@ def _rooms(
     there: Sequence[_Lying],
     later: Sequence[str],
 ) -> Array:
-    """How many of some objects would find the floor beside outlines ``(n * 9,)`` that are in a container."""
+    """How many of some objects would find the floor beside each outline ``(n * 9,)``, each by itself."""
     found = np.zeros((len(outlines), len(GRID)), int)
-    turned = [poses.yaw(angle) for angle in LATER]
+    turned = [poses.yaw(angle) for angle in ALONG_WALLS]
     for name in later:
-        least = ROUND * max(view.model(name).extent[:2])
+        model = view.model(name)
         fits = np.zeros(found.shape, bool)
-        for other in (_outline(view, name, turn) for turn in turned):
-            points = _offsets(place, other, least)
+        for other in (outline_turned(model, turn) for turn in turned):
+            points = _offsets(place, other, TUMBLES * max(model.extent[:2]))
             if there:
-                points = points[Room(other, [each.outline for each in there]).gaps(points) > BY]
+                points = points[Room(other, [each.outline for each in there]).gaps(points) > CLEAR]
             for k, (outline, own) in enumerate(zip(outlines, offsets, strict=True)):
                 apart = (points[None] - own[:, None]).reshape(-1, 2)
                 gaps = Room(other, [outline]).gaps(apart).reshape(len(own), -1)
-                fits[k] |= (gaps > BY).any(axis=1)
+                fits[k] |= (gaps > CLEAR).any(axis=1)
         found += fits
     return found.reshape(-1)

@@ -33,11 +33,7 @@ from bt_tasksim.concept_nodes.drops import preferred_options
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
-from bt_tasksim.concept_nodes.standing import (
-    aside_options,
-    supports_of,
-    tipped,
-)
+from bt_tasksim.concept_nodes.standing import aside_options, supports_of, tipped
 from bt_tasksim.concept_nodes.surface import (
     NEAR,
     apart,
@@ -316,10 +312,13 @@ class Place(ConceptModel[PlaceMemory]):
         """Tool poses ``(k, 7)`` in which the object would stand there, too, the least turned first.
 
         After them those a little aside of there, and last those in which it leans there; an arm of few joints
-        leans it by itself. Where anywhere will do, those on free spots, the nearest first.
+        leans it by itself. Where anywhere will do, those on free spots, the nearest first; in a container
+        there are none.
         """
-        here = self.on in view.world.places or self.on in view.objects
-        if self.on is None or not here or self.distance is not None:
+        if self.on is None or self.distance is not None:
+            return np.zeros((0, 7))
+        place = view.world.places.get(self.on)
+        if (place is None and self.on not in view.objects) or (place is not None and place.container):
             return np.zeros((0, 7))
         now = view.objects[self.target]
         grip = poses.relative(now, view.tool)

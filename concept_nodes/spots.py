@@ -17,6 +17,7 @@ from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import ObjectModel
 from bt_tasksim.planning.room import Room
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import box_corners
@@ -238,8 +239,7 @@ class _Search:
         self._angles = first + 2 * np.pi * np.arange(TURNS) / TURNS
         self._rotations = poses.quat_multiply(np.array([poses.yaw(a) for a in self._angles]), stands[None])
         self._height = standing_height(model)
-        pieces = np.concatenate(pieces_of(model))
-        self.outlines = [hull(poses.rotate(turned[None], pieces)[:, :2]) for turned in self._rotations]
+        self.outlines = [outline_turned(model, turned) for turned in self._rotations]
         self._things = _things(view, target, float(frame[2]), 2.0 * self._height)
         self._reserved = [
             outline_of(surface_of(view, name))
@@ -376,6 +376,11 @@ def corners_of(view: WorldView, name: str) -> Array:
     """Corners ``(n, 3)`` of an object's pieces where it is."""
     pose = poses.unit_pose(view.objects[name])
     return np.concatenate([poses.transform(pose, piece) for piece in pieces_of(view.model(name))])
+
+
+def outline_turned(model: ObjectModel, rotation: Array) -> Array:
+    """Corners ``(n, 2)`` of an object from above about its origin, turned by a rotation ``(4,)``, metres."""
+    return hull(poses.rotate(rotation[None], np.concatenate(pieces_of(model)))[:, :2])
 
 
 def outline_of(surface: FreeSurface) -> Array:

@@ -57,7 +57,7 @@ def aside_options(view: WorldView, reference: str, options: Array, held: bool = 
         held: They are for what is in the hand; else for the choice of a grasp.
     """
     place = view.world.places.get(reference)
-    if not len(options) or (place is not None and place.kind == "bin"):
+    if not len(options) or (place is not None and place.container):
         return np.zeros((0, 7))
     if place is None:
         turns = 2.0 * np.pi * np.arange(1, HEADINGS) / HEADINGS
@@ -107,7 +107,7 @@ def reference_frame(view: WorldView, name: str) -> tuple[Array, float]:
     """Frame ``(7,)`` of a place or of the top of an object, and its rim's height, metres."""
     place = view.world.places.get(name)
     if place is not None:
-        return np.asarray(place.pose), place.height if place.kind == "bin" else 0.0
+        return np.asarray(place.pose), place.rim
     height = np.array([standing_height(view.model(name))])
     return top_frame(view.objects[name][None], height)[0], 0.0
 

@@ -106,7 +106,7 @@ def _check_places(scene: Scene, worlds: list[ActorConfiguration], report: Report
             local = poses.localise(place.pose, np.array(actor.pose[:3]))
             beyond = np.abs(local[:2] - place.centre) - np.array(place.extent) / 2
             off += bool((beyond > 0.0).any())
-            high += actor.model().extent[2] > place.height > 0.0 and place.kind != "bin"
+            high += actor.model().extent[2] > place.height > 0.0 and not place.container
         on = worlds[0].objects[list(scene.object_names).index(name)].on
         if off:
             what = f"stands beyond the edge of '{on}' in {off} of {len(worlds)} draws"

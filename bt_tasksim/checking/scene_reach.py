@@ -164,7 +164,7 @@ def _at_goal(robot: RobotDescription, actor: ObjectActor, place: PlaceModel) -> 
 def _fits(model: ObjectModel, place: PlaceModel) -> bool:
     """A place has room for an object, turned as it may be, below what is above it."""
     footprint, room = sorted(model.extent[:2]), sorted(place.extent)
-    low = place.kind == "bin" or place.height <= 0.0 or model.extent[2] <= place.height
+    low = place.container or place.height <= 0.0 or model.extent[2] <= place.height
     return low and footprint[0] <= room[0] and footprint[1] <= room[1]
 
 

@@ -15,7 +15,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.robot.urdf_visuals import load_collisions
 from bt_tasksim.scene.configuration import ActorConfiguration
-from bt_tasksim.scene.hulls import convex
+from bt_tasksim.scene.hulls import placed
 from bt_tasksim.scene.shapes import BoxPiece, Piece
 
 if TYPE_CHECKING:
@@ -56,7 +56,9 @@ def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repor
 def refuse_in_robot(scene: WorldSource, seed: int) -> None:
     """Refuse a draw in which an object begins in the robot: physics would throw both apart.
 
-    Worlds that are not drawn from a `Scene`, and robots whose shapes are not there, are not looked at.
+    A single run is refused; in an evaluation, which is about all draws, such a one is a failure like others,
+    and `check_room` says beforehand how many there are. Worlds that are not drawn from a `Scene`, and robots
+    whose shapes are not there, are not looked at.
 
     Raises:
         InputError: One does; it says which and by how much.
@@ -70,19 +72,29 @@ def refuse_in_robot(scene: WorldSource, seed: int) -> None:
         links = robot.derived("links at rest", _links)
     except InputError:
         return
-    for name in scene.object_names:
-        link, depth = _of_object(links, world, name)
-        if depth > DEEP:
-            raise InputError(
-                f"with seed {seed} '{name}' begins {1000 * depth:.0f} mm in '{link}' of {robot.name}: draw "
-                f"it from an area beside the robot, see 'bt-tasksim check'"
-            )
+    if found := _first_in(links, world):
+        name, link, depth = found
+        raise InputError(
+            f"with seed {seed} '{name}' starts {1000 * depth:.0f} mm inside '{link}' of {robot.name}: draw "
+            f"it from an area beside the robot, see 'bt-tasksim check'"
+        )
 
 
 def in_robot(robot: RobotDescription, world: ActorConfiguration) -> str:
     """The first object of a draw that begins in the robot at rest; empty where none does."""
-    links = robot.derived("links at rest", _links)
-    return next((a.name for a in world.objects if _of_object(links, world, a.name)[1] > DEEP), "")
+    found = _first_in(robot.derived("links at rest", _links), world)
+    return found[0] if found else ""
+
+
+def _first_in(
+    links: Sequence[tuple[LinkPart, Any]], world: ActorConfiguration
+) -> tuple[str, str, float] | None:
+    """Name of the first object that begins in the robot, the link, and by how many metres."""
+    for actor in world.objects:
+        link, depth = _of_object(links, world, actor.name)
+        if depth > DEEP:
+            return actor.name, link, depth
+    return None
 
 
 def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
@@ -94,8 +106,8 @@ def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
     joints = np.concatenate([robot.rest, robot.hand_open])
     at = PinocchioKinematics(robot).link_poses(joints, sorted({part.link for part in parts}))
     frames = [poses.multiply(at[part.link], part.pose) for part in parts]
-    placed = [coal.Transform3s(poses.to_matrix(f[3:]), f[:3]) for f in frames]
-    return list(zip(parts, placed, strict=True))
+    where = [coal.Transform3s(poses.to_matrix(f[3:]), f[:3]) for f in frames]
+    return list(zip(parts, where, strict=True))
 
 
 def _of_object(
@@ -113,13 +125,9 @@ def _deepest(
 
     request, found = coal.DistanceRequest(), ("", 0.0)
     for piece in pieces:
-        if isinstance(piece, BoxPiece):
-            frame, form = poses.multiply(pose, piece.pose), coal.Box(*(2 * piece.half_size).tolist())
-        else:
-            frame, form = pose, convex(np.asarray(piece.vertices, float))
-        at = coal.Transform3s(poses.to_matrix(frame[3:]), frame[:3])
-        for part, placed in links:
-            depth = -float(coal.distance(part.form, placed, form, at, request, coal.DistanceResult()))
+        form, at = placed(piece, pose)
+        for part, here in links:
+            depth = -float(coal.distance(part.form, here, form, at, request, coal.DistanceResult()))
             if depth > found[1]:
                 found = part.link, depth
     return found

@@ -59,7 +59,7 @@ def place_facts(worlds: Sequence[WorldModel], names: Sequence[str]) -> PlaceFact
         access=each(lambda place: place.access, up),
         exit=each(lambda place: place.exit, up),
         clearance=each(lambda place: place.clearance, 0.0),
-        container=each(lambda place: place.kind == "bin", False),
+        container=each(lambda place: place.container, False),
         rank=np.array(ranks, float).reshape(shape),
         carries=each(lambda place: bool(place.fixture), False),
     )

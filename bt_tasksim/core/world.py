@@ -114,6 +114,16 @@ class PlaceModel:
         for name in ("pose", "access", "exit"):  # everybody who looks at a world has the same ones
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
+    @property
+    def container(self) -> bool:
+        """Things are put into it, and not onto it."""
+        return self.kind == "bin"
+
+    @property
+    def rim(self) -> float:
+        """Metres above its origin that a thing has to be lifted over."""
+        return self.height if self.container else 0.0
+
 
 @dataclass(frozen=True)
 class WorldModel:

@@ -1,9 +1,7 @@
 """PhysX, of which a process has one: made for things of some centimetres.
 
-PhysX is told how long things usually are and how fast, and takes from that within how much it may err, as
-where two shapes meet and along which normal. SAPIEN says 10 cm and 0.2 m/s. Where a jaw holds something of
-some centimetres, normals of contacts then jump from one step to the next, and the grip is gone for a step,
-though nothing moves.
+PhysX is told how long things usually are and how fast (``PxTolerancesScale``), and takes from that within how
+much it may err, as where two shapes meet. SAPIEN says 10 cm and 0.2 m/s.
 """
 
 from __future__ import annotations
@@ -12,21 +10,27 @@ import functools
 from typing import Any
 
 TOLERANCES = (0.03, 0.3)
-"""Metres and metres a second that PhysX takes for usual. With smaller ones normals of contacts are steadier,
-which one jaw needs that presses on a small thing; but with 0.01 m things creep or turn in the Ability hand,
-whose fingers tremble: two of 40 that neither 0.03 m nor SAPIEN's own tolerances lose.
+"""Metres and metres a second that PhysX takes for usual.
 
-In random tasks of seeds 995000 on, 996000 on and 996300 on, of those that are possible, 106 of 109 succeed
-with the SO-100, 88 of 90 with the Ability hand and 59 of 60 with the Panda; with 0.01 m 107, 85 and 60. With
-SAPIEN's own 27 of the first 30 with the SO-100 (28 with these), 49 of the first 50 with the Ability hand (49)
-and 59 with the Panda."""
+Of random tasks that are possible (`benchmarks.any_tree`, seeds 995000, 996000 and 996300 on) there succeed
+
+| tolerances | SO-100 | Ability hand | Panda |
+|---|---|---|---|
+| 0.01 m, 0.1 m/s | 107 of 109 | 85 of 90 | 60 of 60 |
+| 0.03 m, 0.3 m/s | 106 of 109 | 88 of 90 | 59 of 60 |
+| 0.1 m, 0.2 m/s, SAPIEN's own | 27 of 30 | 49 of 50 | 59 of 60 |
+
+These differences are within chance. What decided are grips that were looked at: with SAPIEN's own tolerances
+normals of contacts jump from one step to the next where the SO-100's jaw holds something small and still, and
+with 0.01 m two things turn in the Ability hand (996302 and 996328) that are held with the other two."""
 
 
 @functools.cache
 def start_physx() -> Any:
     """PhysX with `TOLERANCES`; to be called before anything else of SAPIEN's is made.
 
-    SAPIEN makes it with its own where something else comes first in the process, and keeps it then.
+    A process has one: where something else of SAPIEN's comes first it has SAPIEN's own tolerances, and no
+    word is said of that. It lives as long as somebody keeps it, which the cache does.
     """
     from sapien import physx
 

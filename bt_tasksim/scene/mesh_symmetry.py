@@ -11,7 +11,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.mesh_surface import nearest_on_triangles, sampled
 from bt_tasksim.scene.meshes import TriangleMesh, mass_properties
-from bt_tasksim.scene.shape_kind import looks_alike
+from bt_tasksim.scene.symmetry import symmetry_tolerance
 
 ASIDE = 0.005
 """Metres that the axis of a symmetry may be beside the frame's origin: a star's bounding box has another
@@ -36,7 +36,7 @@ def symmetry_about_z(mesh: TriangleMesh) -> int:
         return 1
     points = mesh.vertices - centre
     few = points[:: -(-len(points) // _POINTS)]
-    alike = looks_alike(np.ptp(mesh.vertices, axis=0))
+    alike = symmetry_tolerance(np.ptp(mesh.vertices, axis=0))
 
     to_surface = _distances(mesh)
 

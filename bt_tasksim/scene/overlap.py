@@ -64,16 +64,12 @@ def check_configuration(configuration: ActorConfiguration) -> None:
 
 
 def _body(coal: Any, name: str, pose: Array, pieces: Sequence[Piece]) -> _Body:
-    from bt_tasksim.scene.hulls import convex
+    from bt_tasksim.scene.hulls import placed
 
     parts = []
     corners = []
     for piece in pieces:
-        if isinstance(piece, BoxPiece):
-            frame, form = poses.multiply(pose, piece.pose), coal.Box(*(2 * piece.half_size).tolist())
-        else:
-            frame, form = pose, convex(piece.vertices)
-        parts.append((form, coal.Transform3s(poses.to_matrix(frame[3:]), frame[:3])))
+        parts.append(placed(piece, pose))
         corners.append(poses.transform(pose, piece.corners()))
     every = np.concatenate(corners)
     return _Body(name, tuple(parts), np.min(every, axis=0), np.max(every, axis=0))

@@ -15,10 +15,7 @@ import math
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-import numpy as np
-
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.scene.geometry import Colour, Shape, ShapeSize, Size
 from bt_tasksim.scene.grips import Grips
@@ -87,12 +84,12 @@ class ShapeKind(ABC):
         return size.size
 
     def symmetry_of(self, size: ShapeSize) -> int:
-        """Order of the symmetry of an object of this size.
+        """Order of the symmetry of an object of this size; by default its kind's `symmetry`.
 
-        By default its kind's `symmetry`; but what looks the same after half a turn, and is as wide as it is
-        long, does after a quarter.
+        What is the same along x and along y looks the same after a quarter turn where it is as wide as long,
+        see `bt_tasksim.scene.symmetry.order_of_quarters`.
         """
-        return 4 if self.symmetry == 2 and as_wide_as_long(self.extent(size)) else self.symmetry
+        return self.symmetry
 
     def grasp_axes(self, size: ShapeSize) -> tuple[GraspAxis, ...]:
         """Where two fingers may close, best first; by default along y."""
@@ -117,23 +114,6 @@ class ShapeKind(ABC):
                 return 0.08, 0.10
             case _:
                 return min(0.02, place.extent[0] / 8), min(0.02, place.extent[1] / 8)
-
-
-ALIKE = (0.0002, 0.01, 0.001)
-"""Distance in metres between a surface and itself turned up to which the two look the same: at least 0.2 mm,
-which finding nearest points on a mesh costs; else a hundredth of its size; at most 1 mm, as much as a depth
-camera is wrong by."""
-
-
-def looks_alike(extent: Array | Size) -> float:
-    """Metres, as of `ALIKE`, for something of a full size ``(3,)`` in metres."""
-    least, share, most = ALIKE
-    return min(max(least, share * float(np.linalg.norm(extent))), most)
-
-
-def as_wide_as_long(extent: Size) -> bool:
-    """Whether something of a full size ``(3,)`` in metres looks the same along x and along y."""
-    return abs(extent[0] - extent[1]) / 2 <= looks_alike(extent)
 
 
 def level_grasp_axes(size: ShapeSize, upright: bool = False) -> tuple[GraspAxis, ...]:

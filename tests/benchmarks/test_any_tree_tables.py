@@ -31,7 +31,7 @@ def test_rates_are_those_of_what_is_possible():
     found = {"any_tree-so100": first, "any_tree-panda-2_colours": result(3, 0)}
     lines = any_tree_tables.any_tree(found).splitlines()
     line = next(line for line in lines if "SO-100" in line)
-    assert "| B0099 | 24 | 18 | 4 | 1 | 90.0 %" in line
+    assert "| B0099 | 24 | 18 | 4 | 1 | 90.00 %" in line and "| 95 % | 0 | 0 |" in line
     assert any("`panda-2_colours` |  | 3 | 3 | 0 | 0 |" in each for each in lines), "whatever else there is"
     failures = any_tree_tables.any_tree_failures(found)
     assert "| SO-100 | pick | goal_lost | 2 | 100, 101 |" in failures
@@ -41,11 +41,17 @@ def test_pairs_are_of_the_draws_that_both_had():
     usual, other = result(10, 2), result(4, 0)
     other["draws"][3]["success"] = False
     lines = any_tree_tables.any_tree_pairs({"any_tree-panda": usual, "any_tree-panda-mujoco": other})
-    assert "| Panda, MuJoCo | 4 | 4 | 3 | 1 | 0 | 1 |" in lines
+    assert "| Panda, MuJoCo |  | 4 | 4 | 3 | 1 | 0 | 1 |" in lines
+    block = {**other, "block": "B0098"}
+    found = {"any_tree-panda": result(0, 12), "B0098/any_tree-panda": usual, "any_tree-panda-mujoco": block}
+    lines = any_tree_tables.any_tree_pairs(found)
+    assert "| Panda, MuJoCo | B0098 | 4 | 4 | 3 | 1 | 0 | 1 |" in lines, (
+        "of its own block, not of a later one"
+    )
     for draw in other["draws"]:
         draw["seed"] += 10_000
     lines = any_tree_tables.any_tree_pairs({"any_tree-panda": usual, "any_tree-panda-mujoco": other})
-    assert "MuJoCo | not measured yet on this block" in lines, "no draw in common"
+    assert "MuJoCo | | not measured yet" in lines, "no draw in common"
 
 
 def test_all_of_the_five_trees_have_a_row():

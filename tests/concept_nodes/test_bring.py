@@ -8,7 +8,7 @@ import pytest
 from py_trees.common import Status
 
 from bt_tasksim.concept.leaf import ONE
-from bt_tasksim.concept_nodes import Bring, Place
+from bt_tasksim.concept_nodes import Bring, Place, Release
 from bt_tasksim.concept_nodes.carried_way import WayEnds
 from bt_tasksim.concept_nodes.closer import HIGHER
 from bt_tasksim.concept_nodes.destination import standing_pose
@@ -101,6 +101,27 @@ def test_how_far_it_goes_down_follows_from_where_the_object_is_in_the_hand(toy, 
     status = stage.tick()
     assert (status == Status.RUNNING) == fits, leaf.feedback_message
     assert fits or (leaf.outcome.is_a(NO_WAY) and "ribs" in leaf.feedback_message)
+
+
+@pytest.mark.parametrize("more", [True, False])
+def test_into_a_small_container_it_leaves_room_for_what_the_tree_brings_there_later(toy, more):
+    first = Bring("box", to="goal")
+    later = [Bring("cup", to="goal"), Release("cup", into="goal")] if more else [Bring("cup", to="table")]
+    stage = toy(sequence("two", first, Release("box", into="goal"), *later))
+    model = stage.world.model
+    side = max(model.object("box").extent[:2]) + max(model.object("cup").extent[:2]) + 0.04
+    bin_ = dataclasses.replace(
+        model.place("goal"), kind="bin", extent=(side, side), centre=(0.0, 0.0), height=0.05
+    )
+    stage.context.begin([dataclasses.replace(model, places={**model.places, "goal": bin_})])
+    stage.world.hold("box")
+    stage.look()
+    seen = stage.context.seen(ONE, np.zeros(1))
+    grip = poses.relative(seen.object("box"), seen.tool)[0]
+    assert stage.tick() == Status.RUNNING, first.feedback_message
+    end = first.memory.path.table[0, -1]
+    aside = poses.localise(bin_.pose, poses.multiply(end, poses.inverse(grip))[:3])[:2]
+    assert (np.linalg.norm(aside) > 0.01) == more
 
 
 @pytest.mark.parametrize(("overlap", "aside"), [(-0.01, 0.0), (0.004, ASIDE), (0.012, FARTHER)])

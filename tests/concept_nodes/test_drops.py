@@ -72,6 +72,16 @@ def test_it_is_within_the_walls_however_it_is_turned(view):
         assert (abs(outline(empty, "box", pose) - MIDDLE) <= half + 1e-6).all()
 
 
+def test_what_is_long_goes_in_along_the_walls(view):
+    long, wide, _ = view.model("box").extent
+    narrow = container(view, size=(long + 0.03, wide + 0.03), middle=(0.0, 0.0))
+    across = poses.quat_multiply(np.asarray(narrow.world.places["bin"].pose)[3:], poses.yaw(np.pi / 2))
+    held = {"box": poses.pose(narrow.objects["box"][:3], across)}
+    best = preferred_options(narrow._replace(objects=held), "box", "bin")[0]
+    half = np.array([long, wide]) / 2 + 0.015
+    assert (abs(outline(narrow, "box", best)) <= half + 1e-6).all()
+
+
 def test_beside_what_is_in_it_rather_than_on_it(view):
     full = put(container(view), "cup", MIDDLE[0] + 0.04, MIDDLE[1] + 0.03)
     best = preferred_options(full, "box", "bin")[0]

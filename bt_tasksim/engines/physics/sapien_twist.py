@@ -3,9 +3,11 @@
 A soft pad touches a patch and not a point, and so resists being twisted by up to two thirds of friction times
 force times the patch's radius (R. D. Howe and M. R. Cutkosky, "Practical force-motion models for sliding
 manipulation", Int. J. Robotics Research 15(6), 1996). PhysX's own patches do less. With SAPIEN's tolerances
-an egg swings between two fingers like a pendulum without this law; with those of `bt_tasksim.engines.physx`
-it does not, but of 90 random tasks with the Panda and the SO-100 86 succeeded, and 89 with it (with a length
-of 1 cm there). The resistance is that of a bristle that bends and slips (C. Canudas de Wit and others, "A new
+an egg swings between two fingers like a pendulum without this law. With a length of 1 cm in
+`bt_tasksim.engines.physx` it does not, and of 90 random tasks with the Panda and the SO-100 86 succeeded
+without the law and 89 with it; with the 3 cm in use that was not counted again.
+
+The resistance is that of a bristle that bends and slips (C. Canudas de Wit and others, "A new
 model for control of systems with friction", IEEE Trans. Automatic Control 40(3), 1995).
 """
 

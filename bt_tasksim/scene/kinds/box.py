@@ -11,6 +11,7 @@ from bt_tasksim.scene.geometry import BoxPiece, Shape, ShapeSize, polygon, prism
 from bt_tasksim.scene.grip_places import box_grips
 from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.shape_kind import GraspAxis, ShapeKind, level_grasp_axes
+from bt_tasksim.scene.symmetry import order_of_quarters
 
 
 @register("shape", "box")
@@ -22,6 +23,10 @@ class BoxKind(ShapeKind):
     def shape(self, size: ShapeSize) -> Shape:
         """See `ShapeKind.shape`."""
         return box_shape(size)
+
+    def symmetry_of(self, size: ShapeSize) -> int:
+        """A quarter turn where it is as wide as it is long."""
+        return order_of_quarters(size.size)
 
     def grasp_axes(self, size: ShapeSize) -> tuple[GraspAxis, ...]:
         """See `ShapeKind.grasp_axes`."""

@@ -12,6 +12,7 @@ from bt_tasksim.scene.geometry import Shape, ShapeSize, Size, polygon, prism_sha
 from bt_tasksim.scene.grip_places import across, heights, not_too_wide
 from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.shape_kind import GraspAxis, ShapeKind
+from bt_tasksim.scene.symmetry import order_of_quarters
 
 
 @register("shape", "diamond")
@@ -32,6 +33,10 @@ class DiamondKind(ShapeKind):
         outline = rhombus(*size.size[:2])
         spread = np.max(outline, axis=0) - np.min(outline, axis=0)
         return float(spread[0]), float(spread[1]), size.size[2]
+
+    def symmetry_of(self, size: ShapeSize) -> int:
+        """A quarter turn where it is as wide as it is long."""
+        return order_of_quarters(self.extent(size))
 
     def grasp_axes(self, size: ShapeSize) -> tuple[GraspAxis, ...]:
         """See `ShapeKind.grasp_axes`: across either pair of opposite faces."""

@@ -7,7 +7,8 @@ from bt_tasksim.scene.geometry import Shape, ShapeSize
 from bt_tasksim.scene.grip_places import elliptic_grips
 from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.kinds.cylinder import elliptic_shape
-from bt_tasksim.scene.shape_kind import ShapeKind, as_wide_as_long
+from bt_tasksim.scene.shape_kind import ShapeKind
+from bt_tasksim.scene.symmetry import as_wide_as_long
 
 
 @register("shape", "oval")

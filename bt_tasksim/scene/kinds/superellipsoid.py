@@ -17,6 +17,7 @@ from bt_tasksim.scene.grip_places import superelliptic_grips
 from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.shape_kind import GraspAxis, ShapeKind, level_grasp_axes
 from bt_tasksim.scene.surfaces import SuperellipsoidSurface
+from bt_tasksim.scene.symmetry import order_of_quarters
 
 SHARPEST = 0.05
 """An exponent below this is a box to within 0.2 mm, and its powers would overflow."""
@@ -51,6 +52,10 @@ class SuperellipsoidKind(ShapeKind):
             weigh=lambda: meshes.mass_properties(meshes.superellipsoid(half, e1, e2)),
             surface=SuperellipsoidSurface((float(half[0]), float(half[1]), float(half[2])), (e1, e2)),
         )
+
+    def symmetry_of(self, size: ShapeSize) -> int:
+        """A quarter turn where it is as wide as it is long."""
+        return order_of_quarters(size.size)
 
     def grasp_axes(self, size: ShapeSize) -> tuple[GraspAxis, ...]:
         """See `ShapeKind.grasp_axes`."""

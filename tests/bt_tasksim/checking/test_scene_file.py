@@ -86,7 +86,7 @@ def test_what_stands_in_the_robot_is_named():
 
 def test_a_draw_that_begins_in_the_robot_is_refused_by_seed_and_name():
     near = Scene(objects={"near": ObjectSpec("box", on="table", centre=(-0.55, 0.0), **HERE)})
-    with pytest.raises(InputError, match=r"seed 3 'near' begins \d+ mm in 'panda_link\d' of panda"):
+    with pytest.raises(InputError, match=r"seed 3 'near' starts \d+ mm inside 'panda_link\d' of panda"):
         refuse_in_robot(near, 3)
     refuse_in_robot(Scene(objects={"far": ObjectSpec("box", on="table", **HERE)}), 3)
 
