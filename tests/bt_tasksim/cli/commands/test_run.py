@@ -115,3 +115,17 @@ def test_a_run_is_as_long_as_is_asked_for(call, until, more):
     result = json.loads(Path("short/result.json").read_text())
     assert result["reason"] == "time_over" and result["control_steps"] == 30
     assert call("replay", "short")[0] == 0
+
+
+def test_a_draw_that_starts_in_the_robot_is_bad_input_and_nothing_is_written(call):
+    Path("inside.py").write_text(
+        "from bt_tasksim import ObjectSpec, Scene\n"
+        "from bt_tasksim.concept_nodes import Grasp\n"
+        "from bt_tasksim.trees import sequence\n\n"
+        'near = ObjectSpec("box", on="table", centre=(-0.55, 0.0), area=(0.0, 0.0))\n'
+        'def scene(): return Scene(objects={"near": near})\n'
+        'def build(): return sequence("take", Grasp("near"))\n'
+    )
+    code, out, err = call("run", "inside.py", "--out", "here")
+    assert (code, out) == (2, "") and "'near' starts" in err and "check" in err
+    assert not Path("here").exists()
