@@ -169,9 +169,9 @@ def _made(stage: Stage) -> Behaviour:
     called = " and ".join(actors)
     asked = [asked_by(node) for node in stage.behind]
     missing = [g for g in stage.guards if not any(one is not None and same(one, g) for one in asked)]
-    work = sequence(
-        f"{stage.nodes[0].name} to {stage.nodes[-1].name}", *stage.nodes, *map(condition_leaf, missing)
-    )
+    first, last = stage.nodes[0].name, stage.nodes[-1].name
+    named = first if len(stage.nodes) == 1 else f"{first} to {last}"
+    work = sequence(named, *stage.nodes, *map(condition_leaf, missing))
     guards = [condition_leaf(guard) for guard in stage.guards]
     is_so, is_done = ("is so", "is done") if len(actors) == 1 else ("are so", "are done")
     guard = guards[0] if len(guards) == 1 else sequence(f"{called} {is_so}", *guards)

@@ -65,7 +65,7 @@ def check(file: str | Path, tree: str | None = None) -> Report:
         for concept in group:
             case, checked = check_concept(concept, name, *recorded[name])
             report.findings += case.findings
-            report.checked.append(checked)
+            report.done(checked)
     return report
 
 

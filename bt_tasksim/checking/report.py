@@ -48,6 +48,12 @@ class Report:
     findings: list[Finding] = field(default_factory=list)
     checked: list[str] = field(default_factory=list)
     seen: list[str] = field(default_factory=list)
+    _until: list[int] = field(default_factory=list)
+
+    def done(self, words: str) -> None:
+        """Something was checked, and what was found since the last time is about it."""
+        self.checked.append(words)
+        self._until.append(len(self.findings))
 
     @property
     def errors(self) -> int:
@@ -61,12 +67,19 @@ class Report:
     def lines(self) -> list[str]:
         """What is printed: what was measured, a line for each finding, errors first, and what was checked."""
         order = sorted(self.findings, key=lambda f: (f.concept, f.level != ERROR))
-        counted = f"{_count(self.errors, 'error')}, {_count(len(self.findings) - self.errors, 'warning')}"
-        return [
-            *self.seen,
-            *map(str, order),
-            *(f"{'not ok' if self.errors else 'ok'}: {c}; {counted}" for c in self.checked),
-        ]
+        return [*self.seen, *map(str, order), *self._judged()]
+
+    def _judged(self) -> list[str]:
+        """A line for each thing that was checked: whether it is ok, and how much was found about it."""
+        lines, first = [], 0
+        for words, until in zip(self.checked, self._until, strict=True):
+            until = len(self.findings) if words is self.checked[-1] else until
+            own = self.findings[first:until]
+            errors = sum(f.level == ERROR for f in own)
+            counted = f"{_count(errors, 'error')}, {_count(len(own) - errors, 'warning')}"
+            lines.append(f"{'not ok' if errors else 'ok'}: {words}; {counted}")
+            first = until
+        return lines
 
 
 def _count(n: int, what: str) -> str:

@@ -32,7 +32,7 @@ def check_robot(robot: str) -> Report:
     check_touching(kinematics, postures, report)
     check_drives(robot, kinematics, report)
     arm, hand = len(found.arm_joints), len(found.hand_joints)
-    report.checked.append(
+    report.done(
         f"robot {found.name}, an arm of {arm} joints and a hand of {hand}: frames, limits, reach, "
         f"{len(postures)} postures, drives"
     )

@@ -57,6 +57,7 @@ def check_reach(kinematics: PinocchioKinematics, report: Report) -> Array:
         _line("from above", LOW * length, reached[0], radius),
         _line("from the front", HIGH * length, reached[1], radius),
         *_map(reached[0], reached[1], far, side),
+        f"       ahead is where the tool is at rest, x {tool[0]:.2f} y {tool[1]:.2f} m",
     ]
     if not reached[0].any() and not reached[1].any():
         what = "reaches nothing in front of its base, neither from above nor from the front"

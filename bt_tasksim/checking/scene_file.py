@@ -59,7 +59,7 @@ def check_scene(scene: Scene, report: Report | None = None) -> Report:
         check_together(scene, worlds[:REACHED], report)
         _check_still(scene, worlds[:SETTLED], report)
     things = f"{len(scene.objects)} object{'' if len(scene.objects) == 1 else 's'}"
-    report.checked.append(
+    report.done(
         f"scene {scene.name}, {things} for {load_robot(scene.robot).name}: "
         f"{len(worlds)} of {DRAWS} draws, overlaps, reach, goals, rest"
     )

@@ -16,7 +16,7 @@ from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.shapes import ShapeSize, resting_height
-from bt_tasksim.scene.specs import Goal
+from bt_tasksim.scene.specs import STARTS, Goal
 
 if TYPE_CHECKING:
     from bt_tasksim.engines.kinematics.batch import BatchKinematics
@@ -59,7 +59,8 @@ def check_objects(scene: Scene, worlds: Sequence[ActorConfiguration], report: Re
             place = _place(worlds[0], _actor(worlds[0], name).on)
             what = f"is out of reach on '{place.name}' in {far} of {held} draws, from {_said(place.access)}"
             level = ERROR if far == held else WARNING
-            report.add(level, scene.name, name, what, "move it nearer, or give its place another 'access'")
+            remedy = f"move it nearer to {_ahead(robot)}, or give its place another 'access'"
+            report.add(level, scene.name, name, what, remedy)
 
 
 def is_reached(robot: RobotDescription, world: ActorConfiguration, name: str) -> bool:
@@ -93,7 +94,8 @@ def check_goals(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repo
             far += not _any_reached(robot, _at_goal(robot, actor, place))
         where = f"goal of '{goal.object}'"
         if small:
-            what = f"asks for '{goal.object}' on '{goal.place}', which is too small for it in {small} of "
+            word = goal.relation if goal.relation in STARTS else "on"
+            what = f"asks for '{goal.object}' {word} '{goal.place}', which is too small for it in {small} of "
             marked = any(place.name == goal.place and place.kind == "spot" for place in worlds[0].places)
             level = ERROR if small == known and not marked else WARNING  # a mark bears nothing
             how = "give the spot a larger extent" if marked else "name a larger place"
@@ -102,7 +104,8 @@ def check_goals(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repo
             what = f"is out of reach on '{goal.place}' in {far} of {known} draws, from "
             level = ERROR if far == known else WARNING
             access = _said(_place(worlds[0], goal.place).access)
-            report.add(level, scene.name, where, f"{what}{access}", "name a place that the arm reaches")
+            remedy = f"name a place that the arm reaches, nearer to {_ahead(robot)}"
+            report.add(level, scene.name, where, f"{what}{access}", remedy)
 
 
 def goals_of(world: ActorConfiguration) -> Sequence[Goal]:
@@ -187,6 +190,14 @@ def _actor(world: ActorConfiguration, name: str) -> ObjectActor:
 
 def _place(world: ActorConfiguration, name: str) -> PlaceModel:
     return next(place for place in world.places if place.name == name)
+
+
+def _ahead(robot: RobotDescription) -> str:
+    """Where the tool is at rest, from above."""
+    from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+
+    x, y = robot.derived("tool at rest", lambda r: PinocchioKinematics(r).forward(r.rest))[:2]
+    return f"where the tool of {robot.name} rests (x {x:.2f} y {y:.2f} m)"
 
 
 def _said(access: Array) -> str:

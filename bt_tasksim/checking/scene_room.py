@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from bt_tasksim.scene.scene import Scene, WorldSource
 
 
+TOUCHING = 0.001
+"""Metres that an object may be in a link: what physics parts without a blow."""
+
+
 def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Report) -> None:
     """No furniture and no object stands in the robot, which is at rest with an open hand.
 
@@ -44,7 +48,7 @@ def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repor
             what = f"stands {1000 * depth:.0f} mm in '{link}' of {robot.name}"
             report.add(ERROR, scene.name, f"fixture '{fixture.name}'", what, "put it elsewhere, by its 'at'")
     for name in scene.object_names:
-        deep = [found for world in worlds if (found := _of_object(links, world, name))[1] > DEEP]
+        deep = [found for world in worlds if (found := _of_object(links, world, name))[1] > TOUCHING]
         if deep:
             link, depth = max(deep, key=lambda found: found[1])
             often = f"in {len(deep)} of {len(worlds)} draws"
@@ -72,7 +76,7 @@ def refuse_in_robot(scene: WorldSource, seed: int) -> None:
         links = robot.derived("links at rest", _links)
     except InputError:
         return
-    if found := _first_in(links, world):
+    if found := _first_in(links, world, TOUCHING):
         name, link, depth = found
         raise InputError(
             f"with seed {seed} '{name}' starts {1000 * depth:.0f} mm inside '{link}' of {robot.name}: draw "
@@ -81,18 +85,18 @@ def refuse_in_robot(scene: WorldSource, seed: int) -> None:
 
 
 def in_robot(robot: RobotDescription, world: ActorConfiguration) -> str:
-    """The first object of a draw that begins in the robot at rest; empty where none does."""
-    found = _first_in(robot.derived("links at rest", _links), world)
+    """The first object of a draw that begins deep in the robot at rest; empty where none does."""
+    found = _first_in(robot.derived("links at rest", _links), world, DEEP)
     return found[0] if found else ""
 
 
 def _first_in(
-    links: Sequence[tuple[LinkPart, Any]], world: ActorConfiguration
+    links: Sequence[tuple[LinkPart, Any]], world: ActorConfiguration, least: float
 ) -> tuple[str, str, float] | None:
-    """Name of the first object that begins in the robot, the link, and by how many metres."""
+    """The first object that begins farther than ``least`` metres in the robot, the link, and how far."""
     for actor in world.objects:
         link, depth = _of_object(links, world, actor.name)
-        if depth > DEEP:
+        if depth > least:
             return actor.name, link, depth
     return None
 

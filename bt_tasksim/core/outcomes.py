@@ -373,7 +373,9 @@ FAILED = register_reason("failed", "{text}")
 """A failure of which only words are known, such as those of a plain py_trees behaviour."""
 INTERRUPTED = register_reason("interrupted", "interrupted")
 TIMED_OUT = register_reason("timed_out", "not done within {limit:g}", limit=SECONDS)
-TIME_OVER = register_reason("time_over", "the episode was stopped after {limit:g}", limit=SECONDS)
+TIME_OVER = register_reason(
+    "time_over", "the episode was stopped after {limit:g}, its longest time", limit=SECONDS
+)
 CANNOT_START = register_reason("cannot_start", "cannot start")
 PRECONDITION_UNMET = register_reason("precondition_unmet", "{text}")
 """Of a concept that says in words why it cannot start."""

@@ -71,7 +71,9 @@ def _body(coal: Any, name: str, pose: Array, pieces: Sequence[Piece]) -> _Body:
     for piece in pieces:
         parts.append(placed(piece, pose))
         corners.append(poses.transform(pose, piece.corners()))
-    every = np.concatenate(corners)
+    every = np.concatenate([*corners, np.zeros((0, 3))])
+    if not len(every):  # furniture may be no more than places
+        return _Body(name, (), np.full(3, np.inf), np.full(3, -np.inf))
     return _Body(name, tuple(parts), np.min(every, axis=0), np.max(every, axis=0))
 
 

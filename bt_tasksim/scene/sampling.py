@@ -31,7 +31,7 @@ def draw_spot(spec: SpotSpec, places: Mapping[str, PlaceModel], rng: np.random.G
     """The spot as a place in the robot base frame."""
     base = places[spec.on]
     offset = np.array(spec.centre) + rng.uniform(-1, 1, 2) * np.array(spec.area)
-    local = poses.pose([*offset, 0.0], poses.yaw(rng.uniform(-1, 1) * spec.yaw))
+    local = poses.pose([*offset, 0.0], poses.yaw(draw_heading(spec.yaw, rng)))
     return dataclasses.replace(
         base,
         name=spec.name,
@@ -40,6 +40,12 @@ def draw_spot(spec: SpotSpec, places: Mapping[str, PlaceModel], rng: np.random.G
         extent=spec.extent,
         centre=(0.0, 0.0),
     )
+
+
+def draw_heading(yaw: float | tuple[float, float], rng: np.random.Generator) -> float:
+    """A heading in radians, from half the width of a range about 0 or from the range itself."""
+    low, high = yaw if isinstance(yaw, tuple) else (-yaw, yaw)
+    return float((low + high) / 2 + rng.uniform(-1, 1) * (high - low) / 2)
 
 
 def draw_object(
@@ -90,7 +96,7 @@ def draw_object(
 
     for _ in range(TRIES):
         offset = centre + rng.uniform(-1, 1, 2) * area
-        heading = rng.uniform(-1, 1) * spec.yaw
+        heading = draw_heading(spec.yaw, rng)
         found = tried(offset, heading)
         if (floor := start.floor(found)) > 0.0:
             found = tried(offset, heading, floor)

@@ -210,10 +210,10 @@ class Scene:
                 if goal.place:
                     _require("goal", goal.place, {*places, *specs}, (*where, "place"))
                 if goal.relation == "inside" and goal.place in places and goal.place not in containers:
-                    said = f"it has {', '.join(containers)}" if containers else "it has none"
+                    said = f"such as {', '.join(containers)}" if containers else "such as a trash_bin or tray"
                     raise FieldError(
-                        f"a goal is inside '{goal.place}', which is no container of the scene: {said}; "
-                        f"or write on='{goal.place}'",
+                        f"the goal of '{goal.object}' is inside '{goal.place}', which is no container: name "
+                        f"one, {said}; or write on='{goal.place}'",
                         *where,
                         "place",
                     )

@@ -20,7 +20,7 @@ from bt_tasksim.core.typed_file import (
     known_values,
 )
 from bt_tasksim.scene.object_schema import ObjectFile
-from bt_tasksim.scene.spec_fields import Distance, Extents, Gap, Heading, Position
+from bt_tasksim.scene.spec_fields import Distance, Extents, Gap, Heading, Headings, Position
 from bt_tasksim.scene.specs import OLD_RELATION
 
 
@@ -43,8 +43,8 @@ class ObjectEntry(ObjectFile):
     """Middle of the area in which it is drawn, in the place's frame, m; by default the place's origin."""
     area: Extents | None = None
     """Half sizes of that area, m; by default 0 with `at`, else what an arm reaches well."""
-    heading: Heading = math.pi
-    """Half width of the range of its heading, rad."""
+    heading: Headings = math.pi
+    """Half width of the range of its heading, rad; or the lowest and the highest heading."""
     distance: Distance = 0.10
     """Of `beside`: between the two outlines from above, at most, m."""
     gap: Gap = 0.005
@@ -75,8 +75,8 @@ class SpotEntry(Model):
     """Half sizes of that area, m."""
     extent: Extent2 = (0.12, 0.12)
     """Full size of the spot, m."""
-    heading: Heading = 0.0
-    """Half width of the range of its heading, rad."""
+    heading: Headings = 0.0
+    """Half width of the range of its heading, rad; or the lowest and the highest heading."""
 
 
 class FixturePlacement(Model):

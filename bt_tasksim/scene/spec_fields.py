@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from pydantic import BeforeValidator, Discriminator, Field, InstanceOf, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, InstanceOf, Tag
 
 from bt_tasksim.core.typed_file import (
     Coordinate,
@@ -34,6 +34,26 @@ Extents = Annotated[tuple[HalfSize, HalfSize], Field(strict=False), sized(2)]
 """Half sizes along x and y, metres."""
 Heading = Annotated[Number, Field(ge=-math.tau, le=math.tau)]
 """Radians within a full turn."""
+
+
+def _in_order(value: object) -> object:
+    if isinstance(value, tuple) and value[0] > value[1]:
+        raise ValueError("should be the lowest heading first")
+    return value
+
+
+def _one_or_two(value: object) -> str:
+    return "~range" if isinstance(value, list | tuple) else "~half width"
+
+
+Headings = Annotated[
+    Annotated[Heading, Tag("~half width")]
+    | Annotated[
+        tuple[Heading, Heading], Field(strict=False), sized(2), AfterValidator(_in_order), Tag("~range")
+    ],
+    Discriminator(_one_or_two),
+]
+"""Half width of a range of headings about 0, radians; or the lowest and the highest one."""
 Distance = Annotated[Number, Field(ge=0.0, le=10.0)]
 Gap = Annotated[Number, Field(ge=0.0, le=1.0)]
 AboveZero = Annotated[Number, Field(gt=0.0)]
@@ -69,7 +89,7 @@ class ObjectFields(Model):
     on: Reference
     area: Extents | None
     centre: Vector2
-    yaw: Heading
+    yaw: Headings
     size: SizeField | None
     mass: MassField
     friction: FrictionField
@@ -96,7 +116,7 @@ class SpotFields(Model):
     centre: Vector2
     area: Extents
     extent: Extent2
-    yaw: Heading
+    yaw: Headings
 
 
 class FixtureFields(Model):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bt_tasksim.core.errors import FieldError, nearest, within
+from bt_tasksim.core.known_arguments import known_arguments
 from bt_tasksim.core.names import check_name
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.registry import parts
@@ -37,6 +38,7 @@ OLD_RELATION = "stands"
 
 
 @renamed_fields(strips="split")
+@known_arguments("an object", at="centre", heading="yaw", kind="kinds", object="file", scale="size")
 @dataclass(frozen=True)
 class ObjectSpec:
     """What an object may be; ranges are uniform.
@@ -50,7 +52,8 @@ class ObjectSpec:
         area: Half sizes ``(2,)`` in metres of the rectangle on that place in which its centre is drawn; None
             for the place's own default.
         centre: Centre ``(2,)`` of that rectangle in the place's frame, metres.
-        yaw: Half width in radians of the range of its heading.
+        yaw: Half width in radians of the range of its heading about that of what it is on; or the lowest and
+            the highest heading.
         size: Full size ``(3,)``, or low and high ones ``((3,), (3,))``, in metres; None for the kind's own
             range, or the size of the mesh file.
         mass: In kg, or low and high.
@@ -82,7 +85,7 @@ class ObjectSpec:
     on: str = ""
     area: tuple[float, float] | None = None
     centre: tuple[float, float] = (0.0, 0.0)
-    yaw: float = np.pi
+    yaw: float | tuple[float, float] = np.pi
     size: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     mass: tuple[float, float] = (0.08, 0.25)
     friction: tuple[float, float] = (0.4, 0.9)
@@ -197,6 +200,7 @@ class FixtureSpec:
             check_name(self.name, "the name of a fixture")
 
 
+@known_arguments("a spot", at="centre", heading="yaw")
 @dataclass(frozen=True)
 class SpotSpec:
     """A spot marked on another place, where something is to stand.
@@ -207,7 +211,8 @@ class SpotSpec:
         centre: Centre ``(2,)`` of the rectangle in which it is drawn, in that place's frame, metres.
         area: Half sizes ``(2,)`` of that rectangle, metres; by default it is always at its centre.
         extent: Full size ``(2,)`` of the spot, metres.
-        yaw: Half width in radians of the range of its heading.
+        yaw: Half width in radians of the range of its heading about that of what it is on; or the lowest and
+            the highest heading.
 
     Raises:
         FieldError: A field is no good.
@@ -218,7 +223,7 @@ class SpotSpec:
     centre: tuple[float, float]
     area: tuple[float, float] = (0.0, 0.0)
     extent: tuple[float, float] = (0.12, 0.12)
-    yaw: float = 0.0
+    yaw: float | tuple[float, float] = 0.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "the name of a spot")
@@ -252,6 +257,7 @@ class HandStart:
             )
 
 
+@known_arguments("a goal")
 @dataclass(frozen=True, init=False)
 class Goal:
     """Where an object should be, judged by the hidden state.

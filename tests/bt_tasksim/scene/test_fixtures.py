@@ -7,6 +7,8 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.resources import asset
 from bt_tasksim.scene.fixtures import Fixture, load_fixture
+from bt_tasksim.scene.overlap import check_configuration
+from bt_tasksim.scene.scene import Scene
 
 BUNDLED = sorted(path.stem for path in asset("fixtures").glob("*.yaml"))
 
@@ -138,3 +140,13 @@ def test_the_former_name_of_a_place_is_the_same_class():
     assert fixtures.Place is fixtures.FixturePlace
     with pytest.raises(AttributeError):
         _ = fixtures.Places
+
+
+def test_furniture_may_be_no_more_than_places(tmp_path):
+    file = tmp_path / "desk.yaml"
+    file.write_text(
+        "name: desk\nboxes: []\nplaces:\n"
+        "  - {name: desk, kind: table, position: [0.5, 0, 0], extent: [0.4, 0.3]}\n"
+    )
+    scene = Scene(fixtures=["table", str(file)], objects={"cup": "cup on desk"})
+    check_configuration(scene.sample(0))

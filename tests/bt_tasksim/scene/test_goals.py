@@ -369,9 +369,7 @@ def test_other_functions_are_other_goals():
 @pytest.mark.parametrize("place", ["table", "spot"])
 def test_nothing_is_to_be_inside_what_is_no_container(place):
     spot = SpotSpec("spot", "table", (0.0, 0.1), (0.0, 0.0))
-    with pytest.raises(
-        InputError, match=f"inside '{place}', which is no container of the scene: it has tray"
-    ):
+    with pytest.raises(InputError, match=f"inside '{place}', which is no container: name one, such as tray"):
         Scene(
             fixtures=["tray"], objects={"cup": "cup on table"}, spots=[spot], goal=Goal("cup", inside=place)
         )

@@ -3,14 +3,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bt_tasksim.core.errors import FieldError, InputError
 from bt_tasksim.core.resources import asset
 from bt_tasksim.scene import ObjectSpec, Scene
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.grips import GivenGrip
+from bt_tasksim.scene.sampling import draw_heading
 from bt_tasksim.scene.scene_file import load_scene
-from bt_tasksim.scene.specs import HandStart, SpotSpec
+from bt_tasksim.scene.specs import Goal, HandStart, SpotSpec
 
 ACROSS = {"point": (0, 0, 0), "closing": (0, 1, 0)}
 MESH = Path(__file__).parents[3] / "assets" / "objects" / "bracket.obj"
@@ -32,6 +35,7 @@ def box(**fields):
         ({"exponents": [[0.1, 0.2], [0.3, 0.4]]}, {"exponents": ((0.1, 0.2), (0.3, 0.4))}),
         ({"colour": "red"}, {"colour": (0.86, 0.16, 0.15)}),
         ({"yaw": np.float32(1.0), "symmetry": np.int64(2)}, {"yaw": 1.0, "symmetry": 2}),
+        ({"yaw": np.array([0.5, 0.5])}, {"yaw": (0.5, 0.5)}),
     ],
 )
 def test_python_takes_what_files_take(said, same):
@@ -163,3 +167,29 @@ def test_a_mesh_alone_says_that_it_is_one():
 def test_no_object_is_called_as_the_robots_tool_is():
     with pytest.raises(FieldError, match="an object is called 'tool', which is the robot's own"):
         Scene(objects={"tool": "cup on table"})
+
+
+@given(st.floats(-3.0, 3.0), st.floats(0.0, 1.0), st.integers(0, 2**31))
+def test_headings_are_within_their_range_and_one_number_is_half_its_width(low, width, seed):
+    spot = SpotSpec("a", "table", (0.0, 0.0), yaw=(low, low + width))
+    drawn = draw_heading(spot.yaw, np.random.default_rng(seed))
+    assert low - 1e-9 <= drawn <= low + width + 1e-9
+    about = draw_heading(width, np.random.default_rng(seed))
+    assert about == pytest.approx(draw_heading((-width, width), np.random.default_rng(seed)))
+    assert drawn - low == pytest.approx((about + width) / 2, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda: box(at=(0, 0)), "an object has no 'at'; it is 'centre'"),
+        (lambda: box(sise=1), "an object has no 'sise'; did you mean 'size'"),
+        (lambda: SpotSpec("a", "table", (0, 0), heading=1), "a spot has no 'heading'; it is 'yaw'"),
+        (lambda: SpotSpec("a", "table", (0, 0), yaw=(1.0, 0.5)), "'yaw' should be the lowest heading first"),
+        (lambda: SpotSpec("a", "table", (0, 0), yaw=(1, 2, 3)), "'yaw' should be 2 numbers"),
+        (lambda: Goal("a", "b", heigth=1), "a goal has no 'heigth'; did you mean 'height'"),
+    ],
+)
+def test_arguments_that_there_are_not_are_named_with_the_right_one(made, words):
+    with pytest.raises(FieldError, match=words):
+        made()
