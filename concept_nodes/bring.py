@@ -256,8 +256,8 @@ class Bring(Carry):
         """
         if self.to is None:
             return None
-        heights = [share * self.hover for share in LOWER]
-        return np.concatenate([preferred_options(view, self.target, self.to, h, later) for h in heights])
+        hovers = [share * self.hover for share in LOWER]
+        return preferred_options(view, self.target, self.to, hovers, later)
 
     def _later(self, seen: Seen) -> list[str]:
         """Objects that the tree brings to the same place, after this one."""

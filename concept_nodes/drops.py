@@ -21,21 +21,25 @@ from bt_tasksim.concept_nodes.standing import (
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import PlaceModel
+from bt_tasksim.core.world import ObjectModel, PlaceModel
 from bt_tasksim.planning.room import Room
 from bt_tasksim.scene.outlines import hull
 
 WALL = 0.008
 """Metres that an outline keeps from the walls, where the container is large enough for that."""
-TUMBLES = 0.6
-"""Share of its larger side from above that an object's middle keeps from the walls: it may turn meanwhile."""
+TUMBLES, AT_MOST = 0.6, 0.02
+"""Share of its larger side from above that an object's middle keeps from the walls, since it may turn as it
+falls; but no more than so many metres beyond its own outline: what is long lies down as it is."""
 CLEAR = 0.004
 """Smallest gap in metres at which an object falls beside another one rather than on it."""
+FOR_OTHERS = 0.01
+"""Metres of gap that are left for what is to come."""
 AMPLE = 0.03
 """Metres of gap beyond which a wider one counts no more."""
 STEP = 0.01
 """Metres of height, and of gap, that make a difference."""
-GRID = np.stack(np.meshgrid([0.0, -1.0, 1.0], [0.0, -1.0, 1.0], indexing="ij"), axis=-1).reshape(-1, 2)
+_SHARES = (0.0, -1.0, 1.0, -0.5, 0.5)
+GRID = np.stack(np.meshgrid(_SHARES, _SHARES, indexing="ij"), axis=-1).reshape(-1, 2)
 """Where in a container things are let go: shares of the way from its middle to its walls."""
 ALONG_WALLS = (0.0, np.pi / 2)
 """Headings in which room is sought for what is to come."""
@@ -45,36 +49,45 @@ class _Lying(NamedTuple):
     """Something in a container.
 
     Attributes:
+        name: Its name.
         outline: Corners ``(n, 2)`` of its outline, in the container's frame, metres.
         top: Metres above the floor to which it reaches.
     """
 
+    name: str
     outline: Array
     top: float
 
 
 def preferred_options(
-    view: WorldView, target: str, reference: str, hover: float = 0.0, later: Sequence[str] = ()
+    view: WorldView,
+    target: str,
+    reference: str,
+    hovers: Sequence[float] = (0.0,),
+    later: Sequence[str] = (),
 ) -> Array:
     """Poses ``(k, 7)`` of an object over a place or another object, in the order in which they are preferred.
 
-    Over a container see `drops`; elsewhere those of `standing_options`, the least turned first.
+    They are of one height after the other. Over a container see `drops`; elsewhere they are those of
+    `standing_options`, the least turned first.
 
     Args:
         view: The world.
         target: The object.
         reference: The place, or the other object.
-        hover: Free height below it, metres; over a container, above its rim.
+        hovers: Free heights below it, metres; over a container, above its rim.
         later: Objects that are put there, too, after this one.
     """
     place, now = view.world.places.get(reference), view.objects[target][3:]
-    if place is None or not place.container:
-        return nearest_first(standing_options(view, target, reference, hover), now)
-    return drops(view, target, place, hover, later)
+    if place is not None and place.container:
+        found = drops(view, target, place, later)
+    else:
+        found = nearest_first(standing_options(view, target, reference), now)
+    return np.concatenate([poses.shifted(found, np.array([0.0, 0.0, hover])) for hover in hovers])
 
 
-def drops(view: WorldView, target: str, place: PlaceModel, hover: float, later: Sequence[str] = ()) -> Array:
-    """Poses ``(k, 7)`` over a container in which an object may be let go, the best first.
+def drops(view: WorldView, target: str, place: PlaceModel, later: Sequence[str] = ()) -> Array:
+    """Poses ``(k, 7)`` at a container's rim in which an object may be let go, the best first.
 
     Of two, the one is better that
 
@@ -89,20 +102,19 @@ def drops(view: WorldView, target: str, place: PlaceModel, hover: float, later: 
         view: The world.
         target: The object.
         place: The container.
-        hover: Metres above its rim.
-        later: Objects that are to fall into it after this one.
+        later: Objects that are to fall into it after this one; those that lie there already do not count.
     """
     frame, rim = reference_frame(view, place.name)
-    model, now = view.model(target), view.objects[target][3:]
-    height = standing_height(model) + hover + rim
-    turns, tumbles = headings(), TUMBLES * max(model.extent[:2])
+    model, now, turns = view.model(target), view.objects[target][3:], headings()
+    height = standing_height(model) + rim
     outlines = [outline_turned(model, turn) for turn in turns]
-    offsets = [_offsets(place, outline, tumbles) for outline in outlines]
+    offsets = [_offsets(place, outline, model) for outline in outlines]
     beyond = np.repeat([_beyond(place, outline) for outline in outlines], len(GRID))
     points, there = np.concatenate(offsets), _lying(view, target, place)
     falls = [_falls(outline, some, there) for outline, some in zip(outlines, offsets, strict=True)]
     on, gap = np.concatenate(falls).T
-    rooms = _rooms(view, place, outlines, offsets, there, [n for n in later if n in view.objects])
+    coming = [n for n in later if n in view.objects and not any(each.name == n for each in there)]
+    rooms = _rooms(view, place, outlines, offsets, there, coming)
     rotations = poses.quat_multiply(frame[None, 3:], np.repeat(turns, len(GRID), axis=0))
     angles = np.round(poses.angle_between(rotations, now[None]), 6)
     aside = np.round(np.linalg.norm(points - np.asarray(place.centre), axis=-1), 6)
@@ -112,18 +124,20 @@ def drops(view: WorldView, target: str, place: PlaceModel, hover: float, later: 
     return found
 
 
-def _offsets(place: PlaceModel, outline: Array, apart: float) -> Array:
-    """Points ``(9, 2)`` in a container's frame at which an outline about its origin is within the walls.
+def _offsets(place: PlaceModel, outline: Array, model: ObjectModel) -> Array:
+    """Points ``(25, 2)`` in a container's frame at which an outline about its origin is within the walls.
 
     Along an axis on which it does not fit, they are over the middle.
 
     Args:
         place: The container.
         outline: Corners ``(n, 2)`` of the outline, metres.
-        apart: Metres that the points keep from the walls at least.
+        model: The object whose outline it is.
     """
     middle, half = np.asarray(place.centre), np.asarray(place.extent) / 2
-    room = half - np.maximum(np.abs(outline).max(axis=0) + WALL, apart)
+    own = np.abs(outline).max(axis=0)
+    tumbles = np.minimum(TUMBLES * max(model.extent[:2]), own + AT_MOST)
+    room = half - np.maximum(own + WALL, tumbles)
     found: Array = middle + np.maximum(room, 0.0) * GRID
     return found
 
@@ -137,20 +151,22 @@ def _beyond(place: PlaceModel, outline: Array) -> float:
 def _lying(view: WorldView, target: str, place: PlaceModel) -> list[_Lying]:
     """What is in a container, and the spots that are marked in it: something else is to stand there."""
     frame, middle, half = np.asarray(place.pose), np.asarray(place.centre), np.asarray(place.extent) / 2
-
-    def there(point: Array) -> bool:
-        return bool((abs(poses.localise(frame, point)[:2] - middle) < half).all())
-
+    walls = middle + half * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     found = []
     for name, pose in view.objects.items():
-        if name != target and np.isfinite(pose).all() and there(pose[:3]):
-            corners = poses.localise(frame, corners_of(view, name))
-            found.append(_Lying(hull(corners[:, :2]), float(corners[:, 2].max())))
+        if name == target or not np.isfinite(pose).all():
+            continue
+        corners = poses.localise(frame, corners_of(view, name))
+        outline, low, top = hull(corners[:, :2]), float(corners[:, 2].min()), float(corners[:, 2].max())
+        within = float(Room(outline, [walls]).gaps(np.zeros((1, 2)))[0]) < 0.0
+        if within and low < place.height and top > 0.0:
+            found.append(_Lying(name, outline, top))
     for name, spot in view.world.places.items():
-        if spot.kind == "spot" and there(np.asarray(spot.pose)[:3]):
+        at = poses.localise(frame, np.asarray(spot.pose)[:3])[:2]
+        if spot.kind == "spot" and bool((abs(at - middle) < half).all()):
             edges = outline_of(surface_of(view, name))
             flat = np.column_stack([edges, np.full(len(edges), spot.pose[2])])
-            found.append(_Lying(hull(poses.localise(frame, flat)[:, :2]), place.height))
+            found.append(_Lying(name, hull(poses.localise(frame, flat)[:, :2]), place.height))
     return found
 
 
@@ -176,19 +192,19 @@ def _rooms(
     there: Sequence[_Lying],
     later: Sequence[str],
 ) -> Array:
-    """How many of some objects would find the floor beside each outline ``(n * 9,)``, each by itself."""
+    """How many of some objects would find the floor beside each outline ``(n * 25,)``, each by itself."""
     found = np.zeros((len(outlines), len(GRID)), int)
     turned = [poses.yaw(angle) for angle in ALONG_WALLS]
     for name in later:
         model = view.model(name)
         fits = np.zeros(found.shape, bool)
         for other in (outline_turned(model, turn) for turn in turned):
-            points = _offsets(place, other, TUMBLES * max(model.extent[:2]))
+            points = _offsets(place, other, model)
             if there:
                 points = points[Room(other, [each.outline for each in there]).gaps(points) > CLEAR]
             for k, (outline, own) in enumerate(zip(outlines, offsets, strict=True)):
                 apart = (points[None] - own[:, None]).reshape(-1, 2)
                 gaps = Room(other, [outline]).gaps(apart).reshape(len(own), -1)
-                fits[k] |= (gaps > CLEAR).any(axis=1)
+                fits[k] |= (gaps > FOR_OTHERS).any(axis=1)
         found += fits
     return found.reshape(-1)

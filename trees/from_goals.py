@@ -131,7 +131,9 @@ def _check_goals(goals: Sequence[Goal]) -> None:
     held = [goal.object for goal in goals if _condition(goal).in_hand]
     for goal in goals:
         if goal.object in seen:
-            raise InputError(f"two goals are about '{goal.object}': give one for each object")
+            raise InputError(
+                f"two goals are about '{goal.object}': give one for each object, or write the tree yourself"
+            )
         seen.add(goal.object)
         if goal.place == goal.object:
             raise InputError(f"'{goal.object}' cannot be {goal.relation} itself: name another place")
@@ -147,7 +149,11 @@ def _check_goals(goals: Sequence[Goal]) -> None:
                 f"'{goal.object}' cannot be {goal.relation} '{goal.place}', which is to be held in the end"
             )
     if len(held) > 1:
-        raise InputError(f"the hand can hold one object in the end, and goals ask for {' and '.join(held)}")
+        once = any(goal.when == "once" and goal.object in held for goal in goals)
+        said = "; tidy takes goals that should hold once for such as hold in the end" if once else ""
+        raise InputError(
+            f"the hand can hold one object in the end, and goals ask for {' and '.join(held)}{said}"
+        )
 
 
 def _condition(goal: Goal) -> type[Condition]:

@@ -21,8 +21,8 @@ from benchmarks.any_tree.settings import Setting, setting
 from benchmarks.any_tree.things import FLAT, Thing, bears, draw_things, radius
 from benchmarks.any_tree.trees import tree_of
 from bt_tasksim import ObjectSpec, Scene, SpotSpec, load_robot
-from bt_tasksim.checking.scene_room import in_robot
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.execution.clear_start import TOUCHING, links_at_rest, object_in_robot
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 from bt_tasksim.scene.outlines import distance, rectangle
 from bt_tasksim.scene.shape_kind import BRIGHT
@@ -140,8 +140,10 @@ def _drawn(plan: _Try, rng: np.random.Generator) -> Task:
     actors = {actor.name: actor for actor in drawn.objects}
     forms = {name: thing.form for name, thing in things.items()}
     _check_starts(actors, forms, room)
-    if name := in_robot(load_robot(plan.robot), drawn):
-        raise InputError(f"{name} begins in the hand of a robot at rest")
+    links = links_at_rest(load_robot(plan.robot))
+    for name in specs:
+        if object_in_robot(links, drawn, name).depth > TOUCHING:
+            raise InputError(f"{name} begins in the hand of a robot at rest")
     steps, spots = settled(wishes, spots, actors, forms, room, plan.setting, drawn, rng)
     steps = in_order(steps, actors, rng)
     goals = [step.goal for step in steps]

@@ -6,7 +6,7 @@ that touch in nearly every posture: these are drawn so.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,14 +14,13 @@ from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.clear_start import DEEP, LinkPart, link_part
 from bt_tasksim.robot.urdf_links import load_links
-from bt_tasksim.robot.urdf_visuals import LinkVisual, load_collisions
+from bt_tasksim.robot.urdf_visuals import load_collisions
 
 if TYPE_CHECKING:
     from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 
-DEEP = 0.01
-"""Metres of overlap that hulls may have, which are larger than the links."""
 MOST = 60
 """Postures that are looked at."""
 DRAWN, ALWAYS = 40, 0.9
@@ -30,14 +29,6 @@ OFTEN = 0.2
 """Share of the postures in which links may meet."""
 BETWEEN = 2
 """Moving joints between two links up to which they are neighbours."""
-
-
-class LinkPart(NamedTuple):
-    """A convex part of a link, as coal has it, at ``pose (7,)`` in the link's frame."""
-
-    link: str
-    form: Any
-    pose: Array
 
 
 def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Report) -> None:
@@ -83,26 +74,6 @@ def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Rep
         what = f"has {said}, mostly '{worst[0]}' and '{worst[1]}'"
         remedy = "narrow arm.lower and arm.upper, or let arm.rest and arm.posture lead away from there"
         report.add(WARNING, robot.name, "arm", what, remedy)
-
-
-def link_part(shape: LinkVisual) -> LinkPart | None:
-    """A shape as coal has it."""
-    from bt_tasksim.core.narrow_phase import coal
-    from bt_tasksim.engines.physics.mujoco_robot import mesh_hull
-    from bt_tasksim.scene.hulls import convex
-
-    match shape.kind:
-        case "box":
-            form = coal.Box(*shape.size)
-        case "sphere":
-            form = coal.Sphere(shape.size[0])
-        case "cylinder":
-            form = coal.Cylinder(*shape.size)
-        case _:
-            assert shape.mesh is not None
-            x, y, z = shape.size
-            form = convex(mesh_hull(shape.mesh, (x, y, z)))
-    return LinkPart(shape.link, form, np.array(shape.pose))
 
 
 def _pairs(kinematics: PinocchioKinematics, parts: list[LinkPart]) -> list[tuple[int, int]]:

@@ -45,13 +45,10 @@ def run_into(
         InputError: The folder, the tree or the scene is no good, or an object begins in the robot.
         MachineError: An engine failed, or the disk is full or not writable.
     """
-    from bt_tasksim.checking.scene_room import refuse_in_robot
     from bt_tasksim.execution.runner import LONGEST, Runner
     from bt_tasksim.report.report import NO_VIDEO
     from bt_tasksim.report.write import filming_runner, write_run
 
-    if not engines.real:
-        refuse_in_robot(scene, seed)
     why, longest = "", longest or LONGEST
     if engines.rendering:
         runner, why = filming_runner(tree, scene, engines, longest)

@@ -25,6 +25,7 @@ from bt_tasksim.core.transfer import Index
 from bt_tasksim.core.world import Hidden, WorldModel
 from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.blackboard import WorldBlackboard
+from bt_tasksim.execution.clear_start import clear_draw
 from bt_tasksim.execution.laws import laws_of
 from bt_tasksim.execution.leaf_errors import no_status, set_up
 from bt_tasksim.execution.pipelines import EngineOptions
@@ -319,7 +320,7 @@ class BatchRunner(Closing):
         without: list[tuple[int, BtTasksimError]] = []
         for row, seed in wanted:
             try:
-                worlds.append(self.scene.sample(seed, stream))
+                worlds.append(clear_draw(self.scene, seed, stream, self.robot))
                 drawn.append((row, seed))
             except NoDrawError as error:
                 without.append((seed, error))

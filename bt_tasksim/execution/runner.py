@@ -35,6 +35,7 @@ from bt_tasksim.core.units import SECONDS
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
 from bt_tasksim.execution.blackboard import WorldBlackboard
+from bt_tasksim.execution.clear_start import clear_draw
 from bt_tasksim.execution.given import checked_longest, checked_root, checked_scene, checked_tree
 from bt_tasksim.execution.leaf_errors import clear, end_all, no_status, set_up, ticking
 from bt_tasksim.execution.paths import PathKeeper
@@ -147,7 +148,10 @@ class Runner(Closing):
 
     def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:
         """Draw a world, reset the engines and the tree."""
-        configuration = self.scene.sample(seed, stream)
+        if self.pipeline.real:
+            configuration = self.scene.sample(seed, stream)
+        else:
+            configuration = clear_draw(self.scene, seed, stream, self.robot)
         return configuration, self.reset(configuration)
 
     def reset(self, configuration: ActorConfiguration) -> WorldModel:

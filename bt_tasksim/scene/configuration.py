@@ -93,8 +93,15 @@ class ObjectActor:
 
     def model(self) -> ObjectModel:
         """What is known about it beforehand."""
-        size = ShapeSize(self.known_size or self.size, self.exponents, self.mesh)
-        return object_model(self.name, self.kind, size, self.grasps, self.symmetry)
+        return self._model(self.known_size or self.size)
+
+    def true_model(self) -> ObjectModel:
+        """The same of its true size."""
+        return self._model(self.size)
+
+    def _model(self, size: tuple[float, float, float]) -> ObjectModel:
+        of_size = ShapeSize(size, self.exponents, self.mesh)
+        return object_model(self.name, self.kind, of_size, self.grasps, self.symmetry)
 
 
 @renamed_fields(lesson="stage", goal="goals")

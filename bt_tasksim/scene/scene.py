@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from bt_tasksim.core.errors import FieldError, InputError, NoDrawError, nearest, within
+from bt_tasksim.core.known_arguments import known_arguments
 from bt_tasksim.core.names import TOOL, check_name
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.renamed import renamed_arguments, renamed_fields
@@ -98,6 +99,7 @@ Lesson = CurriculumStage
 
 
 @renamed_fields(lessons="stages", knock="disturbed")
+@known_arguments("a scene", object="objects", fixture="fixtures", spot="spots")
 @dataclass(frozen=True, init=False)
 class Scene:
     """A robot, fixtures and objects, and how they are drawn.

@@ -414,7 +414,7 @@ def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
     code = own_code(runner.tree, job.tree, job.plugins, runner.scene)
     subject = evaluation_subject(runner.tree, runner.scene, job.options, policies_of(runner), code, stream)
     if job.longest != LONGEST:  # earlier files say nothing of it
-        subject["longest time of an episode"] = f"{job.longest:g} s"
+        subject["longest time of an episode"] = f"{job.longest!r} s"
     return subject
 
 

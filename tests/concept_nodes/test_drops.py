@@ -7,7 +7,7 @@ import pytest
 
 from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp
-from bt_tasksim.concept_nodes.drops import GRID, WALL, drops, preferred_options
+from bt_tasksim.concept_nodes.drops import GRID, WALL, _lying, drops, preferred_options
 from bt_tasksim.concept_nodes.standing import HEADINGS, nearest_first, standing_height, standing_options
 from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
@@ -57,7 +57,7 @@ def gap(view, name, pose, other):
 
 def test_over_an_empty_one_it_is_over_the_middle_turned_least(view):
     empty = container(view)
-    found = preferred_options(empty, "box", "bin", 0.05)
+    found = preferred_options(empty, "box", "bin", [0.05])
     assert len(found) == len(GRID) * HEADINGS
     assert np.allclose(within(empty, found[:1])[0, :2], MIDDLE)
     assert np.allclose(within(empty, found)[:, 2], standing_height(view.model("box")) + 0.05 + 0.08)
@@ -121,10 +121,32 @@ def test_a_spot_that_is_marked_in_it_counts_as_taken(view):
     at = poses.pose(poses.transform(frame, np.array([0.06, -0.05, 0.0])))
     marked = container(view, (0.3, 0.24), (0.0, 0.0), goal=dataclasses.replace(spot, pose=at))
     place = marked.world.places["bin"]
-    best = drops(marked, "box", place, 0.0)[0]
+    best = drops(marked, "box", place)[0]
     assert within(marked, best[None])[0, :2] @ [1.0, -1.0] < 0.0, "on the other side"
+
+
+def test_one_height_comes_after_the_other(view):
+    empty = container(view)
+    both = preferred_options(empty, "box", "bin", [0.02, 0.05])
+    low, high = np.split(both, 2)
+    assert np.allclose(high - low, [0, 0, 0.03, 0, 0, 0, 0])
+
+
+def test_what_is_on_a_board_above_does_not_lie_in_it_and_what_leans_over_its_wall_does(view):
+    empty = container(view)
+    above = put(empty, "cup", MIDDLE[0], MIDDLE[1], z=0.5)
+    assert np.allclose(within(above, preferred_options(above, "box", "bin")[:1])[0, :2], MIDDLE)
+    half = max(view.model("cup").extent[:2]) / 2
+    leaning = put(empty, "cup", MIDDLE[0] + SIZE[0] / 2 + 0.5 * half, MIDDLE[1])
+    assert [each.name for each in _lying(leaning, "box", leaning.world.places["bin"])] == ["cup"]
+
+
+def test_what_lies_there_already_is_not_to_come(view):
+    full = put(container(view), "cup", MIDDLE[0] + 0.05, MIDDLE[1] + 0.04)
+    bin_ = full.world.places["bin"]
+    assert np.array_equal(drops(full, "box", bin_, ["cup"]), drops(full, "box", bin_))
 
 
 def test_elsewhere_the_least_turned_come_first(view):
     expected = nearest_first(standing_options(view, "box", "goal", 0.05), view.objects["box"][3:])
-    assert np.array_equal(preferred_options(view, "box", "goal", 0.05), expected)
+    assert np.array_equal(preferred_options(view, "box", "goal", [0.05]), expected)

@@ -35,6 +35,8 @@ class AnyOrder(Reporting, Composite):
         children: What is to be done.
     """
 
+    all_in_any_order = True  # see `bt_tasksim.concept.following`
+
     def __init__(self, name: str, children: list[Behaviour]) -> None:
         super().__init__(name, children)
         self._begin()

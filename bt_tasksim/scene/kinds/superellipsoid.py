@@ -17,7 +17,7 @@ from bt_tasksim.scene.grip_places import superelliptic_grips
 from bt_tasksim.scene.grips import Grips
 from bt_tasksim.scene.shape_kind import GraspAxis, ShapeKind, level_grasp_axes
 from bt_tasksim.scene.surfaces import SuperellipsoidSurface
-from bt_tasksim.scene.symmetry import order_of_quarters
+from bt_tasksim.scene.symmetry import order_of_quarters, symmetry_tolerance
 
 SHARPEST = 0.05
 """An exponent below this is a box to within 0.2 mm, and its powers would overflow."""
@@ -54,8 +54,11 @@ class SuperellipsoidKind(ShapeKind):
         )
 
     def symmetry_of(self, size: ShapeSize) -> int:
-        """A quarter turn where it is as wide as it is long."""
-        return order_of_quarters(size.size)
+        """A quarter turn where it is as wide as it is long; any turn where its outline is a circle then."""
+        order = order_of_quarters(size.size)
+        # How far the outline |x|^(2/e) + |y|^(2/e) = 1 is from a circle on its diagonal.
+        off = abs(2.0 ** ((1.0 - size.exponents[1]) / 2.0) - 1.0) * size.size[0] / 2.0
+        return 0 if order == 4 and off <= symmetry_tolerance(size.size) else order
 
     def grasp_axes(self, size: ShapeSize) -> tuple[GraspAxis, ...]:
         """See `ShapeKind.grasp_axes`."""

@@ -52,8 +52,8 @@ class FinalState:
         return self.world.place(name)
 
     def model(self, name: str) -> ObjectModel:
-        """What is known beforehand of an object."""
-        return self.world.object(name)
+        """What an object truly is, whatever size it was taken to have."""
+        return self.configuration.objects[self.world.object_index(name)].true_model()
 
     def is_object(self, name: str) -> bool:
         """It is an object, and no place."""

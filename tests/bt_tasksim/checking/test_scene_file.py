@@ -11,7 +11,7 @@ from bt_tasksim.checking.kinds import check_file
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.checking.scene_file import check_scene
 from bt_tasksim.checking.scene_goals import check_together
-from bt_tasksim.checking.scene_room import check_room, refuse_in_robot
+from bt_tasksim.checking.scene_room import check_room
 from bt_tasksim.core.resources import asset
 from bt_tasksim.trees.load import load_source
 
@@ -82,13 +82,6 @@ def test_what_stands_in_the_robot_is_named():
     (thing,) = in_the_robot(objects=objects)
     assert furniture[:2] == (ERROR, "fixture 'stand'") and "mm in 'panda_link" in furniture[2]
     assert thing[:2] == (ERROR, "near") and "of panda in 2 of 2 draws" in thing[2]
-
-
-def test_a_draw_that_begins_in_the_robot_is_refused_by_seed_and_name():
-    near = Scene(objects={"near": ObjectSpec("box", on="table", centre=(-0.55, 0.0), **HERE)})
-    with pytest.raises(InputError, match=r"seed 3 'near' starts \d+ mm inside 'panda_link\d' of panda"):
-        refuse_in_robot(near, 3)
-    refuse_in_robot(Scene(objects={"far": ObjectSpec("box", on="table", **HERE)}), 3)
 
 
 @pytest.mark.parametrize("robot", ["panda", "so100"])

@@ -3,6 +3,7 @@
 from py_trees.composites import Selector, Sequence
 
 from bt_tasksim.concept.following import following
+from bt_tasksim.trees.nodes.any_order import any_order
 
 
 def seq(*children):
@@ -56,3 +57,9 @@ def test_a_concept_sees_what_follows(toy, act):
     a.model.begin = lambda seen: (found.append(tuple(seen.later)), begin(seen))[1]
     toy(seq(a, b)).tick()
     assert found == [(b.model,)]
+
+
+def test_where_all_have_to_succeed_in_any_order_all_others_may_follow(act):
+    a, b, c, d = leaves(act, "a", "b", "c", "d")
+    seq(any_order("all", seq(a, b), c), d)
+    assert names(a) == ["b", "c", "d"] and names(b) == ["c", "d"] and names(c) == ["a", "b", "d"]

@@ -121,6 +121,21 @@ def test_turned_by_its_symmetry(kind, axis, degrees, left):
     assert found.success is (left < 10)
 
 
+def test_it_is_judged_as_it_is_whatever_size_it_is_taken_to_have():
+    """A box that is taken for square is no nearer to its goal after a quarter turn."""
+    configuration, model = world(TABLE, "box")
+    k = model.object_index("target")
+    actor = configuration.objects[k]
+    square = dataclasses.replace(actor, known_size=(actor.size[0],) * 2 + (actor.size[2],))
+    objects = [square if i == k else other for i, other in enumerate(configuration.objects)]
+    configuration = dataclasses.replace(configuration, objects=tuple(objects))
+    robot = load_robot("panda")
+    model = configuration.world_model([t.name for t in robot.tips], robot.opening)
+    assert model.object("target").symmetry == 4
+    found = evaluate_success(configuration, model, done(configuration, model, turn=turned(2, 90)))
+    assert not found.success and math.degrees(found.angle_error) == pytest.approx(90.0)
+
+
 @pytest.mark.parametrize(
     ("velocity", "success"),
     [((0.009, 0, 0, 0, 0, 0), True), ((0.011, 0, 0, 0, 0, 0), False),

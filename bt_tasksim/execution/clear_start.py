@@ -1,0 +1,151 @@
+"""Draws in which nothing starts inside the robot: physics would throw both apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError, NoDrawError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.urdf_visuals import LinkVisual, load_collisions
+from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.fixtures import Fixture
+from bt_tasksim.scene.scene import Scene, WorldSource
+from bt_tasksim.scene.shapes import BoxPiece, Piece
+
+TOUCHING = 0.001
+"""Metres that an object may be in a link."""
+DEEP = 0.01
+"""Metres that furniture may be in a link, and links in each other: a robot stands on something, and hulls are
+larger than the links."""
+
+
+class LinkPart(NamedTuple):
+    """A convex part of a link, as coal has it, at ``pose (7,)`` in the link's frame."""
+
+    link: str
+    form: Any
+    pose: Array
+
+
+class Inside(NamedTuple):
+    """Something that starts in the robot.
+
+    Attributes:
+        link: The link that it is in most.
+        depth: By how many metres; 0 where it is in none.
+    """
+
+    link: str
+    depth: float
+
+
+def clear_draw(scene: WorldSource, seed: int, stream: str, robot: RobotDescription) -> ActorConfiguration:
+    """A world of a scene, in simulation.
+
+    Worlds that are not drawn from a `Scene`, that begin with the hand elsewhere than at rest, and those of a
+    robot whose shapes are not there, are not looked at.
+
+    Raises:
+        NoDrawError: No world can be drawn with this seed, or something starts inside the robot.
+    """
+    world = scene.sample(seed, stream)
+    if not isinstance(scene, Scene) or world.joint_position or world.hand_start:
+        return world
+    try:
+        links = links_at_rest(robot)
+    except InputError:
+        return world
+    for fixture in world.fixtures:
+        found = fixture_in_robot(links, fixture)
+        if found.depth > DEEP:
+            raise NoDrawError(
+                _sentence(seed, f"the fixture '{fixture.name}'", found, robot, "put it elsewhere")
+            )
+    for name in scene.object_names:
+        found = object_in_robot(links, world, name)
+        if found.depth > TOUCHING:
+            raise NoDrawError(
+                _sentence(seed, f"'{name}'", found, robot, "draw it from an area beside the robot")
+            )
+    return world
+
+
+def _sentence(seed: int, what: str, found: Inside, robot: RobotDescription, remedy: str) -> str:
+    return (
+        f"with seed {seed} {what} starts {1000 * found.depth:.0f} mm inside '{found.link}' of {robot.name}: "
+        f"{remedy}, see 'bt-tasksim check'"
+    )
+
+
+def links_at_rest(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
+    """The parts of a robot's links, and where they are at rest with an open hand, as coal has it.
+
+    Raises:
+        InputError: A file of its shapes is missing.
+    """
+    found: list[tuple[LinkPart, Any]] = robot.derived("links at rest", _links)
+    return found
+
+
+def fixture_in_robot(links: Sequence[tuple[LinkPart, Any]], fixture: Fixture) -> Inside:
+    """How deep a fixture is in the robot."""
+    boxes = [BoxPiece(np.array(box.pose), np.array(box.size) / 2) for box in fixture.boxes]
+    return _deepest(links, fixture.pose_array(), boxes)
+
+
+def object_in_robot(links: Sequence[tuple[LinkPart, Any]], world: ActorConfiguration, name: str) -> Inside:
+    """How deep an object of a draw is in the robot."""
+    actor = next(actor for actor in world.objects if actor.name == name)
+    return _deepest(links, np.array(actor.pose), actor.shape().collision)
+
+
+def link_part(shape: LinkVisual) -> LinkPart | None:
+    """A shape as coal has it."""
+    from bt_tasksim.core.narrow_phase import coal
+    from bt_tasksim.engines.physics.mujoco_robot import mesh_hull
+    from bt_tasksim.scene.hulls import convex
+
+    match shape.kind:
+        case "box":
+            form = coal.Box(*shape.size)
+        case "sphere":
+            form = coal.Sphere(shape.size[0])
+        case "cylinder":
+            form = coal.Cylinder(*shape.size)
+        case _:
+            assert shape.mesh is not None
+            x, y, z = shape.size
+            form = convex(mesh_hull(shape.mesh, (x, y, z)))
+    return LinkPart(shape.link, form, np.array(shape.pose))
+
+
+def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
+    from bt_tasksim.core.narrow_phase import coal
+    from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
+
+    parts = [part for shape in load_collisions(robot.urdf) if (part := link_part(shape)) is not None]
+    joints = np.concatenate([robot.rest, robot.hand_open])
+    at = PinocchioKinematics(robot).link_poses(joints, sorted({part.link for part in parts}))
+    frames = [poses.multiply(at[part.link], part.pose) for part in parts]
+    where = [coal.Transform3s(poses.to_matrix(f[3:]), f[:3]) for f in frames]
+    return list(zip(parts, where, strict=True))
+
+
+def _deepest(links: Sequence[tuple[LinkPart, Any]], pose: Array, pieces: Sequence[Piece]) -> Inside:
+    """The link that pieces of a body at ``pose (7,)`` overlap most."""
+    from bt_tasksim.core.narrow_phase import coal
+    from bt_tasksim.scene.hulls import placed
+
+    request, found = coal.DistanceRequest(), Inside("", 0.0)
+    for piece in pieces:
+        form, at = placed(piece, pose)
+        for part, here in links:
+            depth = -float(coal.distance(part.form, here, form, at, request, coal.DistanceResult()))
+            if depth > found.depth:
+                found = Inside(part.link, depth)
+    return found
