@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial import ConvexHull, QhullError
 
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import RobotDescription
@@ -96,7 +98,7 @@ class RobotBodies:
         )
         at_rest = np.array([result.isCollision() for result in found.collisionResults], bool)
         kept = (touched > 0) & (touched < _ALWAYS * _POSTURES) & ~at_rest
-        kept &= [not self._neighbours(joints[i], joints[j]) for i, j in pairs]
+        kept &= np.array([not self._neighbours(joints[i], joints[j]) for i, j in pairs], bool)
         return np.array([pair for pair, keep in zip(pairs, kept, strict=True) if keep], int).reshape(-1, 2)
 
     def _neighbours(self, a: int, b: int) -> bool:
@@ -119,10 +121,20 @@ def bodies_of(robot: RobotDescription) -> RobotBodies:
 
 
 def _shapes(robot: RobotDescription, model: pin.Model) -> Any:
-    """The robot's collision shapes, each convex, about a root at the base link."""
+    """The robot's collision shapes, each convex, about a root at the base link.
+
+    Raises:
+        InputError: A shape cannot be read, or is no body.
+    """
     folders = [str(robot.urdf.parent), str(robot.urdf.parent.parent)]
     plain = pin.buildModelFromUrdf(str(robot.urdf))
-    found = pin.buildGeomFromUrdf(plain, str(robot.urdf), pin.GeometryType.COLLISION, package_dirs=folders)
+    try:
+        found = pin.buildGeomFromUrdf(
+            plain, str(robot.urdf), pin.GeometryType.COLLISION, package_dirs=folders
+        )
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise InputError(f"the collision shapes of {robot.name} cannot be read: {said}") from error
     base = plain.frames[plain.getFrameId(robot.base_link)].placement
     shapes = pin.GeometryModel()
     for shape in found.geometryObjects:
@@ -130,9 +142,13 @@ def _shapes(robot: RobotDescription, model: pin.Model) -> Any:
         frame = model.getFrameId(link)
         joint = model.frames[frame].parentJoint
         placement = base.inverse() * shape.placement if joint == 0 else shape.placement
-        shapes.addGeometryObject(
-            pin.GeometryObject(shape.name, joint, frame, placement, _convex(shape.geometry))
-        )
+        try:
+            body = _convex(shape.geometry)
+        except (InputError, QhullError) as error:
+            raise InputError(
+                f"the collision shape '{shape.name}' of {robot.name} is no body: its corners lie in one plane"
+            ) from error
+        shapes.addGeometryObject(pin.GeometryObject(shape.name, joint, frame, placement, body))
     return shapes
 
 
@@ -141,8 +157,6 @@ def _convex(geometry: Any) -> Any:
     if not isinstance(geometry, coal.BVHModelBase):
         return geometry
     vertices = np.array(geometry.vertices(), float).reshape(-1, 3)
-    from scipy.spatial import ConvexHull
-
     corners = vertices[ConvexHull(vertices).vertices]
     if len(corners) <= _MOST_CORNERS:
         return convex(corners)
