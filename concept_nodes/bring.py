@@ -30,7 +30,7 @@ from bt_tasksim.concept_nodes.carried_way import CarriedWay, ProposedWay, WayEnd
 from bt_tasksim.concept_nodes.carry import Carry, MoveMemory
 from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, TOUCHING
 from bt_tasksim.concept_nodes.destination import destination, standing_pose
-from bt_tasksim.concept_nodes.drops import preferred_options
+from bt_tasksim.concept_nodes.drops import lies_in, preferred_options
 from bt_tasksim.concept_nodes.grasp_pose import neutral_rotation, place_below, resting_place
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.spots import GAP, Spots, spots_beside, spots_on
@@ -174,7 +174,7 @@ class Bring(Carry):
                 aside = None
                 if self.to is not None and options is not None and put_down:
                     aside = aside_options(view, self.to, options, held=True)
-                ends = self._low(view, WayEnds(goals[k], options, floor, supports, aside))
+                ends = self._low(view, WayEnds(goals[k], options, floor, supports, aside), later)
             turn = middles[k] if bool(turned[k]) else None
             way, route = way_over(
                 view,
@@ -264,13 +264,12 @@ class Bring(Carry):
         found = [getattr(model, "actor", None) for model in seen.later if model.values.get("to") == self.to]
         return [name for name in dict.fromkeys(found) if name is not None and name != self.target]
 
-    def _low(self, view: WorldView, goals: WayEnds) -> WayEnds:
-        """Low over a container, unless over its middle: what falls far bounces off what is there."""
+    def _low(self, view: WorldView, goals: WayEnds, later: Sequence[str]) -> WayEnds:
+        """Low over a container with something in it, or to come: what falls far bounces off that."""
         place = None if self.to is None else view.world.places.get(self.to)
         if goals.options is None or place is None or not place.container:
             return goals
-        middle = poses.transform(np.asarray(place.pose), np.array([*place.centre, 0.0]))[:2]
-        if np.linalg.norm(goals.options[0, :2] - middle) < 1e-6:
+        if not later and not lies_in(view, self.target, place):
             return goals
         grip = poses.relative(view.objects[self.target], view.tool)
         lowest = goals.options[np.argsort(np.round(goals.options[:, 2], 6), kind="stable")]

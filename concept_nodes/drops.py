@@ -124,6 +124,11 @@ def drops(view: WorldView, target: str, place: PlaceModel, later: Sequence[str] 
     return found
 
 
+def lies_in(view: WorldView, target: str, place: PlaceModel) -> bool:
+    """Whether something other than an object lies in a container, or a spot is marked in it."""
+    return bool(_lying(view, target, place))
+
+
 def _offsets(place: PlaceModel, outline: Array, model: ObjectModel) -> Array:
     """Points ``(25, 2)`` in a container's frame at which an outline about its origin is within the walls.
 

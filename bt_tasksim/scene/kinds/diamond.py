@@ -36,7 +36,7 @@ class DiamondKind(ShapeKind):
 
     def symmetry_of(self, size: ShapeSize) -> int:
         """A quarter turn where it is as wide as it is long."""
-        return order_of_quarters(self.extent(size))
+        return order_of_quarters(size.size)
 
     def grasp_axes(self, size: ShapeSize) -> tuple[GraspAxis, ...]:
         """See `ShapeKind.grasp_axes`: across either pair of opposite faces."""
