@@ -278,7 +278,7 @@ def test_over_a_container_that_has_something_in_it_it_ends_beside_that(toy):
         there = poses.pose(middle + np.array([beside, 0.0, 0.02]))
         now = view._replace(world=world, objects={**view.objects, "box": there})
         model = stage.tree.model
-        goals = model._emptier(now, WayEnds(view.tool, model._options(now), None, frozenset()))
+        goals = model._low(now, WayEnds(view.tool, model._options(now), None, frozenset()), [])
         assert np.array_equal(goals.first, view.tool) is empty
         ends = poses.multiply(goals.first, poses.inverse(poses.relative(now.objects["cup"], now.tool)))
         assert empty or 0.05 < abs(ends[:2] - middle[:2]).max() < 0.15
