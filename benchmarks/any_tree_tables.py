@@ -101,16 +101,16 @@ def any_tree_pairs(results: Results) -> str:
 
 def five(results: Results) -> str:
     """Five trees that anybody tries first."""
-    lines = ["| tree | succeeded (95 % interval) | failures |", "|---|---|---|"]
+    lines = ["| tree | block | succeeded (95 % interval) | failures |", "|---|---|---|---|"]
     for name, label in FIVE.items():
         found = results.get(f"five-{name}-panda")
         if found is None:
-            lines.append(f"| {label} | {NOT_YET} | |")
+            lines.append(f"| {label} | | {NOT_YET} | |")
             continue
         low, high = found["confidence_interval"]
         said = f"{found['successes']} of {found['episodes']} ({100 * low:.1f} to {100 * high:.1f} %)"
         failures = ", ".join(f"{count} x {reason}" for reason, count in found["failures"].items()) or "none"
-        lines.append(f"| {label} | {said} | {failures} |")
+        lines.append(f"| {label} | {found.get('block') or ''} | {said} | {failures} |")
     return "\n".join(lines)
 
 
