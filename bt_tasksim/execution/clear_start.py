@@ -66,7 +66,7 @@ def clear_draw(scene: WorldSource, seed: int, stream: str, robot: RobotDescripti
             raise NoDrawError(
                 _sentence(seed, f"the fixture '{fixture.name}'", found, robot, "put it elsewhere")
             )
-    for name in scene.object_names:
+    for name in (actor.name for actor in world.objects):
         found = object_in_robot(links, world, name)
         if found.depth > TOUCHING:
             raise NoDrawError(
