@@ -116,7 +116,7 @@ class InverseKinematics:
         robot: The robot.
         model: Its arm alone, with a frame ``tool``.
         like: An array of the library, type and device to compute with.
-        patience: Seconds after which a search for another posture ends with what it has.
+        patience: Seconds after which a call that searches for another posture ends with what it has.
     """
 
     def __init__(
@@ -187,8 +187,9 @@ class InverseKinematics:
         return _with(found, rows[near], those)
 
     def _again(self, goal: Array, last: Array) -> Postures:
-        """`near` for rows that a few iterations have not brought there."""
-        reached = self._iterate(last, goal, _HARDER)
+        """`near` for rows that a few iterations have not brought there; going on has half of the patience."""
+        now = time.monotonic()
+        reached = self._iterate(last, goal, _HARDER, until=now + 0.5 * self._patience)
         missed = self._missed(reached.seen, goal)
         rows = goal.shape[-1]
         found = Postures(reached.q, reached.seen, *np.zeros((3, rows)))
@@ -199,7 +200,7 @@ class InverseKinematics:
         way = self._missed(self.chain.seen(last), goal)
         swing = _SWING + _SWING_PER_METRE * way.distance + _SWING_PER_RADIAN * way.angle
         best = _Reached(*taken_of(reached, left))
-        other = self._search(goal, [self._rest], last, best)
+        other = self._search(goal, [self._rest], last, now + self._patience, best)
         swings = (other.code == Reach.REACHED) & (host(_largest(other.q - last)) > swing)
         other.code[swings] = Reach.SWINGS
         other.distance[swings], other.angle[swings] = (
@@ -218,14 +219,15 @@ class InverseKinematics:
             starts: Joints ``(n, N)`` or ``(n, 1)`` to begin at, before the rest posture and random ones.
             posture: Joints ``(n, N)`` or ``(n, 1)`` to come near to; by default the rest posture.
         """
-        return self._search(goal, [*starts, self._rest], self._rest if posture is None else posture)
+        until = time.monotonic() + self._patience
+        return self._search(goal, [*starts, self._rest], self._rest if posture is None else posture, until)
 
     def _search(
-        self, goal: Array, starts: list[Array], posture: Array, best: _Reached | None = None
+        self, goal: Array, starts: list[Array], posture: Array, until: float, best: _Reached | None = None
     ) -> Postures:
         """The solutions nearest to a posture from given starts, or else from the first good random one."""
         xp = array_namespace(goal)
-        rows, until = goal.shape[-1], time.monotonic() + self._patience
+        rows = goal.shape[-1]
         posture = xp.broadcast_to(posture, (self._n, rows))
         tries = xp.stack(
             [clip(xp.broadcast_to(x, (self._n, rows)), self._lower, self._upper) for x in starts], axis=1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -104,3 +105,28 @@ def test_rows_that_ask_for_none_and_rows_that_do_are_solved_as_alone() -> None:
         alone = near(goal[k : k + 1], last[k : k + 1], asked[k : k + 1])
         np.testing.assert_array_equal(alone.q[:, 0], whole.q[:, k])
         assert alone.code[0] == whole.code[k] and alone.distance[0] == whole.distance[k]
+
+
+class Slow:
+    """A chain for which every look at where its joints are takes a millisecond of a clock."""
+
+    def __init__(self, chain: Chain) -> None:
+        self._chain, self.now = chain, 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._chain, name)
+
+    def seen(self, joints: Array) -> Array:
+        self.now += 0.001
+        return self._chain.seen(joints)
+
+
+def test_the_patience_of_a_call_is_for_all_that_it_tries(monkeypatch: pytest.MonkeyPatch) -> None:
+    full, _ = full_model(PANDA)
+    kinematics = InverseKinematics(PANDA, arm_model(PANDA, full), np.zeros(1), patience=0.03)
+    kinematics.chain = slow = Slow(kinematics.chain)
+    monkeypatch.setattr("bt_tasksim.robot.kinematics.inverse.time.monotonic", lambda: slow.now)
+    last = stretched()[:, None]
+    found = kinematics.near(placements(beyond(2.0)[None]), last, kinematics.chain.seen(last))
+    assert found.code[0] == Reach.UNREACHABLE and 1.9 < found.distance[0] < 2.1
+    assert slow.now < 0.04
