@@ -33,7 +33,8 @@ from benchmarks import sealed
 from benchmarks.success import RESULTS
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import Pick
-from bt_tasksim.concept_nodes.grasp import Grasp, _approach_begins, _way_out
+from bt_tasksim.concept_nodes.grasp import Grasp
+from bt_tasksim.concept_nodes.grasp_approach import approach_begins, way_out
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import BtTasksimError, InputError
@@ -114,8 +115,8 @@ class GivenGrasp(Grasp):
             return memory
         goal = self.change.moved(memory.goal, seen.object(self.target)[:, :3])
         back = poses.shifted(goal, -self.standoff * poses.z_axis(goal[:, 3:]))
-        path = plan([*_way_out(seen, back), back, goal], self.speed, blend=0.03)
-        return memory._replace(path=path, begins=_approach_begins(path, self.standoff), goal=goal)
+        path = plan([*way_out(seen, back), back, goal], self.speed, blend=0.03)
+        return memory._replace(path=path, begins=approach_begins(path, self.standoff), goal=goal)
 
 
 def tree_of(change: Change) -> Behaviour:

@@ -17,12 +17,13 @@ from bt_tasksim.concept.parameters import Axis, Direction, Metres, MetresPerSeco
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
-from bt_tasksim.concept_nodes import grasp_features
+from bt_tasksim.concept_nodes import grasp_features, grasp_programmed
 from bt_tasksim.concept_nodes.closer import with_room
 from bt_tasksim.concept_nodes.grasp_aims import aims_of, goes_aside
+from bt_tasksim.concept_nodes.grasp_approach import ACCELERATION, approach_begins, at_rest, sways, way_out
 from bt_tasksim.concept_nodes.grasp_candidates import candidates, narrowest_grip
 from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, rooms
-from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, CLOSE, EAGER, HASTE, SCALE
+from bt_tasksim.concept_nodes.grasp_features import ALONG, CLOSE
 from bt_tasksim.concept_nodes.grasp_firmness import SLANTED
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.concept_nodes.grasp_pose import (
@@ -33,7 +34,7 @@ from bt_tasksim.concept_nodes.grasp_pose import (
     resting_place,
 )
 from bt_tasksim.concept_nodes.holding import HOLDING, tool_distance
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, gentler, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, put_down, views
 from bt_tasksim.core import poses
@@ -44,10 +45,7 @@ from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.arm import arm_of
-from bt_tasksim.planning.hand_collision import beyond
 from bt_tasksim.planning.reference_motion import (
-    Path,
-    minimum_jerk_time,
     plan,
     posture,
     sample,
@@ -56,7 +54,7 @@ from bt_tasksim.planning.reference_motion import (
 from bt_tasksim.planning.route import Pace, Route
 from bt_tasksim.planning.routes import SAMPLES, in_postures, joints_along, with_routes
 from bt_tasksim.robot.description import RobotDescription
-from bt_tasksim.robot.kinematics.hand import standing_side, tips_in_tool
+from bt_tasksim.robot.kinematics.hand import standing_side
 
 NOT_SEEN = register_reason("not_seen", "{object} is not seen")
 TOO_WIDE = register_reason(
@@ -80,9 +78,6 @@ GRASPING = Form(
 )
 SETTLED = 3
 """Ticks for which opposing contacts and a still hand must be seen."""
-ACCELERATION = 3.0
-"""Peak acceleration of the tool on the way to the grasp, m/s^2. It matters where the way is short, as for a
-second grasp beside the first one: an arm that is hurried comes to the object beside its path."""
 TIGHTENING = 0.2
 """The Panda's fingers press 1 N more in each control period. Measured with the middle of the action and a
 fixed number of control periods from opposing contacts on: the Ability hand holds 143 of 150 objects, and at
@@ -101,18 +96,6 @@ TURNED = math.radians(25.0)
 """The same for an object that fingers of both sides have touched: it turns in the hand and does not fall, and
 is set upright where it is put down. The Ability hand's fingers roll what is low up between them, while now
 one and now another one of them has contact."""
-SEARCHING = 0.2
-"""Share of the largest action with which it then goes aside, 1 mm in a control period, as it goes back: any
-faster, the finger takes the object's rim with it and tips it over."""
-
-
-LAG = 0.1
-"""Seconds by which an arm is behind its targets: the damping of the shipped robots' drives over their
-stiffness."""
-SWAY = 0.012
-"""Metres by which it may be aside of them when the straight approach begins."""
-
-
 VARIED = 4
 """Grasps that are tried in turn by a leaf that is begun again after it has failed; the usual one is the
 first."""
@@ -120,25 +103,9 @@ AS_GIVEN = math.cos(math.radians(20.0))
 """Cosine of the angle by which a grasp may differ from the approach or closing axis that its author gave."""
 
 
-FEELING = 0.05
-"""Speed in m/s at which a programmed grasp feels its way where it has little room: a finger that meets an
-edge at 0.18 m/s presses 78 N before it can be stopped."""
-DEEP = 0.04
-"""Metres before the grasp from which on fingers may meet an edge."""
-BOUNCING = 0.0015
-"""Metres by which a hand of which a finger has touched something is held up: it waits."""
-SURELY_ABOVE = 0.008
-"""The same above an object's top, for the ends of a jaw that swings: they go far down beside what is tall."""
-SLOWEST = 0.05
-"""The least share of the reference motion's own speed at which it does so."""
 PATIENCE = 8.0
 """Seconds by which a grasp that feels its way may last longer: the ends of a stiff arm's jaws go down
 beside what is tall at 4 mm a second."""
-YIELDS = 15.0
-"""Newtons against the approach from which on a hand gives way: a finger that stands on something as it comes,
-or a jaw that swings and presses what it closes on against its support."""
-YIELDING = 0.0008
-"""Metres by which it does so in a control period, at twice that force and beyond; it does not come back."""
 
 
 class _Asked(NamedTuple):
@@ -286,7 +253,7 @@ class Grasp(ConceptModel[GraspMemory]):
         # The reference motion goes to where the object is seen, and an action's middle to where it stands.
         goal = poses.shifted(goal, -(scale * support)[:, None] * approach)
         back = poses.shifted(goal, -standoff[:, None] * approach)
-        way = [*_way_out(seen, back), back, goal]
+        way = [*way_out(seen, back), back, goal]
         path = plan(way, self.speed, blend=0.03, acceleration=ACCELERATION, samples=SAMPLES)
         path = with_routes(path, routes, len(seen.robot.arm_joints))
         usual_ways = {k: view.arm for k, view in enumerate(found) if k not in routes}
@@ -297,7 +264,7 @@ class Grasp(ConceptModel[GraspMemory]):
         along = poses.clip(support + SLANTED * (1.0 - known) * slanted / scale, -1.0, 1.0)
         return GraspMemory(
             path=path,
-            begins=_approach_begins(path, standoff),
+            begins=approach_begins(path, standoff),
             goal=goal,
             delay=nothing,
             middle=along[:, None] * grasp_features.axis(ALONG, goal),
@@ -325,7 +292,7 @@ class Grasp(ConceptModel[GraspMemory]):
         approach = poses.z_axis(usual[:, 3:])
         back = poses.shifted(usual, -self.standoff * approach)
         neutral = neutral_rotation(seen, approach, usual[:, :3])
-        arrays = [usual, back, approach, neutral, *_way_out(seen, back)]
+        arrays = [usual, back, approach, neutral, *way_out(seen, back)]
         goals, backs, comes, eases, *ways = host_numbers(arrays)
         routes: dict[int, Sequence[Route]] = {}
         standoffs, tight, known, closure = np.empty((4, len(goals)))
@@ -339,8 +306,8 @@ class Grasp(ConceptModel[GraspMemory]):
             tight[k], known[k], closure[k] = choice.tight, not choice.usual, choice.closure
             if choice.routes:
                 routes[k] = choice.routes
-            elif _sways(way := [*(way[k] for way in ways), backs[k]], goals[k], self.speed):
-                routes[k] = [_at_rest(way, self.speed), _at_rest([backs[k], goals[k]], self.speed, GENTLE)]
+            elif sways(way := [*(way[k] for way in ways), backs[k]], goals[k], self.speed):
+                routes[k] = [at_rest(way, self.speed), at_rest([backs[k], goals[k]], self.speed, GENTLE)]
         goal, standoff = constant(goals, usual), constant(standoffs, usual)
         room, known, closed = (constant(values, usual) for values in (tight, known, closure))
         return _Chosen(goal, standoff, room, known, closed, routes)
@@ -479,53 +446,7 @@ class Grasp(ConceptModel[GraspMemory]):
         says otherwise, the support is right (`GraspMemory.middle`). Where the fingers have little room beside
         the object it comes no faster than `FEELING`, and a finger that stands on something goes outwards.
         """
-        xp = array_namespace(memory.middle)
-        still = self._yielding(seen, memory)
-        usual = xp.concat([still, xp.full_like(still[..., :1], HASTE)], axis=-1)
-        if not bool(xp.any(memory.tight)):
-            return usual
-        return xp.where(memory.tight[:, None], self._feeling(seen, memory), usual)
-
-    def _yielding(self, seen: Seen, memory: GraspMemory) -> Array:
-        """Offsets ``(N, 5)`` asked for by a hand that gives way where it touches something, see `YIELDS`."""
-        xp = array_namespace(memory.offset)
-        push = poses.clip(-seen.wrench[:, 2] / YIELDS - 1.0, 0.0, 1.0)
-        begun = seen.elapsed - memory.delay >= memory.begins
-        back = xp.where(begun & xp.any(seen.contacts, axis=-1), YIELDING * push, xp.zeros_like(push))
-        gone = memory.offset[:, ALONG] - back
-        wanted = gone / SCALE[ALONG] - memory.middle[:, ALONG]
-        asked = xp.where(gone < 0.0, -xp.sqrt(poses.clip(-wanted, 0.0, 1.0)), xp.zeros_like(gone))
-        return asked[:, None] * grasp_features.axis(ALONG, asked)
-
-    def _feeling(self, seen: Seen, memory: GraspMemory) -> Array:
-        """Actions ``(N, 6)`` of a hand that feels its way, see `programmed_motion`."""
-        xp = array_namespace(memory.middle)
-        touching = xp.astype(seen.contacts, memory.middle.dtype)
-        outwards = poses.clip(xp.sum(touching * constant(_sides(seen.robot), touching), axis=-1), -1.0, 1.0)
-        now, period = seen.elapsed - memory.delay, seen.world.control_period
-        ahead = sample(memory.path, now + period)[:, :3] - sample(memory.path, now)[:, :3]
-        near = (poses.norm(seen.tool[:, :3] - memory.goal[:, :3]) < DEEP) | self._among(seen, memory)
-        share = gentler(seen.tool)
-        feeling = FEELING * xp.where(near, share, xp.ones_like(share))
-        share = poses.clip(feeling * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), SLOWEST, 1.0)
-        pace = (share - CAREFUL) / EAGER
-        slower, stands = xp.minimum(pace, xp.zeros_like(pace)), xp.full_like(pace, -CAREFUL / EAGER)
-        pace = xp.where(xp.any(seen.contacts, axis=-1), slower, pace)
-        # A finger that stands on an edge bounces: it must not be pressed down while it does not touch.
-        held_up = poses.localise(memory.target, seen.tool[:, :3])[:, 2] < -BOUNCING
-        comes_down = (memory.closing < 0.0) & xp.any(memory.touched > 0.0, axis=-1)
-        pace = xp.where(held_up & comes_down, stands, pace)
-        aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)
-        return xp.concat([aside + self._yielding(seen, memory), pace[:, None]], axis=-1)
-
-    def _among(self, seen: Seen, memory: GraspMemory) -> Array:
-        """Whether ``(N,)`` the ends of a hand with a jaw that swings may meet the object as it is seen."""
-        xp, along = array_namespace(memory.goal), poses.z_axis(memory.goal[:, 3:])
-        if standing_side(seen.robot) is None:
-            return xp.zeros(along.shape[:1], dtype=xp.bool, device=along.device)
-        here = seen.object(self.target)
-        top = half_extent(here, seen.model(self.target), along) + SURELY_ABOVE
-        return poses.dot(seen.tool[:, :3] - here[:, :3], along) + beyond(seen.robot) > -top
+        return grasp_programmed.motion(seen, memory, self.target)
 
     def done(self, seen: Seen, memory: GraspMemory) -> Array:
         """Opposing contacts and a still hand, some ticks long, that presses as hard as it is to."""
@@ -592,63 +513,5 @@ class Grasp(ConceptModel[GraspMemory]):
         )
 
 
-def _sides(robot: RobotDescription) -> Array:
-    """On which side ``(n_tips,)`` along the closing axis each fingertip of the open hand is, -1 or 1."""
-    found: Array = robot.derived("sides", lambda robot: np.sign(tips_in_tool(robot, robot.hand_open)[:, 1]))
-    return found
-
-
 def _commanded(motion: GraspMotion) -> Command:
     return Command(tool=motion.target, hand=motion.closed[:, None], posture=motion.posture)
-
-
-def _approach_begins(path: Path, standoff: Array) -> Array:
-    """Seconds ``(N,)`` after which no more than ``standoff (N,)`` metres are left of a path."""
-    xp, n = array_namespace(path.table), path.table.shape[1]
-    left = poses.norm(path.table[:, :, :3] - path.table[:, -1:, :3])
-    numbers = xp.astype(xp.arange(1, n + 1, device=left.device), left.dtype)
-    fraction = xp.max(xp.astype(left > standoff[:, None], left.dtype) * numbers, axis=-1) / (n - 1)
-    share = minimum_jerk_time(fraction)
-    return (share if path.even is None else xp.where(path.even, fraction, share)) * path.duration
-
-
-def _sways(way: Sequence[Array], goal: Array, speed: float) -> bool:
-    """Whether a hand that does not stop before the straight approach would still sway aside on it.
-
-    An arm lags behind its targets by `LAG`; what it lags aside by at the corner it has to make up for while
-    it goes down beside the object.
-
-    Args:
-        way: Tool poses ``(7,)`` to where the approach begins.
-        goal: The grasp ``(7,)``.
-        speed: Peak speed of the tool, m/s.
-    """
-    corner, approach = way[-1], poses.z_axis(goal[3:])
-    before = next((p for p in reversed(way[:-1]) if np.linalg.norm(p[:3] - corner[:3]) > 1e-3), None)
-    if before is None:
-        return False
-    along = (corner[:3] - before[:3]) / np.linalg.norm(corner[:3] - before[:3])
-    aside = float(np.linalg.norm(along - approach * float(along @ approach)))
-    points = np.array([p[:3] for p in (*way, goal)])
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=-1)
-    done = np.array(1.0 - lengths[-1] / max(float(lengths.sum()), 1e-9))
-    fraction = float(minimum_jerk_time(done[None])[0])
-    there = 16.0 * fraction**2 * (1.0 - fraction) ** 2 * speed
-    return there * aside * LAG > SWAY
-
-
-def _at_rest(way: Sequence[Array], speed: float, acceleration: float = ACCELERATION) -> Route:
-    """A motion of the tool through poses ``(7,)``, from rest to rest, in whatever posture."""
-    path = plan([p[None] for p in way], speed, blend=0.03, acceleration=acceleration, samples=SAMPLES)
-    return Route(path.table[0], np.full((SAMPLES, 0), np.nan), float(path.duration[0]))
-
-
-def _way_out(seen: Seen, goal: Array) -> list[Array]:
-    """Waypoints from the present tool pose that keep the hand above what stands around."""
-    start = seen.tool
-    xp = array_namespace(start)
-    level = xp.maximum(start[:, 2], goal[:, 2])
-    far = poses.norm(start[:, :2] - goal[:, :2]) > 0.05
-    low = (start[:, 2] < level - 0.02) & far & (level < 0.35)
-    rise = xp.where(low, level - start[:, 2], xp.zeros_like(level))
-    return [start, poses.shifted(start, rise[:, None] * constant([0.0, 0.0, 1.0], start))]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.concept_nodes import Grasp, grasp, grasp_features
-from bt_tasksim.concept_nodes.grasp import FEELING, PATIENCE, SLOWEST, YIELDING
+from bt_tasksim.concept_nodes import Grasp, grasp_features, grasp_programmed
+from bt_tasksim.concept_nodes.grasp import PATIENCE
 from bt_tasksim.concept_nodes.grasp_features import (
     ACROSS,
     ACTIONS,
@@ -23,6 +23,7 @@ from bt_tasksim.concept_nodes.grasp_features import (
     SCALE,
     TIME_SCALING,
 )
+from bt_tasksim.concept_nodes.grasp_programmed import FEELING, SLOWEST, YIELDING
 from bt_tasksim.concept_nodes.limits import gentler
 from bt_tasksim.core import poses
 from bt_tasksim.planning.reference_motion import sample
@@ -335,7 +336,7 @@ def test_a_finger_that_bounces_on_an_edge_is_not_pressed_down_in_between(
 
 def test_what_touches_goes_on_no_faster_than_what_feels_its_way(near, monkeypatch):
     """Near the base of a stiff arm that is slower than the careful pace."""
-    monkeypatch.setattr(grasp, "gentler", lambda tool: np.full(len(tool), 0.02))
+    monkeypatch.setattr(grasp_programmed, "gentler", lambda tool: np.full(len(tool), 0.02))
     paces = []
     for contact in (0, 1):
         seen, memory = approaching(near, within=0.2, contact=contact)
@@ -359,12 +360,12 @@ def test_jaws_that_go_down_beside_something_tall_feel_their_way_from_its_top(nea
     seen, memory = approaching(near, within=0.2)
     far = poses.shifted(memory.goal, -0.06 * poses.z_axis(memory.goal[:, 3:]))
     memory = memory._replace(tight=np.array([True]), goal=far)
-    monkeypatch.setattr(grasp, "gentler", lambda tool: np.full(len(tool), 0.3))
-    monkeypatch.setattr(grasp, "beyond", lambda robot: 1.0)
+    monkeypatch.setattr(grasp_programmed, "gentler", lambda tool: np.full(len(tool), 0.3))
+    monkeypatch.setattr(grasp_programmed, "beyond", lambda robot: 1.0)
     others = near.model.programmed_motion(seen, memory)[0, TIME_SCALING]
-    monkeypatch.setattr(grasp, "standing_side", lambda robot: -0.007)
+    monkeypatch.setattr(grasp_programmed, "standing_side", lambda robot: -0.007)
     jaws = near.model.programmed_motion(seen, memory)[0, TIME_SCALING]
-    monkeypatch.setattr(grasp, "beyond", lambda robot: -1.0)
+    monkeypatch.setattr(grasp_programmed, "beyond", lambda robot: -1.0)
     assert jaws < others == near.model.programmed_motion(seen, memory)[0, TIME_SCALING]
 
 

@@ -1,0 +1,106 @@
+"""The programmed actions of a grasp: it gives way where it is pressed, and feels its way in little room."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept_nodes import grasp_features
+from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, EAGER, HASTE, SCALE
+from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
+from bt_tasksim.concept_nodes.grasp_pose import half_extent
+from bt_tasksim.concept_nodes.limits import gentler
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.planning.hand_collision import beyond
+from bt_tasksim.planning.reference_motion import sample
+from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.hand import standing_side, tips_in_tool
+
+FEELING = 0.05
+"""Speed in m/s at which a programmed grasp feels its way where it has little room: a finger that meets an
+edge at 0.18 m/s presses 78 N before it can be stopped."""
+DEEP = 0.04
+"""Metres before the grasp from which on fingers may meet an edge."""
+BOUNCING = 0.0015
+"""Metres by which a hand of which a finger has touched something is held up: it waits."""
+SURELY_ABOVE = 0.008
+"""The same above an object's top, for the ends of a jaw that swings: they go far down beside what is tall."""
+SLOWEST = 0.05
+"""The least share of the reference motion's own speed at which it does so."""
+YIELDS = 15.0
+"""Newtons against the approach from which on a hand gives way: a finger that stands on something as it comes,
+or a jaw that swings and presses what it closes on against its support."""
+YIELDING = 0.0008
+"""Metres by which it does so in a control period, at twice that force and beyond; it does not come back."""
+SEARCHING = 0.2
+"""Share of the largest action with which it then goes aside, 1 mm in a control period, as it goes back: any
+faster, the finger takes the object's rim with it and tips it over."""
+
+
+def motion(seen: Seen, memory: GraspMemory, target: str) -> Array:
+    """Actions ``(N, 6)``, see `Grasp.programmed_motion`.
+
+    Args:
+        seen: What the concept sees.
+        memory: What the grasp remembers.
+        target: The object.
+    """
+    xp = array_namespace(memory.middle)
+    still = yielding(seen, memory)
+    usual = xp.concat([still, xp.full_like(still[..., :1], HASTE)], axis=-1)
+    if not bool(xp.any(memory.tight)):
+        return usual
+    return xp.where(memory.tight[:, None], feeling(seen, memory, target), usual)
+
+
+def yielding(seen: Seen, memory: GraspMemory) -> Array:
+    """Offsets ``(N, 5)`` asked for by a hand that gives way where it touches something, see `YIELDS`."""
+    xp = array_namespace(memory.offset)
+    push = poses.clip(-seen.wrench[:, 2] / YIELDS - 1.0, 0.0, 1.0)
+    begun = seen.elapsed - memory.delay >= memory.begins
+    back = xp.where(begun & xp.any(seen.contacts, axis=-1), YIELDING * push, xp.zeros_like(push))
+    gone = memory.offset[:, ALONG] - back
+    wanted = gone / SCALE[ALONG] - memory.middle[:, ALONG]
+    asked = xp.where(gone < 0.0, -xp.sqrt(poses.clip(-wanted, 0.0, 1.0)), xp.zeros_like(gone))
+    return asked[:, None] * grasp_features.axis(ALONG, asked)
+
+
+def feeling(seen: Seen, memory: GraspMemory, target: str) -> Array:
+    """Actions ``(N, 6)`` of a hand that feels its way, see `programmed_motion`."""
+    xp = array_namespace(memory.middle)
+    touching = xp.astype(seen.contacts, memory.middle.dtype)
+    outwards = poses.clip(xp.sum(touching * constant(_sides(seen.robot), touching), axis=-1), -1.0, 1.0)
+    now, period = seen.elapsed - memory.delay, seen.world.control_period
+    ahead = sample(memory.path, now + period)[:, :3] - sample(memory.path, now)[:, :3]
+    near = (poses.norm(seen.tool[:, :3] - memory.goal[:, :3]) < DEEP) | _among(seen, memory, target)
+    share = gentler(seen.tool)
+    most = FEELING * xp.where(near, share, xp.ones_like(share))
+    share = poses.clip(most * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), SLOWEST, 1.0)
+    pace = (share - CAREFUL) / EAGER
+    slower, stands = xp.minimum(pace, xp.zeros_like(pace)), xp.full_like(pace, -CAREFUL / EAGER)
+    pace = xp.where(xp.any(seen.contacts, axis=-1), slower, pace)
+    # A finger that stands on an edge bounces: it must not be pressed down while it does not touch.
+    held_up = poses.localise(memory.target, seen.tool[:, :3])[:, 2] < -BOUNCING
+    comes_down = (memory.closing < 0.0) & xp.any(memory.touched > 0.0, axis=-1)
+    pace = xp.where(held_up & comes_down, stands, pace)
+    aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)
+    return xp.concat([aside + yielding(seen, memory), pace[:, None]], axis=-1)
+
+
+def _among(seen: Seen, memory: GraspMemory, target: str) -> Array:
+    """Whether ``(N,)`` the ends of a hand with a jaw that swings may meet the object as it is seen."""
+    xp, along = array_namespace(memory.goal), poses.z_axis(memory.goal[:, 3:])
+    if standing_side(seen.robot) is None:
+        return xp.zeros(along.shape[:1], dtype=xp.bool, device=along.device)
+    here = seen.object(target)
+    top = half_extent(here, seen.model(target), along) + SURELY_ABOVE
+    return poses.dot(seen.tool[:, :3] - here[:, :3], along) + beyond(seen.robot) > -top
+
+
+def _sides(robot: RobotDescription) -> Array:
+    """On which side ``(n_tips,)`` along the closing axis each fingertip of the open hand is, -1 or 1."""
+    found: Array = robot.derived("sides", lambda robot: np.sign(tips_in_tool(robot, robot.hand_open)[:, 1]))
+    return found
