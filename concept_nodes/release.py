@@ -36,7 +36,7 @@ from bt_tasksim.planning.reference_motion import Path, posture, sample
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Leave, Thing
 from bt_tasksim.robot.kinematics.hand import SPARE, opened_about, standing_side, wide_at
-from bt_tasksim.scene.spatial_laws import Hollow, beyond_hollow, floats
+from bt_tasksim.scene.spatial_laws import Hollow, beyond_hollow, beyond_opening, floats, is_borne
 
 OPENED = Form(
     "hand {opening} open, {contacts} fingertips in contact, {force} at the wrist{touch}",
@@ -69,6 +69,8 @@ they open, and get no farther."""
 BARELY = 0.002
 """Metres below a container's rim at which the middle of what leans in it may be above it: estimates are as
 wrong as that."""
+UNMOVED = (0.01, math.radians(10.0))
+"""Metres and radians by which fingers that open move what they let go of, at most."""
 PRESSES = 0.6
 """Share of the force limit from which on a hand that has parted its fingers draws back at once as it opens,
 since they stand on something."""
@@ -197,17 +199,22 @@ class Release(ConceptModel[ReleaseMemory]):
         """Metres ``(N,)`` by which the object's middle is outside what it was to fall into; 0 where unseen.
 
         What lies on other things above its rim is not in it, unless it stands on its floor. What seems to be
-        in the air is not seen any more: it is taken for where it was last. It is 0 until the hand has drawn
-        back; nobody asks before.
+        in the air, or to hang where the hand has let it go, is not seen any more: it is taken for where it
+        was last. It is 0 until the hand has drawn back; nobody asks before.
         """
         xp = array_namespace(seen.tool)
         nothing, back = xp.zeros_like(seen.tool[:, 0]), memory.opened >= memory.path.duration
         if self.into is None or self.into not in seen.world.place_columns or not bool(xp.any(back)):
             return nothing
         where = Estimates.of(seen)
-        far = beyond_hollow(where.body(self.target), _surely(where.hollow(self.into)))
-        told = back & xp.isfinite(far) & ~floats(where, self.target, self.into)
-        return xp.where(told, xp.maximum(far, nothing), nothing)
+        body, hollow = where.body(self.target), where.hollow(self.into)
+        far = beyond_hollow(body, _surely(hollow))
+        unseen = floats(where, self.target, self.into) | (
+            _is_still_at(body.pose, memory.start_pose)
+            & (beyond_opening(body, hollow) <= BARELY)
+            & ~is_borne(where, self.target)
+        )
+        return xp.where(back & xp.isfinite(far) & ~unseen, xp.maximum(far, nothing), nothing)
 
     def done(self, seen: Seen, memory: ReleaseMemory) -> Array:
         """The hand is open, touches nothing and has drawn back; what was to fall into something is in it."""
@@ -234,6 +241,12 @@ class Release(ConceptModel[ReleaseMemory]):
             force=force_at_wrist(seen),
             touch=touched(seen, self.target),
         )
+
+
+def _is_still_at(pose: Array, before: Array) -> Array:
+    """Booleans ``(N,)``: things seem to be where they were, but for what opening fingers move."""
+    shifted = poses.norm(pose[:, :3] - before[:, :3])
+    return (shifted < UNMOVED[0]) & (poses.angle_between(pose[:, 3:], before[:, 3:]) < UNMOVED[1])
 
 
 def _surely(hollow: Hollow) -> Hollow:

@@ -213,19 +213,33 @@ def floats(where: Whereabouts, name: str, container: str) -> Array:
         name: The object.
         container: Something that bears what is below its rim, too.
     """
+    body, hollow = where.body(name), where.hollow(container)
+    rim = hollow.frame[:, 2] + array_namespace(body.pose).max(hollow.boxes[..., 5], axis=-1)
+    return ~((lowest(body) < rim + BORNE) | is_borne(where, name))
+
+
+def is_borne(where: Whereabouts, name: str) -> Array:
+    """Booleans ``(N,)``: a known surface, or the top of a known object, is right below an object's middle."""
     body = where.body(name)
     low = lowest(body)
-    hollow = where.hollow(container)
     xp = array_namespace(low)
-    rim = hollow.frame[:, 2] + xp.max(hollow.boxes[..., 5], axis=-1)
-    borne = low < rim + BORNE
+    borne = xp.zeros_like(low) > 1.0
     for surface in (where.surface(place) for place in where.surfaces):
         over = beyond_edges(surface.frame, surface.centre, surface.half, body.pose) <= 0.0
         borne = borne | (surface.carries & over & (abs(low - surface.frame[:, 2]) < BORNE))
     for other in (where.body(other) for other in where.bodies if other != name):
         top = xp.max(other.reach[..., 2], axis=-1)
         borne = borne | ((_beyond_outline(body.pose, other) <= 0.0) & (abs(low - top) < BORNE))
-    return ~borne
+    return borne
+
+
+def beyond_opening(body: PlacedObject, hollow: Hollow) -> Array:
+    """Metres ``(N,)`` by which an object reaches beyond a hollow, seen along that one's z axis; 0 within."""
+    xp = array_namespace(body.pose)
+    flat = poses.localise(hollow.frame[:, None, :], body.reach)[:, :, None, :2]
+    boxes = hollow.boxes[:, None, :, :]
+    aside = xp.max(abs(flat - boxes[..., :2]) - boxes[..., 2:4], axis=-1)
+    return poses.clip(xp.max(xp.min(aside, axis=-1), axis=-1), 0.0, math.inf)
 
 
 def lowest(body: PlacedObject) -> Array:

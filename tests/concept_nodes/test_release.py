@@ -208,3 +208,44 @@ def test_a_hand_of_two_fingers_opens_no_wider_than_it_has_room(toy, beside, all_
     opened = float(view.robot.closure(_opened(view, "cup")))
     held = float(view.robot.closure(view.hand))
     assert (opened == 0.0) == all_the_way and opened < held
+
+
+@pytest.mark.parametrize(
+    ("aside", "gone", "turned", "unseen"),
+    [
+        (0.0, 0.0, 0.0, True),  # nobody has seen it since
+        (0.0, 0.03, 0.0, False),  # it came to rest higher than that, on something that nobody knows
+        (0.0, 0.0, 0.5, False),  # it leans there now
+        (0.09, 0.0, 0.0, False),  # over a wall of the bin
+    ],
+)
+def test_what_was_let_go_low_in_a_container_and_not_seen_since_counts_as_fallen(
+    situations, aside, gone, turned, unseen
+):
+    """The camera shows it no more, and it is taken for where the hand had it, partly below the rim."""
+    near = situations(Release, "pick_and_throw")
+    at = near.asked(near.single[-1])
+    model, seen = near.model, at.seen
+    bin_, size = seen.place("trash_bin"), seen.model(model.target).extent[0]
+    column = seen.world.column(model.target)
+    held = np.array([*bin_.pose[0, :3], 1.0, 0, 0, 0]) + [
+        aside,
+        0,
+        bin_.height[0] + 0.3 * size[2],
+        0,
+        0,
+        0,
+        0,
+    ]
+    now = poses.multiply(poses.shifted(held, np.array([0, 0, gone])), poses.pose([0.0] * 3, roll(turned)))
+    objects = np.array(seen.objects)
+    objects[:, column] = now
+    memory = at.memory._replace(start_pose=held[None], opened=at.memory.path.duration + 10.0)
+    there = seen.believing(objects)
+    assert (model._beside(there, memory)[0] == 0.0) == unseen
+    assert any(limit.applies[0] for limit in model.limits(there, memory)) != unseen
+
+
+def roll(angle):
+    """A turn about the x axis."""
+    return np.array([np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0])

@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 from bt_tasksim.core import poses
 from bt_tasksim.scene.outlines import distance, slabs, whole_outline
 from bt_tasksim.scene.shapes import ShapeSize, shape
-from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject, _normals, between, beyond_hollow, leaning
+from bt_tasksim.scene.spatial_laws import (
+    Hollow,
+    PlacedObject,
+    _normals,
+    between,
+    beyond_hollow,
+    beyond_opening,
+    leaning,
+)
 from tests.bt_tasksim.scene.solids import solids
 
 QUATERNIONS = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
@@ -72,3 +80,14 @@ def test_a_world_gets_the_same_bits_in_any_company(some, others):
         assert gaps(one, other)[0] == together[k]
         assert beyond_hollow(one, Hollow(other.pose, boxes[k : k + 1]))[0] == inside[k]
         assert leaning(one.pose[:, 3:], one.cubic)[0] == lean[k]
+
+
+@settings(deadline=None)
+@given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-4, 4))
+def test_what_reaches_beyond_an_opening_is_measured_from_above(x, y, heading):
+    """Two halves of an opening of 20 by 20 cm, against the corners of a box."""
+    made = shape("box", ShapeSize((0.06, 0.04, 0.1)))
+    there = body((made, poses.pose([x, y, 5.0], poses.yaw(heading))))
+    halves = np.array([[[-0.05, 0.0, 0.05, 0.1, 0.0, 0.2], [0.05, 0.0, 0.05, 0.1, 0.0, 0.2]]])
+    exact = np.clip(np.max(np.abs(there.reach[0, :, :2])) - 0.1, 0.0, np.inf)
+    assert np.isclose(beyond_opening(there, Hollow(poses.pose([0.0, 0, 0])[None], halves))[0], exact)
