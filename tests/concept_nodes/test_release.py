@@ -228,15 +228,8 @@ def test_what_was_let_go_low_in_a_container_and_not_seen_since_counts_as_fallen(
     model, seen = near.model, at.seen
     bin_, size = seen.place("trash_bin"), seen.model(model.target).extent[0]
     column = seen.world.column(model.target)
-    held = np.array([*bin_.pose[0, :3], 1.0, 0, 0, 0]) + [
-        aside,
-        0,
-        bin_.height[0] + 0.3 * size[2],
-        0,
-        0,
-        0,
-        0,
-    ]
+    above = [aside, 0.0, bin_.height[0] + 0.3 * size[2]]
+    held = poses.pose(bin_.pose[0, :3] + above)
     now = poses.multiply(poses.shifted(held, np.array([0, 0, gone])), poses.pose([0.0] * 3, roll(turned)))
     objects = np.array(seen.objects)
     objects[:, column] = now
