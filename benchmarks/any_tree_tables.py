@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from benchmarks.any_tree.report import impossible
 from benchmarks.paired import Paired, mcnemar
+from bt_tasksim.training.evaluation_outcomes import wilson
 
 NOT_YET = "not measured yet"
 ROWS = {
@@ -28,6 +30,15 @@ BARS = {
     "any_tree-panda-original": 92,
 }
 """Percent of the possible draws that should succeed at least."""
+DRAWS = {
+    "any_tree-panda": 500,
+    "any_tree-panda-recovering": 500,
+    "any_tree-xarm7_ability": 200,
+    "any_tree-so100": 200,
+    "any_tree-panda-mujoco": 200,
+    "any_tree-panda-twin": 40,
+}
+"""How many draws a row should have, where not 100: a newer block that has fewer does not replace an older one."""
 PAIRS = ("any_tree-panda-recovering", "any_tree-panda-mujoco", "any_tree-panda-twin")
 """Rows on the draws of the first one, in other circumstances."""
 FIVE = {
@@ -43,24 +54,27 @@ Results = dict[str, Any]
 
 
 def any_tree(results: Results) -> str:
-    """Successes of the draws that are possible, and what trees said that was not so."""
+    """Successes of the draws that are possible and not refused, and what trees said that was not so."""
     lines = [
-        "| with | block | draws | succeeded | impossible | time was over | of the possible (95 % interval) "
-        "| bar | SUCCESS, goals missed | bodies overlapped |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| with | block | draws | succeeded | impossible | time was over | refused by name "
+        "| of the others (95 % interval) | bar | SUCCESS, goals missed | bodies overlapped |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, label in _shown(results):
-        found = results.get(name)
+        found = _full(results, name)
         if found is None:
-            lines.append(f"| {label} | | {NOT_YET} | | | | | | | |")
+            lines.append(f"| {label} | | {NOT_YET} | | | | | | | | |")
             continue
-        low, high = found["confidence_interval"]
-        rate = f"{100 * found['possible_rate']:.2f} % ({100 * low:.1f} to {100 * high:.1f})"
+        refused = _refused(found)
+        counted = found["possible"] - refused
+        low, high = wilson(found["successes"], counted)
+        share = 100 * found["successes"] / counted
+        rate = f"{share:.2f} % ({100 * low:.1f} to {100 * high:.1f})"
         bar = f"{BARS[name]} %" if name in BARS else ""
         impossible, block = found["episodes"] - found["possible"], found.get("block") or ""
         lines.append(
             f"| {label} | {block} | {found['episodes']} | {found['successes']} | {impossible} "
-            f"| {found['unended']} | {rate} | {bar} | {found['lies']} | {found['overlaps']} |"
+            f"| {found['unended']} | {refused} | {rate} | {bar} | {found['lies']} | {found['overlaps']} |"
         )
     return "\n".join(lines)
 
@@ -69,7 +83,7 @@ def any_tree_failures(results: Results) -> str:
     """Leaves and reasons of all that failed and is possible."""
     lines = ["| with | leaf | reason | how often | seeds |", "|---|---|---|---|---|"]
     for name, label in _shown(results):
-        for failure in (results.get(name) or {"failures": []})["failures"]:
+        for failure in (_full(results, name) or {"failures": []})["failures"]:
             seeds = ", ".join(str(seed) for seed in failure["seeds"][:SHOWN])
             more = ", ..." if failure["count"] > SHOWN else ""
             said = f"{failure['concept']} | {failure['reason']} | {failure['count']} | {seeds}{more}"
@@ -84,7 +98,7 @@ def any_tree_pairs(results: Results) -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for name in PAIRS:
-        other = results.get(name)
+        other = _full(results, name)
         block = (other or {}).get("block") or ""
         usual = results.get(f"{block}/any_tree-panda" if block else "any_tree-panda")
         pair = Paired("any_tree", name, _outcomes(usual), _outcomes(other))
@@ -117,6 +131,19 @@ def five(results: Results) -> str:
 def _shown(results: Results) -> list[tuple[str, str]]:
     others = sorted(n for n in results if n.startswith("any_tree-") and n not in ROWS)
     return [*ROWS.items(), *((name, f"`{name.removeprefix('any_tree-')}`") for name in others)]
+
+
+def _full(results: Results, name: str) -> dict[str, Any] | None:
+    """The result of the newest block that has all the draws of a row; else the newest of all."""
+    blocks = sorted((key for key in results if key.endswith(f"/{name}")), reverse=True)
+    full = (results[key] for key in blocks if results[key]["episodes"] >= DRAWS.get(name, 100))
+    return next(full, results.get(name))
+
+
+def _refused(found: dict[str, Any]) -> int:
+    """Draws that are possible, and that were refused by name before anything moved."""
+    refused = set(found.get("refused", ()))
+    return sum(draw["seed"] in refused and not impossible(draw) for draw in found["draws"])
 
 
 def _outcomes(found: dict[str, Any] | None) -> dict[str, bool]:
