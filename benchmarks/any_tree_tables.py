@@ -38,7 +38,7 @@ DRAWS = {
     "any_tree-panda-mujoco": 200,
     "any_tree-panda-twin": 40,
 }
-"""How many draws a row should have, where not 100: a newer block that has fewer does not replace an older one."""
+"""How many draws a row should have, where not 100: a newer block with fewer does not replace an older one."""
 PAIRS = ("any_tree-panda-recovering", "any_tree-panda-mujoco", "any_tree-panda-twin")
 """Rows on the draws of the first one, in other circumstances."""
 FIVE = {
