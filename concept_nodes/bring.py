@@ -43,7 +43,7 @@ from bt_tasksim.core.registry import register
 from bt_tasksim.planning.arm import arm_of
 from bt_tasksim.planning.reference_motion import plan
 from bt_tasksim.planning.route import Pace, Route
-from bt_tasksim.planning.routes import SAMPLES, in_postures, joints_along, with_routes
+from bt_tasksim.planning.routes import SAMPLES, hurried, in_postures, joints_along, with_routes
 
 HOVERS = (0.03, 0.12)
 """Metres between which the height lies that is taken over from a demonstration."""
@@ -190,9 +190,11 @@ class Bring(Carry):
         padded = np.array([[*way, *[way[-1]] * (most - len(way))] for way in ways])
         points = [constant(padded[:, k], tool_goal) for k in range(most)]
         path = plan(points, self.speed, blend=0.04, samples=SAMPLES)
-        path = with_routes(path, routes, len(seen.robot.arm_joints))
-        straight = {k: view.arm for k, view in enumerate(found) if k not in routes}
-        return MoveMemory(in_postures(path, joints_along(path, arm_of(seen.robot), straight)))
+        arm = arm_of(seen.robot)
+        usual = joints_along(path, arm, {k: view.arm for k, view in enumerate(found) if k not in routes})
+        slow = hurried(usual, arm, Pace(self.speed))
+        path = with_routes(path, {**routes, **slow}, len(seen.robot.arm_joints))
+        return MoveMemory(in_postures(path, {k: way for k, way in usual.items() if k not in slow}))
 
     def aim(self, view: WorldView) -> Aim | None:
         """Above its destination."""

@@ -20,7 +20,7 @@ from bt_tasksim.core.world import Command
 from bt_tasksim.planning.arm import FULL, arm_of
 from bt_tasksim.planning.reference_motion import Path, plan, posture, sample, searched_for
 from bt_tasksim.planning.route import Pace, followed
-from bt_tasksim.planning.routes import SAMPLES, in_postures, with_routes
+from bt_tasksim.planning.routes import SAMPLES, hurried, in_postures, with_routes
 
 CARRIED = Form(
     "tool {tool_to_goal} from its goal, {object} {object_to_tool} from the tool, {force} at the wrist{touch}",
@@ -44,7 +44,8 @@ def straight_path(
 ) -> Path:
     """The tool's paths straight to goals ``(N, 7)``, in the postures in which the arm was looked at.
 
-    An arm of few joints turns its tool on the way as far as it must, so its way is that of its joints.
+    An arm of few joints turns its tool on the way as far as it must, so its way is that of its joints. Where
+    joints would have to hurry, the tool goes as fast as they can.
 
     Args:
         seen: Where the tool is.
@@ -56,7 +57,9 @@ def straight_path(
     ways, arm = {k: way for k, way in enumerate(joints) if len(way)}, arm_of(seen.robot)
     path = plan([seen.tool, goal], speed, samples=SAMPLES)
     if len(seen.robot.arm_joints) >= FULL and not len(before):
-        return in_postures(with_routes(path, {}, len(seen.robot.arm_joints)), ways)
+        slow = hurried(ways, arm, Pace(speed))
+        path = with_routes(path, slow, len(seen.robot.arm_joints))
+        return in_postures(path, {k: way for k, way in ways.items() if k not in slow})
     pieces = {k: [before[k], way] if len(before) and len(before[k]) else [way] for k, way in ways.items()}
     routes = {k: [followed(arm, piece, Pace(speed)) for piece in found] for k, found in pieces.items()}
     return with_routes(path, routes, len(seen.robot.arm_joints))

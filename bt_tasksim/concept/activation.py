@@ -229,6 +229,10 @@ class Activation:
         self._failures[begins[anew]] = 0
         self._started[begins] = context.times[begins]
         seen = self.seen(begins)
+        if context.planner is not None:
+            for k, row in enumerate(begins.tolist()):
+                self._plans[row] = context.planner.begin(self._beginning, seen.at(np.array([k])))
+            return
         unmet = sequence_of(model.initial_state(seen), self._contract.where("initial_state"))
         for possible in unmet:
             self._contract.answers(possible.applies, len(begins), "initial_state")
@@ -242,14 +246,18 @@ class Activation:
             if not len(can):
                 return
             begins, positions, seen = begins[can], positions[can], seen.at(can)
-        if context.planner is not None:
-            for k, row in enumerate(begins.tolist()):
-                self._plans[row] = context.planner.begin(model.begin, seen.at(np.array([k])))
-            return
         try:
             self._remember(begins, model.begin(seen), "begin")
         except NoWayError:
             self._begin_each(begins, positions, seen, statuses)
+
+    def _beginning(self, seen: Seen) -> Any:
+        """What it begins with in one world, or why it cannot: asked beside a robot's loop."""
+        unmet = sequence_of(self._model.initial_state(seen), self._contract.where("initial_state"))
+        for possible in unmet:
+            self._contract.answers(possible.applies, 1, "initial_state")
+        why = first_of([possible.on_host() for possible in unmet], 0)
+        return self._model.begin(seen) if why is None else CANNOT_START(why)
 
     def _begin_each(self, begins: Array, positions: Array, seen: Seen, statuses: Array) -> None:
         """Begin world by world: in one of them at least there is no way."""
@@ -285,7 +293,10 @@ class Activation:
             self._no_way(statuses, position, row, error)
             return
         if plan.outdated(seen):
-            self._plans[row] = planner.begin(self._model.begin, seen, plan.anew + 1)
+            self._plans[row] = planner.begin(self._beginning, seen, plan.anew + 1)
+            return
+        if isinstance(memory, Outcome):
+            self._fail(statuses, position, row, memory)
             return
         self._started[row] = now
         self._remember(np.array([row]), memory, "begin")

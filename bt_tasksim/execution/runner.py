@@ -42,6 +42,7 @@ from bt_tasksim.execution.paths import PathKeeper
 from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
 from bt_tasksim.execution.result import Result
 from bt_tasksim.hardware.safety.stop import SafetyStop
+from bt_tasksim.planning.prepared import prepare
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.moments import Moments
@@ -158,6 +159,8 @@ class Runner(Closing):
         """Reset the engines and the tree to a world."""
         self.configuration, self._began = configuration, time.perf_counter()
         world = configuration.world_model([tip.name for tip in self.robot.tips], self.robot.opening)
+        if self.pipeline.real:
+            prepare(world, self.robot)
         with self.blackboard:
             clear(self.tree)
         self.blackboard = WorldBlackboard(self._planted)

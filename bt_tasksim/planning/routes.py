@@ -11,7 +11,7 @@ from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.transfer import fetched
 from bt_tasksim.planning.arm import Arm
 from bt_tasksim.planning.reference_motion import Path, minimum_jerk
-from bt_tasksim.planning.route import Route
+from bt_tasksim.planning.route import Pace, Route, followed, hurries
 
 SAMPLES = 97
 """Rows of the table of a path that may hold a route: one for each control period of some five seconds."""
@@ -68,6 +68,20 @@ def in_postures(path: Path, ways: Mapping[int, Array]) -> Path:
         places = np.linspace(0.0, 1.0, len(way))
         joints[world] = np.stack([np.interp(rows, places, column) for column in way.T], axis=-1)
     return path._replace(joints=constant(joints, path.table))
+
+
+def hurried(ways: Mapping[int, Array], arm: Arm, pace: Pace) -> dict[int, list[Route]]:
+    """The motions of those worlds in which joints would else have to go faster than they may.
+
+    A simulated drive falls behind there and catches up; a real arm is stopped, since it is not where it was
+    told to be.
+
+    Args:
+        ways: Joints ``(k, n_arm)``, at least two, evenly along a path, by the number of the world.
+        arm: The arm.
+        pace: How fast its tool goes.
+    """
+    return {k: [followed(arm, way, pace)] for k, way in ways.items() if hurries(arm, way, pace)}
 
 
 def joints_along(path: Path, arm: Arm, starts: Mapping[int, Array]) -> dict[int, Array]:
