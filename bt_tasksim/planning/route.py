@@ -26,8 +26,8 @@ _SPEED, _ACCELERATION = 0.85, 0.4
 """Shares of the joints' limits that a way uses."""
 _BEHIND = 0.19
 """Seconds by which a real arm may be behind its commands: 0.1 s by the damping of its drives over their
-stiffness, 0.135 s of the twin's worst, and up to 0.05 s until the next command. What it is behind by must stay
-within the robot's limit of tracking, or it is stopped."""
+stiffness, 0.135 s of the twin's worst, and up to 0.05 s until the next command. What it is behind by must
+stay within the robot's limit of tracking, or it is stopped."""
 _FINE = 200
 _PEAK = 1.875
 """Peak speed of a minimum-jerk motion, over its mean one."""
