@@ -24,10 +24,6 @@ _BLEND = 0.5
 """Radians before and after a corner within which it is rounded, at most."""
 _SPEED, _ACCELERATION = 0.85, 0.4
 """Shares of the joints' limits that a way uses."""
-_BEHIND = 0.19
-"""Seconds by which a real arm may be behind its commands: 0.1 s by the damping of its drives over their
-stiffness, 0.135 s of the twin's worst, and up to 0.05 s until the next command. What it is behind by must
-stay within the robot's limit of tracking, or it is stopped."""
 _FINE = 200
 _PEAK = 1.875
 """Peak speed of a minimum-jerk motion, over its mean one."""
@@ -101,15 +97,8 @@ def hurries(arm: Arm, joints: Array, pace: Pace) -> bool:
     tools = arm.tools(joints)
     moved = np.linalg.norm(np.diff(tools[:, :3], axis=0), axis=-1) / pace.speed
     turned = poses.angle_between(tools[:-1, 3:], tools[1:, 3:]) / pace.turn
-    needed = np.abs(np.diff(joints, axis=0) / _fastest(arm)).max(axis=-1)
+    needed = np.abs(np.diff(joints, axis=0) / (_SPEED * arm.robot.arm_velocity)).max(axis=-1)
     return bool((needed > np.maximum(moved, turned)).any())
-
-
-def _fastest(arm: Arm) -> Array:
-    """Speeds ``(n_arm,)`` that joints go on a way at most, rad/s."""
-    robot = arm.robot
-    usual: Array = _SPEED * robot.arm_velocity
-    return usual if robot.safety is None else np.minimum(usual, robot.safety.tracking / _BEHIND)
 
 
 def _at(shares: Array, along: Array, line: Array) -> Array:
@@ -118,7 +107,7 @@ def _at(shares: Array, along: Array, line: Array) -> Array:
 
 def _seconds(arm: Arm, line: Array, tools: Array, pace: Pace) -> Array:
     """About how many seconds ``(n - 1,)`` each piece takes at full speed; smooth where the way is."""
-    joints = np.diff(line, axis=0) / _fastest(arm)
+    joints = np.diff(line, axis=0) / (_SPEED * arm.robot.arm_velocity)
     moved = np.linalg.norm(np.diff(tools[:, :3], axis=0), axis=-1) / pace.speed
     turned = poses.angle_between(tools[:-1, 3:], tools[1:, 3:]) / pace.turn
     found: Array = (np.abs(joints).max(axis=-1) ** 4 + moved**4 + turned**4) ** 0.25
