@@ -1,5 +1,6 @@
 """Planning beside a robot's loop: the arm stands meanwhile, and then all is as if no time had passed."""
 
+import sys
 import threading
 
 import numpy as np
@@ -8,9 +9,9 @@ from py_trees.common import Status
 
 from bt_tasksim.concept import activation
 from bt_tasksim.concept.model import ConceptModel
-from bt_tasksim.concept.planner import Planner
+from bt_tasksim.concept.planner import TURNS, Planner
 from bt_tasksim.core.errors import LeafError, NoWayError
-from bt_tasksim.core.outcomes import CANNOT_START, NO_WAY
+from bt_tasksim.core.outcomes import CANNOT_START, NO_WAY, register_reason
 from bt_tasksim.core.world import Command
 from bt_tasksim.trees import any_order, sequence
 
@@ -146,3 +147,35 @@ def test_an_interrupted_leaf_waits_for_nothing_any_more_and_may_begin_again(robo
     assert not leaf.plans
     leaf.model.free.set()
     assert stage.tick(4) == Status.RUNNING and leaf.activations == 2
+
+
+class Hesitate(Ponder):
+    """Takes a while to find that it cannot begin."""
+
+    def initial_state(self, seen):
+        assert self.free.wait(20.0)
+        return NOTHING.where(np.array([True]))
+
+
+NOTHING = register_reason("hesitates_for_nothing", "there is nothing to be done")
+
+
+def test_whether_it_can_begin_is_asked_beside_the_loop_too(robot):
+    leaf = Hesitate()
+    leaf.model.free, leaf.model.error, leaf.model.values_seen = threading.Event(), None, []
+    stage = robot(leaf)
+    for _ in range(3):
+        assert stage.tick() == Status.RUNNING and leaf.plans
+    leaf.model.free.set()
+    planned(leaf)
+    assert stage.tick() == Status.FAILURE
+    assert leaf.outcome.is_a(CANNOT_START) and leaf.outcome.is_a(NOTHING)
+    assert leaf.model.values_seen == [], "it did not begin"
+
+
+def test_threads_take_short_turns_while_there_is_a_robot():
+    before = sys.getswitchinterval()
+    planner = Planner()
+    assert sys.getswitchinterval() <= TURNS
+    planner.close()
+    assert sys.getswitchinterval() == before
