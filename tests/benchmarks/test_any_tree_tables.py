@@ -31,10 +31,28 @@ def test_rates_are_those_of_what_is_possible():
     found = {"any_tree-so100": first, "any_tree-panda-2_colours": result(3, 0)}
     lines = any_tree_tables.any_tree(found).splitlines()
     line = next(line for line in lines if "SO-100" in line)
-    assert "| B0099 | 24 | 18 | 4 | 1 | 90.00 %" in line and "| 95 % | 0 | 0 |" in line
-    assert any("`panda-2_colours` |  | 3 | 3 | 0 | 0 |" in each for each in lines), "whatever else there is"
+    assert "| B0099 | 24 | 18 | 4 | 1 | 0 | 90.00 %" in line and "| 95 % | 0 | 0 |" in line
+    assert any("`panda-2_colours` |  | 3 | 3 | 0 | 0 | 0 |" in each for each in lines), "whatever else there is"
     failures = any_tree_tables.any_tree_failures(found)
     assert "| SO-100 | pick | goal_lost | 2 | 100, 101 |" in failures
+
+
+def test_what_is_refused_by_name_does_not_count():
+    draws = result(18, 2)["draws"]
+    for k in range(3):
+        draws.append({"seed": 300 + k, "success": False, "reason": "not_told_apart", "concept": "", "leaf": ""})
+    draws[-1]["oracle"] = {"possible": False, "reason": "no grasp"}
+    found = {"any_tree-panda-camera-1_colours": {**summary(draws), "draws": draws}}
+    lines = any_tree_tables.any_tree(found).splitlines()
+    assert any("one colour |  | 23 | 18 | 1 | 1 | 2 | 90.00 %" in line for line in lines)
+
+
+def test_a_newer_block_with_fewer_draws_does_not_replace_an_older_one():
+    old, new = {**result(95, 5), "block": "B0001"}, {**result(40, 0), "block": "B0002"}
+    name = "any_tree-panda-camera"
+    found = {name: new, f"B0001/{name}": old, f"B0002/{name}": new}
+    line = next(line for line in any_tree_tables.any_tree(found).splitlines() if "camera" in line)
+    assert "| B0001 | 100 | 95 |" in line
 
 
 def test_pairs_are_of_the_draws_that_both_had():
