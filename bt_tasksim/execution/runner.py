@@ -19,6 +19,7 @@ from bt_tasksim.concept.context import Context, one_world
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.planner import Planner
 from bt_tasksim.concept.reporting import as_statement, speaker, whole_outcome
+from bt_tasksim.core import pauses
 from bt_tasksim.core.closing import Closing
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
 from bt_tasksim.core.interrupts import ending, terminable
@@ -145,6 +146,7 @@ class Runner(Closing):
         """Close the engines."""
         if self.context.planner is not None:
             self.context.planner.close()
+            pauses.take_back()
         self.pipeline.close()
 
     def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:
@@ -161,6 +163,7 @@ class Runner(Closing):
         world = configuration.world_model([tip.name for tip in self.robot.tips], self.robot.opening)
         if self.pipeline.real:
             prepare(world, self.robot)
+            pauses.set_aside()
         with self.blackboard:
             clear(self.tree)
         self.blackboard = WorldBlackboard(self._planted)

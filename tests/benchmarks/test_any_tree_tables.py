@@ -32,7 +32,9 @@ def test_rates_are_those_of_what_is_possible():
     lines = any_tree_tables.any_tree(found).splitlines()
     line = next(line for line in lines if "SO-100" in line)
     assert "| B0099 | 24 | 18 | 4 | 1 | 0 | 90.00 %" in line and "| 95 % | 0 | 0 |" in line
-    assert any("`panda-2_colours` |  | 3 | 3 | 0 | 0 | 0 |" in each for each in lines), "whatever else there is"
+    assert any("`panda-2_colours` |  | 3 | 3 | 0 | 0 | 0 |" in each for each in lines), (
+        "whatever else there is"
+    )
     failures = any_tree_tables.any_tree_failures(found)
     assert "| SO-100 | pick | goal_lost | 2 | 100, 101 |" in failures
 
@@ -40,7 +42,9 @@ def test_rates_are_those_of_what_is_possible():
 def test_what_is_refused_by_name_does_not_count():
     draws = result(18, 2)["draws"]
     for k in range(3):
-        draws.append({"seed": 300 + k, "success": False, "reason": "not_told_apart", "concept": "", "leaf": ""})
+        draws.append(
+            {"seed": 300 + k, "success": False, "reason": "not_told_apart", "concept": "", "leaf": ""}
+        )
     draws[-1]["oracle"] = {"possible": False, "reason": "no grasp"}
     found = {"any_tree-panda-camera-1_colours": {**summary(draws), "draws": draws}}
     lines = any_tree_tables.any_tree(found).splitlines()

@@ -30,6 +30,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from trajectory_msgs.msg import JointTrajectory
 
+from bt_tasksim.core import pauses
 from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.hardware.ros.setting import RosSetting, load_setting
@@ -192,6 +193,7 @@ class TwinNode(Node):  # type: ignore[misc]
                 self.fault, self._frozen = "", []
                 self._delayed.clear()
                 self._worlds += 1
+                pauses.set_aside()
                 return {"done": True}
             case "picture":
                 return self._picture(question.get("known"))
@@ -299,6 +301,7 @@ def main() -> int:
         return 2
     rclpy.init()
     node = TwinNode(cell, setting)
+    pauses.set_aside()
     print(f"ready {server.port}", flush=True)
     try:
         run(node, server, options.parent)
