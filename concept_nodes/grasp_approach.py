@@ -17,8 +17,8 @@ ACCELERATION = 3.0
 """Peak acceleration of the tool on the way to the grasp, m/s^2. It matters where the way is short, as for a
 second grasp beside the first one: an arm that is hurried comes to the object beside its path."""
 LAG = 0.1
-"""Seconds by which an arm is behind its targets: the damping of the shipped robots' drives over their
-stiffness."""
+"""Seconds by which an arm may be behind its targets: the delays of a robot's cell together, see
+`bt_tasksim.hardware.twin.gap`. In a simulation there is next to none."""
 SWAY = 0.012
 """Metres by which it may be aside of them when the straight approach begins."""
 

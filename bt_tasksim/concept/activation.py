@@ -11,6 +11,7 @@ worlds go on, statuses, clocks and counts are NumPy's.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +35,7 @@ from bt_tasksim.core.outcomes import (
     NO_WAY,
     TIMED_OUT,
     Outcome,
+    Possible,
     Statement,
     register_reason,
 )
@@ -233,9 +235,7 @@ class Activation:
             for k, row in enumerate(begins.tolist()):
                 self._plans[row] = context.planner.begin(self._beginning, seen.at(np.array([k])))
             return
-        unmet = sequence_of(model.initial_state(seen), self._contract.where("initial_state"))
-        for possible in unmet:
-            self._contract.answers(possible.applies, len(begins), "initial_state")
+        unmet = self._unmet(seen, len(begins))
         cannot = host(any_of(seen.tool, unmet))
         if cannot.any():
             unmet = [possible.on_host() for possible in unmet]
@@ -253,11 +253,15 @@ class Activation:
 
     def _beginning(self, seen: Seen) -> Any:
         """What it begins with in one world, or why it cannot: asked beside a robot's loop."""
+        why = first_of([possible.on_host() for possible in self._unmet(seen, 1)], 0)
+        return self._model.begin(seen) if why is None else CANNOT_START(why)
+
+    def _unmet(self, seen: Seen, worlds: int) -> Sequence[Possible]:
+        """What may keep it from beginning, held to the contract."""
         unmet = sequence_of(self._model.initial_state(seen), self._contract.where("initial_state"))
         for possible in unmet:
-            self._contract.answers(possible.applies, 1, "initial_state")
-        why = first_of([possible.on_host() for possible in unmet], 0)
-        return self._model.begin(seen) if why is None else CANNOT_START(why)
+            self._contract.answers(possible.applies, worlds, "initial_state")
+        return unmet
 
     def _begin_each(self, begins: Array, positions: Array, seen: Seen, statuses: Array) -> None:
         """Begin world by world: in one of them at least there is no way."""
@@ -287,13 +291,13 @@ class Activation:
             return
         del self._plans[row]
         seen = self.seen(np.array([row]))
+        if plan.outdated(seen):
+            self._plans[row] = planner.begin(self._beginning, seen, plan.anew + 1)
+            return
         try:
             memory = plan.result()
         except NoWayError as error:
             self._no_way(statuses, position, row, error)
-            return
-        if plan.outdated(seen):
-            self._plans[row] = planner.begin(self._beginning, seen, plan.anew + 1)
             return
         if isinstance(memory, Outcome):
             self._fail(statuses, position, row, memory)

@@ -8,7 +8,6 @@ every sign of life given as usual.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, TimeoutError
 from typing import Any
@@ -29,19 +28,14 @@ MOVED = 0.02
 when it was asked for comes to rest in the meantime, and then it is planned once more."""
 ANEW = 3
 """How often that may happen."""
-TURNS = 2e-4
-"""Seconds after which a thread that computes lets another one go on, while there is a robot. By default it is
-5 ms, and each message of the robot waits so long for a plan that is being made: hundreds a second cannot."""
 THREADS = 2
 """One more than is needed, for a plan that was dropped may still be under way."""
 
 
 class Planner:
-    """Makes plans on threads of its own, which let the robot's loop go on; they share one interpreter."""
+    """Makes plans on threads of its own."""
 
     def __init__(self) -> None:
-        self._turns = sys.getswitchinterval()
-        sys.setswitchinterval(min(TURNS, self._turns))
         self._pool = ThreadPoolExecutor(THREADS, thread_name_prefix="planning")
 
     def begin(self, plan: Callable[[Seen], Any], seen: Seen, anew: int = 0) -> Plan:
@@ -58,7 +52,6 @@ class Planner:
     def close(self) -> None:
         """Begin no other plan; what is under way ends by itself."""
         self._pool.shutdown(wait=False, cancel_futures=True)
-        sys.setswitchinterval(self._turns)
 
 
 class Plan:

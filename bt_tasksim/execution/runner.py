@@ -19,7 +19,6 @@ from bt_tasksim.concept.context import Context, one_world
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.planner import Planner
 from bt_tasksim.concept.reporting import as_statement, speaker, whole_outcome
-from bt_tasksim.core import pauses
 from bt_tasksim.core.closing import Closing
 from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, UnreachableError
 from bt_tasksim.core.interrupts import ending, terminable
@@ -32,6 +31,7 @@ from bt_tasksim.core.outcomes import (
 )
 from bt_tasksim.core.plain import short
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.real_time import RealTime
 from bt_tasksim.core.units import SECONDS
 from bt_tasksim.core.world import Command, Hidden, Observation, WorldModel
 from bt_tasksim.engines.pipeline import EnginePipeline
@@ -112,11 +112,16 @@ class Runner(Closing):
         self.pipeline = pipeline or build_pipeline(self.robot, self.options)
         self.scene, self.longest = self.pipeline.worlds(scene), longest
         self.context = Context(self.robot)
-        if self.pipeline.real:
-            self.context.planner = Planner()
         self._planted: WorldBlackboard | None = None
         self.configuration: ActorConfiguration | None = None
-        self.plant(tree)
+        self._real_time = RealTime() if self.pipeline.real else None
+        try:
+            if self.pipeline.real:
+                self.context.planner = Planner()
+            self.plant(tree)
+        except BaseException:
+            self._close(pipeline is None)
+            raise
 
     def plant(self, tree: Behaviour | Callable[[], Behaviour]) -> None:
         """Run another tree from the next episode on, such as a new one, whose nodes remember nothing.
@@ -144,10 +149,17 @@ class Runner(Closing):
 
     def close(self) -> None:
         """Close the engines."""
-        if self.context.planner is not None:
-            self.context.planner.close()
-            pauses.take_back()
-        self.pipeline.close()
+        self._close(True)
+
+    def _close(self, engines: bool) -> None:
+        try:
+            if self.context.planner is not None:
+                self.context.planner.close()
+            if engines:
+                self.pipeline.close()
+        finally:
+            if self._real_time is not None:
+                self._real_time.close()
 
     def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:
         """Draw a world, reset the engines and the tree."""
@@ -161,9 +173,9 @@ class Runner(Closing):
         """Reset the engines and the tree to a world."""
         self.configuration, self._began = configuration, time.perf_counter()
         world = configuration.world_model([tip.name for tip in self.robot.tips], self.robot.opening)
-        if self.pipeline.real:
+        if self._real_time is not None:
             prepare(world, self.robot)
-            pauses.set_aside()
+            self._real_time.set_aside()
         with self.blackboard:
             clear(self.tree)
         self.blackboard = WorldBlackboard(self._planted)

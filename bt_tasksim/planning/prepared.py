@@ -6,6 +6,7 @@ reach 0.4 s. A loop that waits for them falls silent, and the robot is stopped.
 
 from __future__ import annotations
 
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.world import WorldModel
 from bt_tasksim.planning.arm import arm_of
 from bt_tasksim.planning.bodies import bodies_of
@@ -16,13 +17,18 @@ from bt_tasksim.scene.hulls import convex
 
 
 def prepare(world: WorldModel, robot: RobotDescription) -> None:
-    """Compute what planning and conditions ask of a world's objects and of the robot, and keep it."""
-    arm_of(robot)
-    bodies_of(robot)
-    reach_of(robot)
+    """Compute what planning and conditions ask of a world's objects and of the robot, and keep it.
+
+    A robot whose shapes are not on this computer can do what needs no planning; what does says so itself.
+    """
+    try:
+        arm_of(robot)
+        bodies_of(robot)
+        reach_of(robot)
+    except InputError:
+        pass
     for model in world.objects:
         for piece in pieces_of(model):
             convex(piece)
-        if model.solid is not None:
-            for name in ("outer", "hollow", "grips"):
-                getattr(model.solid, name)
+        if (solid := model.solid) is not None:
+            _ = (solid.outer, solid.hollow, solid.grips)

@@ -32,8 +32,8 @@ _PEAK = 1.875
 class Pace(NamedTuple):
     """How fast the tool may go: m/s, rad/s, and m/s^2.
 
-    An arm that lags behind by 0.1 s cuts the corners of a way by half the acceleration times that squared:
-    with 0.8 m/s^2 by 4 mm, which is less than what is kept clear.
+    An arm that lags behind by 0.1 s, as over a network, cuts the corners of a way by half the acceleration
+    times that squared: with 0.8 m/s^2 by 4 mm, which is less than what is kept clear.
     """
 
     speed: float

@@ -45,7 +45,7 @@ class SafetyLimits:
             frame.
         force: External force on the tool, N.
         torque: External torque about the tool's origin, Nm.
-        tracking: Largest difference of a commanded and a measured arm joint, rad, beyond what its drive lags.
+        tracking: Largest difference of a commanded and a measured arm joint, rad.
         stale: Seconds after which joint states are too old to act on.
         validity: Seconds after which a command expires and the robot holds by itself.
         watchdog: Seconds without a sign of life from the runner after which the watchdog stops the robot.

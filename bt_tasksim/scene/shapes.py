@@ -150,7 +150,7 @@ class KnownSolid:
         """See `KnownGeometry.hollow`."""
         return self.shape.hollow
 
-    @property
+    @cached_property
     def grips(self) -> Grips:
         """Where two fingers may hold it: as given, else as its kind says."""
         if self.given:

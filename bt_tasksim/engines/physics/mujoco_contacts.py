@@ -50,7 +50,8 @@ IMPRATIO = 1000.0
 """Impedance of friction over that of the normal force. The lower it is, the faster things creep under a load:
 with 100 what is held creeps by some 0.01 mm in 5 s, and a superellipsoid that stands on a small facet of its
 hull, 1 degree aslant, tips by another 0.04 degrees in 4 s, with this by 0.004. Three such turned by 11 to 17
-degrees in a random task (1050020, 1050065, 1050132), and none with this, which makes steps 15 % slower."""
+degrees in a random task (1050020, 1050065, 1050132), and none of these with this, though two others do
+(1070047, 1070096). It makes steps 15 % slower."""
 ROLLING = 5e-4
 """Metres: what an object rolls on resists with this lever times the normal force, as wood and plastic do
 (`bt_tasksim.engines.physics.rolling` has the law). Without it a cup that leans in a corner rocks for ever."""

@@ -212,8 +212,9 @@ def plausible(
     return _worst(IMPLAUSIBLE, way, can, names)
 
 
-def tracking(off: Array, limit: float, names: Sequence[str]) -> Outcome | None:
-    """Arm joints are ``off (n,)`` from where they may be expected by no more than a limit in rad."""
+def tracking(commanded: Array, measured: Array, limit: float, names: Sequence[str]) -> Outcome | None:
+    """Measured arm joints ``(n,)`` are where they were told to be, within a limit in rad."""
+    off = np.abs(commanded - measured)
     return _worst(TRACKING, off, np.full(len(off), limit), names)
 
 

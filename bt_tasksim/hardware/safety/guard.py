@@ -17,7 +17,6 @@ from bt_tasksim.core.units import MILLISECONDS
 from bt_tasksim.core.world import JointTarget
 from bt_tasksim.hardware.safety import checks
 from bt_tasksim.hardware.safety.engine import JointReading
-from bt_tasksim.hardware.safety.lagging import beyond, followed_lagging
 from bt_tasksim.hardware.safety.motion import JointMotion, braked, followed, moved, resting
 from bt_tasksim.hardware.safety.stop import RAD, SafetyStop
 from bt_tasksim.robot.description import RobotDescription
@@ -56,7 +55,6 @@ class Guard:
         self.robot, self.limits, self.forward = robot, robot.safety, forward
         self.names = robot.joints
         self._n = len(robot.arm_joints)
-        self._lag = robot.arm_drive.damping / robot.arm_drive.stiffness
         self.lower, self.upper, self.velocity, self.acceleration = _bounds(robot, robot.safety)
         self.stopped: SafetyStop | None = None
         self.begin(np.zeros(len(self.names)), 0.05)
@@ -78,7 +76,6 @@ class Guard:
         begin[n:] = np.clip(begin[n:], self.lower[n:], self.upper[n:])  # measured, and so beside its range
         self.motion = JointMotion(begin, still)
         self._reference = self.motion
-        self._expected = begin[:n].copy()
         self._tool = self.forward(self.motion.position)
         self._twist = np.zeros(6)
         self._reading: JointReading | None = None
@@ -129,7 +126,6 @@ class Guard:
             motion = self._gentler(motion)
             tool, twist = self._tool_motion(motion)
         self._stop_at(self._exceeded(motion, tool, twist))
-        self._follow(motion, self.period)
         self._reference, self.motion, self._tool, self._twist = wanted, motion, tool, twist
         return JointTarget(motion.position, motion.velocity, self.limits.validity)
 
@@ -144,16 +140,9 @@ class Guard:
         position = rest - (rest - self.motion.position) * share**2
         velocity[self._n :] = 0.0  # a hand goes where it was told, and no further
         position[self._n :] = self.motion.position[self._n :]
-        motion = JointMotion(position, velocity)
-        self._follow(motion, seconds)
-        self.motion, self._tool = motion, self.forward(position)
+        self.motion, self._tool = JointMotion(position, velocity), self.forward(position)
         before = self.forward(position - self.period * velocity)
         self._twist = checks.twist(before, self._tool, self.period)
-
-    def _follow(self, motion: JointMotion, seconds: float) -> None:
-        """The arm is expected to have followed a motion for so many seconds, behind by its drives' lag."""
-        start, end = self.motion.position[: self._n], motion.position[: self._n]
-        self._expected = followed_lagging(self._expected, start, end, seconds, self._lag)
 
     def _refused(self, wanted: JointMotion) -> Outcome | None:
         """Limits that stop, and that the command itself exceeds, whatever clipping would make of it."""
@@ -265,8 +254,7 @@ class Guard:
             elapsed = reading.stamp - before.stamp
             self._stop_at(checks.plausible(before.position[:n], arm, elapsed, self.velocity[:n], names))
         self._stop_at(self._frozen(reading, now))
-        off = beyond(arm, self._expected, self.motion.position[:n])
-        self._stop_at(checks.tracking(off, limits.tracking, names))
+        self._stop_at(checks.tracking(self.motion.position[:n], arm, limits.tracking, names))
         self._reading = reading
 
     def _frozen(self, reading: JointReading, now: float) -> Outcome | None:
@@ -308,9 +296,7 @@ class Guard:
 
     def brake(self) -> JointTarget:
         """The next target of an arm that slows down as fast as it may, for a simulation."""
-        motion = braked(self.motion, self.acceleration, self.period)
-        self._follow(motion, self.period)
-        self.motion = motion
+        self.motion = braked(self.motion, self.acceleration, self.period)
         return JointTarget(self.motion.position, self.motion.velocity, self.limits.validity)
 
 

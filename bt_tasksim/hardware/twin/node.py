@@ -24,15 +24,16 @@ import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from trajectory_msgs.msg import JointTrajectory
 
-from bt_tasksim.core import pauses
 from bt_tasksim.core.errors import BtTasksimError, InputError
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.real_time import RealTime
 from bt_tasksim.hardware.ros.setting import RosSetting, load_setting
 from bt_tasksim.hardware.twin import loop
 from bt_tasksim.hardware.twin.bridge_cleanup import clear_up, parent_has_ended
@@ -55,16 +56,17 @@ class TwinNode(Node):  # type: ignore[misc]
     Args:
         cell: The cell.
         setting: Names of topics, joints and frames.
+        real_time: Its loop.
     """
 
-    def __init__(self, cell: Cell, setting: RosSetting) -> None:
+    def __init__(self, cell: Cell, setting: RosSetting, real_time: RealTime) -> None:
         super().__init__("bt_tasksim_twin", start_parameter_services=False, enable_rosout=False)
-        self.cell, self.setting = cell, setting
+        self.cell, self.setting, self._real_time = cell, setting, real_time
         self.fault = ""
         self._delayed: deque[tuple[float, JointState]] = deque()
         self._frozen: list[float] = []
         self._said: dict[str, float] = {}
-        subscribe, publish = self.create_subscription, self.create_publisher
+        subscribe, publish = self._subscribe, self._publisher
         # Commands first: where one and the word to hold are both there, the command is taken first.
         for group, topic in (("arm", setting.arm.command), ("hand", setting.hand.command)):
             subscribe(JointTrajectory, topic, self._taking(group), 1)
@@ -84,6 +86,17 @@ class TwinNode(Node):  # type: ignore[misc]
         self._tick = 0
         self._stopped = cell.stopped
         self._worlds = 0
+
+    # Nobody asks for events of topics (such as a subscriber that does not match), and the executor goes through
+    # all that could come each time that it waits: with some tens of topics that took longer than physics.
+
+    def _publisher(self, kind: type, topic: str, depth: int) -> Any:
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        return self.create_publisher(kind, topic, depth, event_callbacks=quiet)
+
+    def _subscribe(self, kind: type, topic: str, take: Callable[[Any], None], depth: int) -> None:
+        quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
+        self.create_subscription(kind, topic, take, depth, event_callbacks=quiet)
 
     # ---- commands ---------------------------------------------------------------------------------------
 
@@ -148,7 +161,7 @@ class TwinNode(Node):  # type: ignore[misc]
             for actor, pose in zip(self.cell.configuration.objects, reading.objects, strict=True):
                 topic = setting.object_topic(actor.name)
                 if topic not in self._objects:
-                    self._objects[topic] = self.create_publisher(PoseStamped, topic, 10)
+                    self._objects[topic] = self._publisher(PoseStamped, topic, 10)
                 self._objects[topic].publish(_pose(pose, setting.objects.frame, stamp))
 
     def _on_the_wire(self, values: Array) -> list[float]:
@@ -179,6 +192,14 @@ class TwinNode(Node):  # type: ignore[misc]
         else:
             self._joints.publish(message)
 
+    def _forget_objects(self) -> None:
+        """End the topics of objects that are not in this world."""
+        if self.setting.objects is None:
+            return
+        here = [self.setting.object_topic(actor.name) for actor in self.cell.configuration.objects]
+        for topic in self._objects.keys() - set(here):
+            self.destroy_publisher(self._objects.pop(topic))
+
     # ---- the evaluation channel -------------------------------------------------------------------------
 
     def answer(self, question: dict[str, Any]) -> dict[str, Any]:
@@ -190,17 +211,18 @@ class TwinNode(Node):  # type: ignore[misc]
                     raise InputError("'load' needs a configuration as text, and a number as seed")
                 configuration = ActorConfiguration.from_json(text)
                 self.cell.load(configuration, seed)
+                self._forget_objects()
                 self.fault, self._frozen = "", []
                 self._delayed.clear()
                 self._worlds += 1
-                pauses.set_aside()
+                self._real_time.set_aside()
                 return {"done": True}
             case "picture":
                 return self._picture(question.get("known"))
             case "truth":
                 return hidden_to_json(self.cell.hidden()) | {"deepest_pair": self.cell.deepest_pair}
             case "tell":
-                return self.cell.tell()
+                return {**self.cell.tell(), "object_topics": sorted(self._objects)}
             case "fault":
                 self.fault = str(question.get("name", ""))
                 self.cell.watch(self.fault)
@@ -300,8 +322,9 @@ def main() -> int:
         print(f"twin: {error}", file=sys.stderr)
         return 2
     rclpy.init()
-    node = TwinNode(cell, setting)
-    pauses.set_aside()
+    real_time = RealTime()
+    node = TwinNode(cell, setting, real_time)
+    real_time.set_aside()
     print(f"ready {server.port}", flush=True)
     try:
         run(node, server, options.parent)
@@ -312,6 +335,7 @@ def main() -> int:
         return 1
     finally:
         server.close()
+        real_time.close()
         node.destroy_node()
         rclpy.try_shutdown()
         if options.home and parent_has_ended(options.parent):

@@ -1,6 +1,5 @@
 """Planning beside a robot's loop: the arm stands meanwhile, and then all is as if no time had passed."""
 
-import sys
 import threading
 
 import numpy as np
@@ -9,7 +8,7 @@ from py_trees.common import Status
 
 from bt_tasksim.concept import activation
 from bt_tasksim.concept.model import ConceptModel
-from bt_tasksim.concept.planner import TURNS, Planner
+from bt_tasksim.concept.planner import Planner
 from bt_tasksim.core.errors import LeafError, NoWayError
 from bt_tasksim.core.outcomes import CANNOT_START, NO_WAY, register_reason
 from bt_tasksim.core.world import Command
@@ -123,6 +122,21 @@ def test_no_way_is_found_out_later_and_others_have_their_turn(robot):
     assert other.status == Status.RUNNING
 
 
+def test_no_way_from_where_the_arm_was_moving_is_looked_for_anew(robot):
+    leaf = pondering(NoWayError("a wall is there"))
+    stage = robot(leaf)
+    stage.tick()
+    stage.world.put(arm_position=stage.world.now.arm_position + np.eye(7)[0] * 0.1)
+    stage.world.bend = lambda posture=None: None
+    stage.tick()
+    leaf.model.free.set()
+    planned(leaf)
+    leaf.model.error = None  # from here there is one
+    assert stage.tick() == Status.RUNNING
+    planned(leaf)
+    assert stage.tick() == Status.RUNNING and not leaf.plans
+
+
 def test_an_exception_is_the_leafs_own(robot):
     leaf = pondering(ValueError("too large"))
     stage = robot(leaf)
@@ -171,11 +185,3 @@ def test_whether_it_can_begin_is_asked_beside_the_loop_too(robot):
     assert stage.tick() == Status.FAILURE
     assert leaf.outcome.is_a(CANNOT_START) and leaf.outcome.is_a(NOTHING)
     assert leaf.model.values_seen == [], "it did not begin"
-
-
-def test_threads_take_short_turns_while_there_is_a_robot():
-    before = sys.getswitchinterval()
-    planner = Planner()
-    assert sys.getswitchinterval() <= TURNS
-    planner.close()
-    assert sys.getswitchinterval() == before

@@ -331,28 +331,6 @@ def test_states_that_are_not_to_be_trusted_stop(state, now, name, sentence):
         guard.command(target(START))
 
 
-@pytest.mark.parametrize(("lags", "stops"), [(0.0, False), (1.0, False), (1.4, False), (None, True)])
-def test_an_arm_that_lags_as_its_drives_do_is_not_off_its_command(lags, stops):
-    """At 2 rad/s the shipped drives are 0.2 rad behind; an arm that does not move at all is stopped."""
-    guard = guard_of(tracking=0.15)
-    lag, at, way, stopped = ROBOT.arm_drive.damping / ROBOT.arm_drive.stiffness, START.copy(), 0.0, False
-    for k in range(14):
-        speed = 2.0 * min(1.0, (k + 1) / 5)
-        way += speed * PERIOD
-        there = offset(way)
-        guard.command(target(there, offset(speed) - START))
-        at = at if lags is None else there if lags == 0.0 else at + (there - at) * (
-            1.0 - np.exp(-PERIOD / (lags * lag))
-        )  # fmt: skip
-        try:
-            guard.reading(reading(at, 10.0 + PERIOD * k), 10.0 + PERIOD * k)
-        except SafetyStop as error:
-            assert error.reason.name in ("tracking_error", "frozen_joint_states")
-            stopped = True
-            break
-    assert stopped == stops
-
-
 def test_a_jump_of_a_measured_joint_stops():
     guard = guard_of(tracking=10.0)
     guard.reading(reading(), 10.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gc
 import json
 import logging
 import random
@@ -23,7 +24,9 @@ import yaml
 from benchmarks.any_tree.episodes import Conditions, player_of
 from benchmarks.faults import Bench, Seen, bench_of, measure
 from benchmarks.sweep import sweeping
+from bt_tasksim import Runner
 from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.real_time import TURNS
 from bt_tasksim.core.world import Hidden
 from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
 from bt_tasksim.hardware.ros.websocket import WebSocket
@@ -376,3 +379,38 @@ def test_bytes_that_are_no_protocol(bench: Bench) -> None:
         assert runner.run(0).status.name == "SUCCESS"
     finally:
         runner.pipeline.close()
+
+
+def test_topics_of_objects_end_with_their_world(bench: Bench) -> None:
+    def topics(of: list[str]) -> list[str]:
+        return [bench.setting.object_topic(name) for name in of]
+
+    for name in ("pick_and_throw", "shelf_to_shelf"):
+        configuration = load_source(name).scene.sample(0)
+        names = sorted(actor.name for actor in configuration.objects)
+        bench.evaluation.load(configuration, 0)
+        end = time.monotonic() + 5.0
+        while (told := bench.evaluation.tell()["object_topics"]) != topics(names):
+            assert time.monotonic() < end, (told, names)
+            time.sleep(0.05)
+
+
+def test_a_runner_of_a_robot_is_in_real_time_until_it_is_closed(bench: Bench) -> None:
+    usual = sys.getswitchinterval()
+    runner, _ = bench.sweeping()
+    try:
+        assert sys.getswitchinterval() <= TURNS < usual
+        bench.evaluation.load(bench.configuration)
+        runner.begin(0)
+        assert gc.get_freeze_count() > 0 and runner.context.planner is not None
+    finally:
+        runner.close()
+    assert sys.getswitchinterval() == usual and gc.get_freeze_count() == 0
+
+
+def test_a_runner_that_cannot_be_made_leaves_nothing_changed(bench: Bench) -> None:
+    usual, scene = sys.getswitchinterval(), load_source("pick_and_throw").scene
+    options = EngineOptions(engines=f"ros:127.0.0.1:{bench.twin.port}")
+    with pytest.raises(InputError):
+        Runner(lambda: "no tree", scene, options)
+    assert sys.getswitchinterval() == usual
