@@ -59,8 +59,8 @@ _INTERPRETER = _Interpreter()
 class RealTime(Closing):
     """A loop in real time, from its making until it is closed.
 
-    An application that has frozen objects itself before takes care of its collector, and nothing is done about
-    that.
+    An application that has frozen objects itself before takes care of its collector, and nothing is done
+    about that.
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class RealTime(Closing):
         _INTERPRETER.open()
 
     def set_aside(self) -> None:
-        """Collect what is garbage now, which takes a moment, and have later collections pass the rest over."""
+        """Collect garbage now, which takes a moment, and have later collections pass over what is left."""
         _INTERPRETER.set_aside()
 
     def close(self) -> None:

@@ -87,8 +87,8 @@ class TwinNode(Node):  # type: ignore[misc]
         self._stopped = cell.stopped
         self._worlds = 0
 
-    # Nobody asks for events of topics (such as a subscriber that does not match), and the executor goes through
-    # all that could come each time that it waits: with some tens of topics that took longer than physics.
+    # Nobody asks for events of topics (such as a subscriber that does not match), and the executor goes
+    # through all that could come each time that it waits: with some tens of topics longer than physics takes.
 
     def _publisher(self, kind: type, topic: str, depth: int) -> Any:
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
