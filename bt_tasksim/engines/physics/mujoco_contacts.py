@@ -11,6 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bt_tasksim.engines.physics.rolling import SPINNING_RESISTANCE
+
 if TYPE_CHECKING:
     import mujoco as mj
 
@@ -46,12 +48,10 @@ SOLIMP = (0.99, 0.998, 0.001, 0.5, 2.0)
 masses that touch, so that it must carry a light cup which a heavy arm sets down."""
 HAND_SOLIMP = (0.98, 0.99, 0.001, 0.5, 2.0)
 """The same of what the robot presses on."""
-IMPRATIO = 1000.0
+IMPRATIO = 100.0
 """Impedance of friction over that of the normal force. The lower it is, the faster things creep under a load:
-with 100 what is held creeps by some 0.01 mm in 5 s, and a superellipsoid that stands on a small facet of its
-hull, 1 degree aslant, tips by another 0.04 degrees in 4 s, with this by 0.004. Three such turned by 11 to 17
-degrees in a random task (1050020, 1050065, 1050132), and none of these with this, though two others do
-(1070047, 1070096). It makes steps 15 % slower."""
+with this what is held creeps by some 0.01 mm in 5 s. With 1000 steps take 15 % longer, and of 54 things on
+slopes that they should stick to three slid by 0.2 to 0.7 mm in a second."""
 ROLLING = 5e-4
 """Metres: what an object rolls on resists with this lever times the normal force, as wood and plastic do
 (`bt_tasksim.engines.physics.rolling` has the law). Without it a cup that leans in a corner rocks for ever."""
@@ -125,14 +125,15 @@ def add_pair(spec: mj.MjSpec, a: Solid, b: Solid) -> None:
 
     Friction is Coulomb's with an elliptic cone, its coefficient the mean of both, as in PhysX. A pad's
     patch of radius r that presses with the force f resists twisting with up to friction * r * f; an object
-    that lies or stands on something resists rolling.
+    that lies or stands on something resists rolling and spinning.
     """
     friction = (a.surface.friction + b.surface.friction) / 2
     patch = max(a.surface.patch, b.surface.patch)
     pair = spec.add_pair(name=f"{a.name} {b.name}", geomname1=a.name, geomname2=b.name)
     robot = not {"link", "base"}.isdisjoint((a.body.role, b.body.role))
     pair.condim = (4 if patch > 0.0 else 3) if robot else 6
-    pair.friction = [friction, friction, max(friction * patch, _NO_TWIST), ROLLING, ROLLING]
+    twist = max(friction * patch, _NO_TWIST) if robot else SPINNING_RESISTANCE
+    pair.friction = [friction, friction, twist, ROLLING, ROLLING]
     pair.solreffriction = list(FRICTION_SOLREF)
     grips = max(a.body.tip, b.body.tip) >= 0 and "object" in (a.body.role, b.body.role)
     pair.solref = list(TIP_SOLREF if grips else HAND_SOLREF if robot else SOLREF)

@@ -192,7 +192,7 @@ class ContactReader:
 
 
 def resist_rolling(world: World, lying: _Pairs, step: float, hand_force: list[float]) -> None:
-    """Rolling resistance of what lies free, for the next steps; PhysX itself knows none.
+    """Rolling and spinning resistance of what lies free, for the next steps; PhysX itself knows none.
 
     It is PhysX's own damping, set anew for each step: unlike a torque, that lets things fall asleep.
 
