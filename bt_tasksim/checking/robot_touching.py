@@ -14,9 +14,8 @@ from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.execution.clear_start import DEEP, LinkPart, link_part
+from bt_tasksim.robot.link_parts import DEEP, LinkPart, link_parts
 from bt_tasksim.robot.urdf_links import load_links
-from bt_tasksim.robot.urdf_visuals import load_collisions
 
 if TYPE_CHECKING:
     from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
@@ -41,7 +40,7 @@ def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Rep
     """
     robot = kinematics.robot
     try:
-        parts = [part for shape in load_collisions(robot.urdf) if (part := link_part(shape)) is not None]
+        parts = link_parts(robot)
     except InputError as error:
         report.add(WARNING, robot.name, "urdf", f"links were not compared: {error}", "put the files there")
         return

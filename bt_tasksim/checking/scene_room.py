@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.execution.clear_start import (
-    DEEP,
     TOUCHING,
     fixture_in_robot,
     links_at_rest,
     object_in_robot,
 )
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.link_parts import DEEP
 from bt_tasksim.scene.configuration import ActorConfiguration
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError, NoDrawError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import RobotDescription
-from bt_tasksim.robot.urdf_visuals import LinkVisual, load_collisions
+from bt_tasksim.robot.link_parts import DEEP, LinkPart, link_parts
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.fixtures import Fixture
 from bt_tasksim.scene.scene import Scene, WorldSource
@@ -19,17 +19,6 @@ from bt_tasksim.scene.shapes import BoxPiece, Piece
 
 TOUCHING = 0.001
 """Metres that an object may be in a link."""
-DEEP = 0.01
-"""Metres that furniture may be in a link, and links in each other: a robot stands on something, and hulls are
-larger than the links."""
-
-
-class LinkPart(NamedTuple):
-    """A convex part of a link, as coal has it, at ``pose (7,)`` in the link's frame."""
-
-    link: str
-    form: Any
-    pose: Array
 
 
 class Inside(NamedTuple):
@@ -104,31 +93,11 @@ def object_in_robot(links: Sequence[tuple[LinkPart, Any]], world: ActorConfigura
     return _deepest(links, np.array(actor.pose), actor.shape().collision)
 
 
-def link_part(shape: LinkVisual) -> LinkPart | None:
-    """A shape as coal has it."""
-    from bt_tasksim.core.narrow_phase import coal
-    from bt_tasksim.engines.physics.mujoco_robot import mesh_hull
-    from bt_tasksim.scene.hulls import convex
-
-    match shape.kind:
-        case "box":
-            form = coal.Box(*shape.size)
-        case "sphere":
-            form = coal.Sphere(shape.size[0])
-        case "cylinder":
-            form = coal.Cylinder(*shape.size)
-        case _:
-            assert shape.mesh is not None
-            x, y, z = shape.size
-            form = convex(mesh_hull(shape.mesh, (x, y, z)))
-    return LinkPart(shape.link, form, np.array(shape.pose))
-
-
 def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
     from bt_tasksim.core.narrow_phase import coal
     from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 
-    parts = [part for shape in load_collisions(robot.urdf) if (part := link_part(shape)) is not None]
+    parts = link_parts(robot)
     joints = np.concatenate([robot.rest, robot.hand_open])
     at = PinocchioKinematics(robot).link_poses(joints, sorted({part.link for part in parts}))
     frames = [poses.multiply(at[part.link], part.pose) for part in parts]

@@ -14,13 +14,13 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull, QhullError
 
+from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.models import full_model
 from bt_tasksim.robot.urdf_links import load_links
-from bt_tasksim.scene.hulls import convex
 
 _POSTURES = 400
 """Random postures by which pairs of bodies are told apart."""
