@@ -6,6 +6,7 @@ that touch in nearly every posture: these are drawn so.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,10 +41,12 @@ def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Rep
     """
     robot = kinematics.robot
     try:
-        parts = link_parts(robot)
+        parts, left_out = link_parts(robot)
     except InputError as error:
         report.add(WARNING, robot.name, "urdf", f"links were not compared: {error}", "put the files there")
         return
+    for said in left_out:
+        report.add(WARNING, robot.name, "urdf", said, "give the shape a thickness, or leave it out")
     pairs = _pairs(kinematics, parts)
     rng = np.random.default_rng(0)
     anywhere = rng.uniform(robot.arm_lower, robot.arm_upper, (DRAWN, len(robot.rest)))
@@ -75,7 +78,7 @@ def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Rep
         report.add(WARNING, robot.name, "arm", what, remedy)
 
 
-def _pairs(kinematics: PinocchioKinematics, parts: list[LinkPart]) -> list[tuple[int, int]]:
+def _pairs(kinematics: PinocchioKinematics, parts: Sequence[LinkPart]) -> list[tuple[int, int]]:
     """Numbers of parts of links that are no neighbours; the hand's fingers may touch one another."""
     links = {item.link: item for item in load_links(kinematics.robot.urdf)}
     hand = {item.link for item in links.values() if item.joint in kinematics.robot.hand_joints}
@@ -98,7 +101,7 @@ def _pairs(kinematics: PinocchioKinematics, parts: list[LinkPart]) -> list[tuple
 
 
 def _overlaps(
-    kinematics: PinocchioKinematics, arm: Array, parts: list[LinkPart], pairs: list[tuple[int, int]]
+    kinematics: PinocchioKinematics, arm: Array, parts: Sequence[LinkPart], pairs: list[tuple[int, int]]
 ) -> dict[tuple[str, str], float]:
     """Metres by which links overlap in a posture, by their names, where it is more than `DEEP`."""
     from bt_tasksim.core.narrow_phase import coal

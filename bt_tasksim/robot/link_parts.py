@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bt_tasksim.core.errors import NoVolumeError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.mesh_hulls import mesh_hull
@@ -28,22 +29,45 @@ class LinkPart(NamedTuple):
     pose: Array
 
 
-def link_parts(robot: RobotDescription) -> list[LinkPart]:
-    """The parts of a robot's links, link by link, made once.
+class LinkParts(NamedTuple):
+    """The parts of a robot's links, link by link.
+
+    Attributes:
+        parts: Those that are bodies.
+        left_out: One sentence for each of the others: which it is, and why it is none.
+    """
+
+    parts: tuple[LinkPart, ...]
+    left_out: tuple[str, ...]
+
+
+def link_parts(robot: RobotDescription) -> LinkParts:
+    """The parts of a robot's links, made once.
 
     Raises:
-        InputError: A file of its shapes is missing or cannot be read, or a shape is no body.
+        InputError: The URDF, or a file of its shapes, is missing or cannot be read.
     """
-    found: list[LinkPart] = robot.derived("link parts", _link_parts)
+    found: LinkParts = robot.derived("link parts", _link_parts)
     return found
 
 
-def _link_parts(robot: RobotDescription) -> list[LinkPart]:
-    return [LinkPart(shape.link, _form(shape), np.array(shape.pose)) for shape in load_collisions(robot.urdf)]
+def _link_parts(robot: RobotDescription) -> LinkParts:
+    parts, left_out = list[LinkPart](), list[str]()
+    for shape in load_collisions(robot.urdf):
+        try:
+            parts.append(LinkPart(shape.link, _form(shape), np.array(shape.pose)))
+        except NoVolumeError as error:
+            left_out.append(f"a collision shape of '{shape.link}' was left out: {error}")
+    return LinkParts(tuple(parts), tuple(left_out))
 
 
 def _form(shape: LinkVisual) -> Any:
-    """A shape as coal has it."""
+    """A shape as coal has it.
+
+    Raises:
+        NoVolumeError: It is no body.
+        InputError: Its file cannot be read.
+    """
     from bt_tasksim.core.convex_hulls import convex
     from bt_tasksim.core.narrow_phase import coal
 

@@ -17,7 +17,7 @@ def placed(piece: Piece, pose: Array) -> tuple[Any, Any]:
     """A piece of a body at ``pose (7,)`` as coal's shape, and where it is.
 
     Raises:
-        InputError: The piece has no volume.
+        NoVolumeError: The piece is no body.
     """
     if isinstance(piece, BoxPiece):
         frame, form = poses.multiply(pose, piece.pose), coal.Box(*(2 * piece.half_size).tolist())
