@@ -34,20 +34,36 @@ class Inside(NamedTuple):
     depth: float
 
 
-def clear_draw(scene: WorldSource, seed: int, stream: str, robot: RobotDescription) -> ActorConfiguration:
-    """A world of a scene, in simulation.
+def clear_draw(
+    scene: WorldSource,
+    seed: int,
+    stream: str,
+    robot: RobotDescription,
+    stage: int | None = None,
+    real: bool = False,
+) -> ActorConfiguration:
+    """A world of a scene, as whatever runs, judges or trains in it draws it.
 
-    Worlds that are not drawn from a `Scene`, and those that begin with the hand elsewhere than at rest, are
-    not looked at.
+    Worlds of a real robot, those that are not drawn from a `Scene`, and those that begin with the hand
+    elsewhere than at rest, are not looked at.
+
+    Args:
+        scene: Where it is drawn from.
+        seed: See `Scene.sample`.
+        stream: See `Scene.sample`.
+        robot: The robot.
+        stage: See `Scene.sample`.
+        real: The robot is a real one: what is drawn only says what there is.
 
     Raises:
         NoDrawError: No world can be drawn with this seed, or something starts inside the robot.
+        InputError: See `Scene.sample`.
 
     Warns:
         BtTasksimWarning: A shape of the robot or of an object is missing, or no body, and is not looked at.
     """
-    world = scene.sample(seed, stream)
-    if not isinstance(scene, Scene) or world.joint_position or world.hand_start:
+    world = scene.sample(seed, stream, stage)
+    if real or not isinstance(scene, Scene) or world.joint_position or world.hand_start:
         return world
     links: list[tuple[LinkPart, Any]] = robot.derived("links that may be started in", _links_there)
     for fixture in world.fixtures:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bt_tasksim import Fixture, ObjectSpec, Scene, evaluate, load_robot
+from bt_tasksim.checking.recording import record
 from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.core.errors import BtTasksimWarning, NoDrawError
 from bt_tasksim.execution.clear_start import clear_draw
@@ -53,6 +54,12 @@ def test_a_run_refuses_it_and_an_evaluation_counts_it_as_no_draw():
         runner.run(inside[0])
     found = evaluate(Grasp("some", timeout=0.1), scene, episodes=6, seed=0)
     assert [o.seed for o in found.outcomes if o.reason == "no_draw"] == inside
+
+
+def test_a_recording_for_a_check_refuses_it():
+    found = record(Grasp("near", timeout=0.1), Scene(objects={"near": NEAR}), seeds=(3,))
+    (error,) = found.errors
+    assert isinstance(error, NoDrawError) and found.ends == [str(error)]
 
 
 FLAT_MESH = "v 0 0 0\nv 0.1 0 0\nv 0.1 0.1 0\nv 0 0.1 0\nf 1 2 3\nf 1 3 4\n"
