@@ -348,10 +348,7 @@ class Player(Closing):
             self._batch = BatchRunner(self._build, scene, job.options, worlds, job.threads, job.longest)
         index_of = {seed: index for index, seed in enumerate(seeds)}
         for seed, found in self._batch.run(seeds, stream):
-            if isinstance(found, InputError) and not isinstance(found, NoDrawError | NotToldApartError):
-                raise found
-            outcome = unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else in_short(found)
-            yield index_of[seed], outcome
+            yield index_of[seed], of_batch(seed, found)
 
 
 def play(player: Player, seeds: Sequence[int], stream: str) -> Iterator[tuple[int, EpisodeOutcome]]:
@@ -380,6 +377,17 @@ def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOut
         if isinstance(error, MachineError) and (isinstance(error, LostEngine) or runner.options.real):
             raise  # an engine that is not there any more, or a robot, says nothing about the tree
         return unfinished(seed, error, time.perf_counter() - started)
+
+
+def of_batch(seed: int, found: Result | BtTasksimError) -> EpisodeOutcome:
+    """One episode of a batch; errors count as those in `episode`.
+
+    Raises:
+        InputError: Tree or scene are no good.
+    """
+    if isinstance(found, InputError) and not isinstance(found, NoDrawError | NotToldApartError):
+        raise found
+    return unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else in_short(found)
 
 
 def unfinished(seed: int, error: BtTasksimError, seconds: float) -> EpisodeOutcome:

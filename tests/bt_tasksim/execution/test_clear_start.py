@@ -52,8 +52,9 @@ def test_a_run_refuses_it_and_an_evaluation_counts_it_as_no_draw():
     assert 0 < len(inside) < 6
     with Runner(Grasp("some", timeout=0.1), scene) as runner, pytest.raises(NoDrawError):
         runner.run(inside[0])
-    found = evaluate(Grasp("some", timeout=0.1), scene, episodes=6, seed=0)
-    assert [o.seed for o in found.outcomes if o.reason == "no_draw"] == inside
+    for tree in (Grasp("some", timeout=0.1), lambda: Grasp("some", timeout=0.1)):
+        found = evaluate(tree, scene, episodes=6, seed=0)
+        assert [o.seed for o in found.outcomes if o.reason == "no_draw"] == inside
 
 
 def test_a_recording_for_a_check_refuses_it():
