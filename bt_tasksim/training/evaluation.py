@@ -38,6 +38,7 @@ from bt_tasksim.core.plugins import loaded
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.batch_runner import BatchRunner
+from bt_tasksim.execution.given import checked_longest
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import LONGEST, Runner
@@ -71,10 +72,11 @@ class Job:
         batch: How many worlds are run at once in each process, by default `usual_batch`. Outcomes do not
             depend on it.
         threads: How many threads step them.
-        longest: Seconds of an episode after which it is stopped.
+        longest: Seconds of an episode after which it is stopped; kept as a float.
 
     Raises:
-        InputError: There is no world or thread, or these engines have no worlds in batches.
+        InputError: The longest time is no positive number, there is no world or thread, or these engines have
+            no worlds in batches.
     """
 
     tree: str
@@ -88,6 +90,7 @@ class Job:
     longest: float = LONGEST
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "longest", checked_longest(self.longest))
         batch = 1 if self.batch is None else self.batch
         if self.batch == 1 and self.options.laws == "torch":
             raise InputError("--laws torch is for batches of worlds: give a --batch of 2 or more, or none")
@@ -422,8 +425,14 @@ def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
     code = own_code(runner.tree, job.tree, job.plugins, runner.scene)
     subject = evaluation_subject(runner.tree, runner.scene, job.options, policies_of(runner), code, stream)
     if job.longest != LONGEST:  # earlier files say nothing of it
-        subject["longest time of an episode"] = f"{job.longest!r} s"
+        subject["longest time of an episode"] = f"{_number(job.longest)} s"
     return subject
+
+
+def _number(value: float) -> str:
+    """A number as earlier files have it, where six digits say all of it; else with all its digits."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
 
 
 def _name(job: Job) -> str:
