@@ -27,7 +27,10 @@ def test_things_of_the_same_words_are_told_apart():
     report.done(word)
     report.add(ERROR, "a", "", "is wrong", "mend it")
     report.done(word)
-    assert report.lines()[1:] == ["ok: the same; 0 errors, 0 warnings", "not ok: the same; 1 error, 0 warnings"]
+    assert report.lines()[1:] == [
+        "ok: the same; 0 errors, 0 warnings",
+        "not ok: the same; 1 error, 0 warnings",
+    ]
 
 
 def test_what_was_checked_is_said_by_done_alone():
