@@ -161,7 +161,7 @@ class Bring(Carry):
         via = self._via(now, goal, origin, grip)
         arrays = [tool_goal, goal[:, 2] - self.hover, middle, turns, *self._exits(seen), *via]
         goals, floors, middles, turned, outs, intos, *vias = host_numbers(arrays)
-        put_down, later = self._put_down(seen), self._later(seen)
+        put_down = self._put_down(seen)
         ways: list[list[Array]] = []
         routes: dict[int, list[Route]] = {}
         for k, view in enumerate(found):
@@ -170,6 +170,7 @@ class Bring(Carry):
             else:
                 supports = supports_of(view, self.to) if self.to is not None else frozenset()
                 floor = float(floors[k]) if put_down else None
+                later = self._later(seen, k)
                 options = self._options(view, later)
                 aside = None
                 if self.to is not None and options is not None and put_down:
@@ -254,16 +255,17 @@ class Bring(Carry):
 
         Args:
             view: The world.
-            later: Objects that go there, too, after it.
+            later: Objects that may still go there, too.
         """
         if self.to is None:
             return None
         hovers = [share * self.hover for share in LOWER]
         return preferred_options(view, self.target, self.to, hovers, later)
 
-    def _later(self, seen: Seen) -> list[str]:
-        """Objects that the tree brings to the same place, after this one."""
-        found = [getattr(model, "actor", None) for model in seen.later if model.values.get("to") == self.to]
+    def _later(self, seen: Seen, row: int) -> list[str]:
+        """Objects that the tree may still bring to the same place, in one world."""
+        coming = seen.to_come(row)
+        found = [getattr(model, "actor", None) for model in coming if model.values.get("to") == self.to]
         return [name for name in dict.fromkeys(found) if name is not None and name != self.target]
 
     def _low(self, view: WorldView, goals: WayEnds, later: Sequence[str]) -> WayEnds:

@@ -76,7 +76,7 @@ def preferred_options(
         target: The object.
         reference: The place, or the other object.
         hovers: Free heights below it, metres; over a container, above its rim.
-        later: Objects that are put there, too, after this one.
+        later: Objects that may still be put there, too.
     """
     place, now = view.world.places.get(reference), view.objects[target][3:]
     if place is not None and place.container:
@@ -102,7 +102,7 @@ def drops(view: WorldView, target: str, place: PlaceModel, later: Sequence[str] 
         view: The world.
         target: The object.
         place: The container.
-        later: Objects that are to fall into it after this one; those that lie there already do not count.
+        later: Objects that may still fall into it; those that lie there already do not count.
     """
     frame, rim = reference_frame(view, place.name)
     model, now, turns = view.model(target), view.objects[target][3:], headings()

@@ -13,12 +13,12 @@ import numpy as np
 
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
+from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.closing import Squeeze, closing_of
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import box_corners
 from bt_tasksim.robot.kinematics.hand import standing_side
-from bt_tasksim.scene.hulls import convex
 
 SLANTED = 0.01
 """Metres by which the middle of an action is deeper for a horizontal approach than for one from above: where

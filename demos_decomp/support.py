@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.world import is_container
 from bt_tasksim.demos_decomp.log import Demonstration, Floats, Surface
 from bt_tasksim.demos_decomp.signals import SmoothMotion
 
@@ -66,7 +67,7 @@ def supports_under(
     for name, surface in shown.places.items():
         if over(surface, at[:3]):
             gap = bottom - float(surface.pose[2])
-            support = Support(name, surface.pose[:3], gap, surface.kind == "bin")
+            support = Support(name, surface.pose[:3], gap, is_container(surface.kind))
             found.append((gap, float(np.prod(surface.extent)), support))
     for name, track in shown.objects.items():
         other = motion.objects[name][index]

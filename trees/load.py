@@ -22,6 +22,7 @@ from bt_tasksim.core.former import advice
 from bt_tasksim.core.plugins import line_in
 from bt_tasksim.policy.policy import concept_name
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.meshes_beside import with_meshes_beside
 from bt_tasksim.scene.scene import Scene, WorldSource
 from bt_tasksim.trees.check import check_tree
 
@@ -357,7 +358,7 @@ def _made(build: Any, robot: str | None, path: Path) -> Scene:
             f"'{path}': scene() gives robot '{made.robot}', though --robot asks for '{robot}': "
             "pass its argument robot on to Scene(robot)"
         )
-    return made
+    return with_meshes_beside(made, path.resolve().parent)
 
 
 def tree_module(tree: str) -> str:

@@ -269,7 +269,7 @@ def _physical(task: Task, configuration: ActorConfiguration) -> tuple[str, str] 
         if actor.mass * GRAVITY > 2 * friction * FINGER_FORCE:
             return "too heavy", f"{step.target} weighs {actor.mass:.2f} kg"
         place = places.get(step.place)
-        if place is not None and place.kind == "bin" and not _fits(model, place.extent):
+        if place is not None and place.container and not _fits(model, place.extent):
             return "too large for the container", f"{step.target} does not fit into {step.place}"
     return None
 

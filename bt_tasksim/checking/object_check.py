@@ -70,7 +70,7 @@ def check_object(name: str, spec: ObjectSpec, robot: str = "panda", report: Repo
         report.add(WARNING, name, "mass", f"has {found}", "see its mass (kg) and its size (m)")
     _check_given(name, spec, load_robot(robot).opening, report)
     check_scene(scene, report)
-    report.checked[-1] = f"object {name}, {sides} mm, for {scene.robot}: size, density, grips, reach, rest"
+    report.done_rather(f"object {name}, {sides} mm, for {scene.robot}: size, density, grips, reach, rest")
     return report
 
 

@@ -16,6 +16,7 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.errors import BtTasksimError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden
+from bt_tasksim.execution.clear_start import clear_draw
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.policy.policy import Action, Decidable, Policy, ProgrammedPolicy, ViewT
@@ -142,7 +143,7 @@ def record(
             if explore and number > 0:
                 spy._rng = np.random.default_rng(seed)
         try:
-            configuration = scene.sample(seed, stream, stage)
+            configuration = clear_draw(scene, seed, stream, runner.robot, stage, runner.pipeline.real)
             result = runner.finish(configuration, runner.reset(configuration))
             out.ends.append(result.why)
         except BtTasksimError as error:

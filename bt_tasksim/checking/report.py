@@ -41,19 +41,26 @@ class Report:
 
     Attributes:
         findings: What is wrong.
-        checked: What was checked, a line for each thing.
         seen: What was measured, in lines to read.
     """
 
     findings: list[Finding] = field(default_factory=list)
-    checked: list[str] = field(default_factory=list)
     seen: list[str] = field(default_factory=list)
-    _until: list[int] = field(default_factory=list)
+    _done: list[tuple[str, int]] = field(default_factory=list, init=False)
+    """What was checked, and up to which finding it is about that."""
+
+    @property
+    def checked(self) -> tuple[str, ...]:
+        """What was checked, a line for each thing."""
+        return tuple(words for words, _ in self._done)
 
     def done(self, words: str) -> None:
         """Something was checked, and what was found since the last time is about it."""
-        self.checked.append(words)
-        self._until.append(len(self.findings))
+        self._done.append((words, len(self.findings)))
+
+    def done_rather(self, words: str) -> None:
+        """What was checked last is better said in these words."""
+        self._done[-1] = words, self._done[-1][1]
 
     @property
     def errors(self) -> int:
@@ -72,9 +79,8 @@ class Report:
     def _judged(self) -> list[str]:
         """A line for each thing that was checked: whether it is ok, and how much was found about it."""
         lines, first = [], 0
-        for words, until in zip(self.checked, self._until, strict=True):
-            until = len(self.findings) if words is self.checked[-1] else until
-            own = self.findings[first:until]
+        for k, (words, until) in enumerate(self._done, 1):
+            own = self.findings[first : until if k < len(self._done) else None]
             errors = sum(f.level == ERROR for f in own)
             counted = f"{_count(errors, 'error')}, {_count(len(own) - errors, 'warning')}"
             lines.append(f"{'not ok' if errors else 'ok'}: {words}; {counted}")

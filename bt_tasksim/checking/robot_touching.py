@@ -6,6 +6,7 @@ that touch in nearly every posture: these are drawn so.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +15,8 @@ from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.execution.clear_start import DEEP, LinkPart, link_part
+from bt_tasksim.robot.link_parts import DEEP, LinkPart, link_parts
 from bt_tasksim.robot.urdf_links import load_links
-from bt_tasksim.robot.urdf_visuals import load_collisions
 
 if TYPE_CHECKING:
     from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
@@ -41,10 +41,12 @@ def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Rep
     """
     robot = kinematics.robot
     try:
-        parts = [part for shape in load_collisions(robot.urdf) if (part := link_part(shape)) is not None]
+        parts, left_out = link_parts(robot)
     except InputError as error:
         report.add(WARNING, robot.name, "urdf", f"links were not compared: {error}", "put the files there")
         return
+    for said in left_out:
+        report.add(WARNING, robot.name, "urdf", said, "give the shape a thickness, or leave it out")
     pairs = _pairs(kinematics, parts)
     rng = np.random.default_rng(0)
     anywhere = rng.uniform(robot.arm_lower, robot.arm_upper, (DRAWN, len(robot.rest)))
@@ -76,7 +78,7 @@ def check_touching(kinematics: PinocchioKinematics, postures: Array, report: Rep
         report.add(WARNING, robot.name, "arm", what, remedy)
 
 
-def _pairs(kinematics: PinocchioKinematics, parts: list[LinkPart]) -> list[tuple[int, int]]:
+def _pairs(kinematics: PinocchioKinematics, parts: Sequence[LinkPart]) -> list[tuple[int, int]]:
     """Numbers of parts of links that are no neighbours; the hand's fingers may touch one another."""
     links = {item.link: item for item in load_links(kinematics.robot.urdf)}
     hand = {item.link for item in links.values() if item.joint in kinematics.robot.hand_joints}
@@ -99,7 +101,7 @@ def _pairs(kinematics: PinocchioKinematics, parts: list[LinkPart]) -> list[tuple
 
 
 def _overlaps(
-    kinematics: PinocchioKinematics, arm: Array, parts: list[LinkPart], pairs: list[tuple[int, int]]
+    kinematics: PinocchioKinematics, arm: Array, parts: Sequence[LinkPart], pairs: list[tuple[int, int]]
 ) -> dict[tuple[str, str], float]:
     """Metres by which links overlap in a posture, by their names, where it is more than `DEEP`."""
     from bt_tasksim.core.narrow_phase import coal

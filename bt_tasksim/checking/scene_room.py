@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.execution.clear_start import (
-    DEEP,
     TOUCHING,
     fixture_in_robot,
     links_at_rest,
     object_in_robot,
 )
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.link_parts import DEEP, link_parts
 from bt_tasksim.scene.configuration import ActorConfiguration
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ def check_room(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repor
         what = f"was not compared with what stands there: {error}"
         report.add(WARNING, scene.name, "robot", what, "put the files of its URDF there")
         return
+    for said in link_parts(robot).left_out:
+        report.add(WARNING, robot.name, "urdf", said, "give the shape a thickness, or leave it out")
     for fixture in worlds[0].fixtures:
         link, depth = fixture_in_robot(links, fixture)
         if depth > DEEP:

@@ -255,7 +255,7 @@ def _snapped(direction: Array) -> Array:
 
 def _corners(part: LinkVisual) -> Array:
     """Corners ``(n, 3)`` of a shape, or of the box about it, in its own frame."""
-    from bt_tasksim.engines.physics.mujoco_robot import mesh_hull
+    from bt_tasksim.robot.mesh_hulls import mesh_hull
 
     if part.kind == "mesh":
         assert part.mesh is not None

@@ -111,9 +111,12 @@ class Activation:
         """It waits for a plan, see `bt_tasksim.concept.planner`."""
         return bool(self._plans)
 
-    def drop_plans(self) -> None:
-        """Wait for no plan any more."""
-        self._plans.clear()
+    def stopped(self, rows: Array) -> None:
+        """It is stopped in worlds ``(k,)``, where it acts or has ended: what it has done counts no more."""
+        self._context.note(self._model, False, rows)
+        self._context.withdraw(self._leaf, rows)
+        for row in rows.tolist() if self._plans else ():
+            self._plans.pop(row, None)
 
     def elapsed(self, rows: Array) -> Array:
         """Seconds ``(k,)`` since it began."""
@@ -124,7 +127,7 @@ class Activation:
         found = self._context.seen(rows, self.elapsed(rows))
         if self._later is None:
             self._later = following(self._leaf)
-        found.later = self._later
+        found.later, found.succeeded = self._later, self._context.succeeded(self._later, rows)
         model, context = self._model, self._context
         found.failures = self._failures[rows]
         for goal in model.reaches:
@@ -146,6 +149,7 @@ class Activation:
             begins = rows[fresh]
             self.activations[begins] += 1
             self._lost[begins], self._nearer[begins] = 0, 0.0
+            self._context.note(self._model, False, begins)
             for row in begins.tolist() if self._plans else ():
                 del self._plans[row]
         for row, refusal in self._context.refused.items():
@@ -189,6 +193,7 @@ class Activation:
             statuses[ends.going] = np.where(done[positions], SUCCESS, FAILURE)
             finished = judged.rows[done]
             self._failures[finished] = 0
+            context.note(model, True, finished)
             self._failures[judged.rows[late]] += 1
             for row in judged.rows[late].tolist():
                 self._led_nowhere(row)

@@ -25,8 +25,10 @@ class ConceptInBatch(BatchLeaf):
         context: The batch's.
     """
 
+    stops_ended = True
+
     def __init__(self, leaf: ConceptNode, context: Context) -> None:
-        self.leaf, self._context = leaf, context
+        self.leaf = leaf
         self.activation = Activation(leaf, leaf.model, context)
         like, worlds = context.like, context.worlds
         xp = array_namespace(like)
@@ -75,7 +77,7 @@ class ConceptInBatch(BatchLeaf):
 
     def stop(self, rows: Array) -> None:
         """See `BatchLeaf.stop`."""
-        self._context.withdraw(self.leaf, rows)
+        self.activation.stopped(rows)
 
     def outcome(self, row: int) -> Outcome | None:
         """How it ended when it was last active in a world; None where it runs."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -102,6 +102,7 @@ class Context:
         self._refused: dict[int, Refusal] = {}
         self._held: dict[tuple[str, str], Array] = {}
         self._dead_ends: dict[tuple[str, str], Array] = {}
+        self._succeeded: dict[int, tuple[Any, Array]] = {}  # by identity of the model, which it keeps alive
         most = {"tool": TOOL + len(robot.arm_joints), "hand": 1 + len(robot.synergies)}
         self._parts = {name: _Part(name, worlds, self.like, n) for name, n in most.items()}
         self._indices: dict[bytes, Index] = {}
@@ -197,6 +198,8 @@ class Context:
             held[rows] = False
         for count in self._dead_ends.values():
             count[rows] = 0
+        for _, succeeded in self._succeeded.values():
+            succeeded[rows] = False
         for row in rows.tolist():
             self.refused.pop(row, None)
 
@@ -316,6 +319,24 @@ class Context:
         """How often ``(k,)`` that was so in the episode, in whole times."""
         counts = self._dead_ends.get((goal, target))
         return np.zeros(len(rows), np.int64) if counts is None else np.floor(counts[rows]).astype(np.int64)
+
+    def note(self, model: Any, succeeded: bool, rows: Array) -> None:
+        """A concept has succeeded, or has begun anew or been stopped."""
+        if succeeded and id(model) not in self._succeeded:
+            self._succeeded[id(model)] = model, np.zeros(self.worlds, bool)
+        if id(model) in self._succeeded:
+            self._succeeded[id(model)][1][rows] = succeeded
+
+    def succeeded(self, models: Sequence[Any], rows: Array) -> Array:
+        """Booleans ``(k, n)``: which of ``n`` concepts have succeeded, and were not stopped since.
+
+        Of those that py_trees ticks world by world in a batch nobody says it.
+        """
+        out = np.zeros((len(rows), len(models)), bool)
+        for k, model in enumerate(models) if self._succeeded else ():
+            if id(model) in self._succeeded:
+                out[:, k] = self._succeeded[id(model)][1][rows]
+        return out
 
     def _goal(self, goal: str, target: str) -> Array:
         if (goal, target) not in self._held:

@@ -1,4 +1,4 @@
-"""What comes after a leaf in its tree, as far as sequences say."""
+"""What may still follow a leaf in its tree, as far as sequences say."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ ALL_IN_ANY_ORDER = "all_in_any_order"
 
 
 def following(leaf: Behaviour) -> tuple[Any, ...]:
-    """The models of the leaves that are ticked after a leaf has succeeded, in order.
+    """The models of the leaves that may be ticked after a leaf has succeeded, in order.
 
     They are the later siblings in each sequence above it, and all siblings in a composite whose children may
-    succeed in any order, done already or not. What stands under a fallback is among them, since it may be
-    ticked; a fallback's later children are none, since they are not ticked after a success.
+    succeed in any order, done already or not (see `bt_tasksim.concept.seen.Seen.to_come`). What stands under
+    a fallback is among them, since it may be ticked; a fallback's later children are none, since they are not
+    ticked after a success.
     """
     found: list[Any] = []
     node = leaf

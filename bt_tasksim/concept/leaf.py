@@ -221,9 +221,7 @@ class ConceptNode(ModelLeaf):
         if self.status == Status.RUNNING:
             self.report(INTERRUPTED())
         if self._activation is not None:
-            self._activation.drop_plans()
-        if self._context is not None:
-            self._context.withdraw(self, ONE)
+            self._activation.stopped(ONE)
 
 
 def leaf_class_of(model: type, base: type[ModelLeaf]) -> type[ModelLeaf]:

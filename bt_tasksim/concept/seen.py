@@ -30,7 +30,10 @@ class Seen:
         world: What is known beforehand of these worlds.
         robot: The robot.
         elapsed: ``(N,)`` seconds since the concept became active.
-        later: The concepts that come after this one in its tree, in order, where they are known.
+        later: The concepts that may still follow this one in its tree, where they are known: those after it
+            in sequences, in order, and those of the same composite where all succeed in any order.
+        succeeded: Booleans ``(N, n)`` in NumPy: which of these have succeeded already; None where nobody says
+            it.
         failures: ``(N,)`` in NumPy: how often this leaf has failed in a row in the episode before it became
             active, or one after it has failed with what this one had reached, every second loss of it
             among them; None where nobody has counted.
@@ -47,6 +50,7 @@ class Seen:
         "later",
         "observation",
         "robot",
+        "succeeded",
         "world",
     )
 
@@ -59,6 +63,7 @@ class Seen:
         later: Sequence[Any] = (),
         failures: np.ndarray | None = None,
         believed: Callable[[], Array] | None = None,
+        succeeded: np.ndarray | None = None,
     ) -> None:
         self.observation = observation
         self.world = world
@@ -66,6 +71,7 @@ class Seen:
         self.elapsed = elapsed
         self.later = later
         self.failures = failures
+        self.succeeded = succeeded
         self._believed = believed
         self._derived: dict[str, Array] | None = None
         self._made: dict[Hashable, Any] | None = None
@@ -86,6 +92,7 @@ class Seen:
             self.later,
             index.of(self.failures) if self.failures is not None else None,
             lambda: index.of(self.objects),
+            None if self.succeeded is None else self.succeeded[rows],
         )
 
     def believing(self, objects: Array) -> Seen:
@@ -98,7 +105,13 @@ class Seen:
             self.later,
             self.failures,
             believed=lambda: objects,
+            succeeded=self.succeeded,
         )
+
+    def to_come(self, row: int) -> list[Any]:
+        """The concepts of `later` that have not succeeded already in one of these worlds."""
+        done = self.succeeded
+        return [model for k, model in enumerate(self.later) if done is None or not done[row, k]]
 
     def observable(self, name: str) -> Array:
         """An observable by its name, computed when it is first asked for.

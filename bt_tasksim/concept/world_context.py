@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -125,6 +126,21 @@ class WorldContext(Context):
     def reached(self, goal: str, target: str, rows: Array) -> Array:
         """See `Context.reached`."""
         return self._batch.reached(goal, target, self._row[rows])
+
+    def led_nowhere(self, goal: str, target: str, row: int, counts: float = 1.0) -> None:
+        """See `Context.led_nowhere`."""
+        self._batch.led_nowhere(goal, target, int(self._row[row]), counts)
+
+    def dead_ends(self, goal: str, target: str, rows: Array) -> Array:
+        """See `Context.dead_ends`."""
+        return self._batch.dead_ends(goal, target, self._row[rows])
+
+    def note(self, model: Any, succeeded: bool, rows: Array) -> None:
+        """See `Context.note`: of copies, which end with their episode, nothing is kept."""
+
+    def succeeded(self, models: Sequence[Any], rows: Array) -> Array:
+        """See `Context.succeeded`."""
+        return np.zeros((len(rows), len(models)), bool)
 
     def _hidden(self, rows: Array | None = None) -> Hidden | None:
         found = self._batch.ask_hidden(self._row)

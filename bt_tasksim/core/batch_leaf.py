@@ -25,6 +25,9 @@ class BatchLeaf(abc.ABC):
     ``int8`` array ``(k,)`` of the same library and device.
     """
 
+    stops_ended: bool = False
+    """It is stopped in worlds where it has ended, too, as py_trees does."""
+
     @abc.abstractmethod
     def tick(self, rows: Array, fresh: Array) -> Array:
         """One tick in some worlds.
@@ -49,7 +52,10 @@ class BatchLeaf(abc.ABC):
         raise NotImplementedError(f"{type(self).__name__} was never PENDING")
 
     def stop(self, rows: Array) -> None:  # noqa: B027  # most have nothing to do
-        """It is interrupted in worlds where it is RUNNING or PENDING, which the tree does not tick on."""
+        """It is interrupted in worlds where it is RUNNING or PENDING, which the tree does not tick on.
+
+        With `stops_ended` this is called, too, where it has ended and is to be INVALID.
+        """
 
     def outcome(self, row: int) -> Outcome | None:
         """How it ended in a world when it was last active; None: it runs, or has nothing to say."""

@@ -55,6 +55,10 @@ def within(*where: str | int) -> Iterator[None]:
         raise FieldError(str(error), *where) from error
 
 
+class NoVolumeError(InputError):
+    """Corners whose hull is no body: they lie in one plane, or are not finite."""
+
+
 class MachineError(BtTasksimError, RuntimeError):
     """The machine failed: a full disk, a lost connection, an engine that stopped."""
 

@@ -80,6 +80,11 @@ class ObjectModel:
     solid: KnownGeometry | None = None
 
 
+def is_container(kind: str) -> bool:
+    """Whether things are put into a place of this kind, and not onto it."""
+    return kind == "bin"
+
+
 @dataclass(frozen=True)
 class PlaceModel:
     """A surface or a container of the scene, calibrated beforehand.
@@ -117,7 +122,7 @@ class PlaceModel:
     @property
     def container(self) -> bool:
         """Things are put into it, and not onto it."""
-        return self.kind == "bin"
+        return is_container(self.kind)
 
     @property
     def rim(self) -> float:

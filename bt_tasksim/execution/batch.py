@@ -374,7 +374,7 @@ class BatchTree:
                 for below in range(node + 1, self._ends[node]):
                     self.compiled[below] = BelowUnknown(leaf, below - node)
             self.compiled[node] = leaf
-            self._listeners[node] = FAILURE if isinstance(leaf, WorldByWorld) else RUNNING, leaf.stop
+            self._listeners[node] = FAILURE if leaf.stops_ended else RUNNING, leaf.stop
             self._handlers.append(partial(self._tick_leaf, node, leaf))
             self._resume[node] = len(self._handlers)
             self._handlers.append(partial(self._resume_leaf, node, leaf))

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import InputError, NoDrawError
+from bt_tasksim.core.errors import BtTasksimWarning, InputError, NoDrawError, NoVolumeError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import RobotDescription
-from bt_tasksim.robot.urdf_visuals import LinkVisual, load_collisions
+from bt_tasksim.robot.link_parts import DEEP, LinkPart, link_parts
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.fixtures import Fixture
 from bt_tasksim.scene.scene import Scene, WorldSource
@@ -19,17 +20,6 @@ from bt_tasksim.scene.shapes import BoxPiece, Piece
 
 TOUCHING = 0.001
 """Metres that an object may be in a link."""
-DEEP = 0.01
-"""Metres that furniture may be in a link, and links in each other: a robot stands on something, and hulls are
-larger than the links."""
-
-
-class LinkPart(NamedTuple):
-    """A convex part of a link, as coal has it, at ``pose (7,)`` in the link's frame."""
-
-    link: str
-    form: Any
-    pose: Array
 
 
 class Inside(NamedTuple):
@@ -44,22 +34,38 @@ class Inside(NamedTuple):
     depth: float
 
 
-def clear_draw(scene: WorldSource, seed: int, stream: str, robot: RobotDescription) -> ActorConfiguration:
-    """A world of a scene, in simulation.
+def clear_draw(
+    scene: WorldSource,
+    seed: int,
+    stream: str,
+    robot: RobotDescription,
+    stage: int | None = None,
+    real: bool = False,
+) -> ActorConfiguration:
+    """A world of a scene, as whatever runs, judges or trains in it draws it.
 
-    Worlds that are not drawn from a `Scene`, that begin with the hand elsewhere than at rest, and those of a
-    robot whose shapes are not there, are not looked at.
+    Worlds of a real robot, those that are not drawn from a `Scene`, and those that begin with the hand
+    elsewhere than at rest, are not looked at.
+
+    Args:
+        scene: Where it is drawn from.
+        seed: See `Scene.sample`.
+        stream: See `Scene.sample`.
+        robot: The robot.
+        stage: See `Scene.sample`.
+        real: The robot is a real one: what is drawn only says what there is.
 
     Raises:
         NoDrawError: No world can be drawn with this seed, or something starts inside the robot.
+        InputError: See `Scene.sample`.
+
+    Warns:
+        BtTasksimWarning: A shape of the robot or of an object is missing, or no body, and is not looked at.
     """
-    world = scene.sample(seed, stream)
-    if not isinstance(scene, Scene) or world.joint_position or world.hand_start:
+    world = scene.sample(seed, stream, stage)
+    if real or not isinstance(scene, Scene) or world.joint_position or world.hand_start:
         return world
-    try:
-        links = links_at_rest(robot)
-    except InputError:
-        return world
+    links: list[tuple[LinkPart, Any]] = robot.derived("links that may be started in", _links_there)
     for fixture in world.fixtures:
         found = fixture_in_robot(links, fixture)
         if found.depth > DEEP:
@@ -82,11 +88,27 @@ def _sentence(seed: int, what: str, found: Inside, robot: RobotDescription, reme
     )
 
 
+def _links_there(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
+    """Links at rest that can be looked at, with a warning about others."""
+    try:
+        links = links_at_rest(robot)
+    except InputError as error:
+        said = f"what starts inside {robot.name} is not noticed: {error}"
+        warnings.warn(said, BtTasksimWarning, stacklevel=2)
+        return []
+    for left_out in link_parts(robot).left_out:
+        said = f"what starts inside {robot.name} is not noticed everywhere: {left_out}"
+        warnings.warn(said, BtTasksimWarning, stacklevel=2)
+    return links
+
+
 def links_at_rest(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
     """The parts of a robot's links, and where they are at rest with an open hand, as coal has it.
 
+    Parts that are no bodies are not among them, see `bt_tasksim.robot.link_parts.LinkParts`.
+
     Raises:
-        InputError: A file of its shapes is missing.
+        InputError: The URDF, or a file of its shapes, is missing or cannot be read.
     """
     found: list[tuple[LinkPart, Any]] = robot.derived("links at rest", _links)
     return found
@@ -95,40 +117,38 @@ def links_at_rest(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
 def fixture_in_robot(links: Sequence[tuple[LinkPart, Any]], fixture: Fixture) -> Inside:
     """How deep a fixture is in the robot."""
     boxes = [BoxPiece(np.array(box.pose), np.array(box.size) / 2) for box in fixture.boxes]
-    return _deepest(links, fixture.pose_array(), boxes)
+    return _deepest(links, _solids(fixture.name, fixture.pose_array(), boxes))
 
 
 def object_in_robot(links: Sequence[tuple[LinkPart, Any]], world: ActorConfiguration, name: str) -> Inside:
-    """How deep an object of a draw is in the robot."""
+    """How deep an object of a draw is in the robot.
+
+    Warns:
+        BtTasksimWarning: A piece of it is no body, and is not looked at.
+    """
     actor = next(actor for actor in world.objects if actor.name == name)
-    return _deepest(links, np.array(actor.pose), actor.shape().collision)
+    return _deepest(links, _solids(name, np.array(actor.pose), actor.shape().collision))
 
 
-def link_part(shape: LinkVisual) -> LinkPart | None:
-    """A shape as coal has it."""
-    from bt_tasksim.core.narrow_phase import coal
-    from bt_tasksim.engines.physics.mujoco_robot import mesh_hull
-    from bt_tasksim.scene.hulls import convex
+def _solids(name: str, pose: Array, pieces: Sequence[Piece]) -> list[tuple[Any, Any]]:
+    """Pieces of something at ``pose (7,)`` as coal has them, and where; a warning names what is no body."""
+    from bt_tasksim.scene.hulls import placed
 
-    match shape.kind:
-        case "box":
-            form = coal.Box(*shape.size)
-        case "sphere":
-            form = coal.Sphere(shape.size[0])
-        case "cylinder":
-            form = coal.Cylinder(*shape.size)
-        case _:
-            assert shape.mesh is not None
-            x, y, z = shape.size
-            form = convex(mesh_hull(shape.mesh, (x, y, z)))
-    return LinkPart(shape.link, form, np.array(shape.pose))
+    solids = list[tuple[Any, Any]]()
+    for piece in pieces:
+        try:
+            solids.append(placed(piece, pose))
+        except NoVolumeError as error:
+            said = f"a piece of '{name}' is not looked for inside the robot: {error}"
+            warnings.warn(said, BtTasksimWarning, stacklevel=2)
+    return solids
 
 
 def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
     from bt_tasksim.core.narrow_phase import coal
     from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 
-    parts = [part for shape in load_collisions(robot.urdf) if (part := link_part(shape)) is not None]
+    parts = link_parts(robot).parts
     joints = np.concatenate([robot.rest, robot.hand_open])
     at = PinocchioKinematics(robot).link_poses(joints, sorted({part.link for part in parts}))
     frames = [poses.multiply(at[part.link], part.pose) for part in parts]
@@ -136,14 +156,12 @@ def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
     return list(zip(parts, where, strict=True))
 
 
-def _deepest(links: Sequence[tuple[LinkPart, Any]], pose: Array, pieces: Sequence[Piece]) -> Inside:
-    """The link that pieces of a body at ``pose (7,)`` overlap most."""
+def _deepest(links: Sequence[tuple[LinkPart, Any]], solids: Sequence[tuple[Any, Any]]) -> Inside:
+    """The link that solids overlap most."""
     from bt_tasksim.core.narrow_phase import coal
-    from bt_tasksim.scene.hulls import placed
 
     request, found = coal.DistanceRequest(), Inside("", 0.0)
-    for piece in pieces:
-        form, at = placed(piece, pose)
+    for form, at in solids:
         for part, here in links:
             depth = -float(coal.distance(part.form, here, form, at, request, coal.DistanceResult()))
             if depth > found.depth:

@@ -28,7 +28,7 @@ class PipelineWorlds(Worlds):
     """
 
     def __init__(self, robot: RobotDescription, pipeline: EnginePipeline) -> None:
-        self.count, self.pipeline = 1, pipeline
+        self.count, self.pipeline, self.real = 1, pipeline, pipeline.real
         self._robot, self._tips = robot, [tip.name for tip in robot.tips]
         self._seen: Observation | None = None
         self._error: BtTasksimError | None = None

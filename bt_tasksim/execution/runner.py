@@ -163,10 +163,7 @@ class Runner(Closing):
 
     def begin(self, seed: int, stream: str = "evaluation") -> tuple[ActorConfiguration, WorldModel]:
         """Draw a world, reset the engines and the tree."""
-        if self.pipeline.real:
-            configuration = self.scene.sample(seed, stream)
-        else:
-            configuration = clear_draw(self.scene, seed, stream, self.robot)
+        configuration = clear_draw(self.scene, seed, stream, self.robot, real=self.pipeline.real)
         return configuration, self.reset(configuration)
 
     def reset(self, configuration: ActorConfiguration) -> WorldModel:

@@ -49,6 +49,8 @@ class WorldByWorld(BatchLeaf):
             `trees.walk`, from the behaviour on.
     """
 
+    stops_ended = True
+
     def __init__(
         self,
         copies: list[Behaviour],
@@ -66,7 +68,7 @@ class WorldByWorld(BatchLeaf):
         return self._codes([self._tick(row) for row in rows.tolist()])
 
     def stop(self, rows: Array) -> None:
-        """See `BatchLeaf.stop`; called too where it has ended, as py_trees does.
+        """See `BatchLeaf.stop`.
 
         Raises:
             LeafError: A behaviour raised as it was ended; those of all worlds have ended.

@@ -120,9 +120,11 @@ class Worlds(ABC):
         count: How many, N.
         observation: What was last seen of all of them ``(N, ...)``, the objects of each in its own order;
             None before the first look.
+        real: It is a real robot's one world.
     """
 
     count: int
+    real: bool = False
     observation: Observation | None = None
 
     def source(self, scene: WorldSource) -> WorldSource:

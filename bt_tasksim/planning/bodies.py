@@ -14,13 +14,13 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull, QhullError
 
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.convex_hulls import convex
+from bt_tasksim.core.errors import InputError, NoVolumeError
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.models import full_model
 from bt_tasksim.robot.urdf_links import load_links
-from bt_tasksim.scene.hulls import convex
 
 _POSTURES = 400
 """Random postures by which pairs of bodies are told apart."""
@@ -144,7 +144,7 @@ def _shapes(robot: RobotDescription, model: pin.Model) -> Any:
         placement = base.inverse() * shape.placement if joint == 0 else shape.placement
         try:
             body = _convex(shape.geometry)
-        except (InputError, QhullError) as error:
+        except (NoVolumeError, QhullError) as error:
             raise InputError(
                 f"the collision shape '{shape.name}' of {robot.name} is no body: its corners lie in one plane"
             ) from error

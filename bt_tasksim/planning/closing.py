@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.bodies import bodies_of
@@ -24,7 +25,6 @@ from bt_tasksim.planning.hand_collision import hand_shapes
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.hand import tips_in_tool
 from bt_tasksim.robot.kinematics.models import se3
-from bt_tasksim.scene.hulls import convex
 
 _Placed = Sequence[tuple[Any, Any]]
 """Shapes and where they are."""

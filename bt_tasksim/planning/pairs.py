@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.things import Held, Leave, Thing, Touch, shapes_of
 from bt_tasksim.robot.kinematics.models import se3
-from bt_tasksim.scene.hulls import convex
 
 _TOUCHING = 1e-6
 """Metres apart at which bodies count as touching: of two that lie in one another, centre in centre or aside

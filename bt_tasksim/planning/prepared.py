@@ -6,6 +6,7 @@ reach 0.4 s. A loop that waits for them falls silent, and the robot is stopped.
 
 from __future__ import annotations
 
+from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.world import WorldModel
 from bt_tasksim.planning.arm import arm_of
@@ -13,7 +14,6 @@ from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.reach import reach_of
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.robot.description import RobotDescription
-from bt_tasksim.scene.hulls import convex
 
 
 def prepare(world: WorldModel, robot: RobotDescription) -> None:

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.chords import faces
-from bt_tasksim.scene.hulls import convex
 
 Touch = tuple[str, str]
 """Names of two things that touch: of a link of the robot or of what is held, and of what it touches."""

@@ -19,7 +19,7 @@ from bt_tasksim.core.names import check_name
 from bt_tasksim.core.plain import Plain
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.renamed import renamed_fields
-from bt_tasksim.core.world import PlaceModel
+from bt_tasksim.core.world import PlaceModel, is_container
 from bt_tasksim.scene.specs import FixtureSpec
 
 if TYPE_CHECKING:
@@ -58,6 +58,11 @@ class FixturePlace:
     access: tuple[float, float, float]
     exit: tuple[float, float, float]
     clearance: float
+
+    @property
+    def container(self) -> bool:
+        """Things are put into it, and not onto it."""
+        return is_container(self.kind)
 
 
 @dataclass(frozen=True)

@@ -2,52 +2,25 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.geometry import BoxPiece, Piece
 
-_KEPT = 1024
-"""Hulls that are remembered."""
-
-
-FLAT = 1e-9
-"""Metres below which corners lie in a plane: coal's hulls need a volume, and end the process without one."""
-
-
-def convex(corners: Array) -> Any:
-    """The convex hull of corners ``(n, 3)`` as coal's shape, one of its own for each who asks.
-
-    Raises:
-        InputError: The corners are not finite, or lie in one plane.
-    """
-    return _hull(np.ascontiguousarray(corners, float).tobytes()).clone()
-
 
 def placed(piece: Piece, pose: Array) -> tuple[Any, Any]:
-    """A piece of a body at ``pose (7,)`` as coal's shape, and where it is."""
+    """A piece of a body at ``pose (7,)`` as coal's shape, and where it is.
+
+    Raises:
+        NoVolumeError: The piece is no body.
+    """
     if isinstance(piece, BoxPiece):
         frame, form = poses.multiply(pose, piece.pose), coal.Box(*(2 * piece.half_size).tolist())
     else:
         frame, form = pose, convex(np.asarray(piece.vertices, float))
     return form, coal.Transform3s(poses.to_matrix(frame[3:]), frame[:3])
-
-
-@lru_cache(maxsize=_KEPT)
-def _hull(corners: bytes) -> Any:
-    """The hull of corners; to make one takes a millisecond, and the same things are asked about again."""
-    given = np.frombuffer(corners).reshape(-1, 3)
-    if len(given) < 4 or not np.isfinite(given).all():
-        raise InputError("a convex piece needs at least four corners with finite coordinates")
-    if float(np.linalg.svd(given - given.mean(axis=0), compute_uv=False)[-1]) < FLAT:
-        raise InputError("the corners of a convex piece lie in one plane: it needs a volume")
-    points = coal.StdVec_Vec3s()
-    for corner in given:
-        points.append(corner)
-    return coal.Convex.convexHull(points, False, "")

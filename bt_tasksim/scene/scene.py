@@ -179,7 +179,7 @@ class Scene:
     def _check_names(self, specs: Mapping[str, ObjectSpec]) -> None:
         """Every name that is used is one of the scene, and means one thing."""
         furniture = [p for f in self.fixtures for p in load_fixture(f).places]
-        places, containers = {p.name for p in furniture}, [p.name for p in furniture if p.kind == "bin"]
+        places, containers = {p.name for p in furniture}, [p.name for p in furniture if p.container]
         for i, spot in enumerate(self.spots):
             _require_place(f"spot '{spot.name}'", "on", spot.on, places, ("spots", i, "on"))
             if spot.name in places:

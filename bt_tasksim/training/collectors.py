@@ -88,7 +88,7 @@ class EnvironmentRollout:
         cut: Features ``(k, n_features)`` after decisions ``cut_at (k,)`` at which an episode was truncated.
         cut_at: See ``cut``; the environment's last decision is among them unless its episode ended there.
         ends: One for each episode that ended.
-        redrawn: Draws in which the subtree was never active.
+        redrawn: Draws that had no world, or in which the subtree was never active.
     """
 
     features: Array

@@ -9,6 +9,7 @@ import numpy as np
 from bt_tasksim.concept.context import Context, Refusal
 from bt_tasksim.core.errors import BtTasksimError
 from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.clear_start import clear_draw
 from bt_tasksim.execution.worlds import Worlds
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -72,7 +73,14 @@ class DrawnWorlds:
             assert draws is not None
             self.seeds[row] = int(draws.rng.integers(2**31)) if draws.draw is None else draws.draw
             try:
-                drawn[row] = self.scene.sample(int(self.seeds[row]), draws.stream, draws.stage)
+                drawn[row] = clear_draw(
+                    self.scene,
+                    int(self.seeds[row]),
+                    draws.stream,
+                    self._robot,
+                    draws.stage,
+                    self._engines.real,
+                )
             except BtTasksimError as error:
                 failed[row] = error
         return drawn, failed

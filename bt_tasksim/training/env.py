@@ -90,7 +90,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
         self.observation_space, self.action_space = self.batch.observation_space, self.batch.action_space
         self.stream, self.stage, self.render_mode = stream, stage, render_mode
         self.redrawn = 0
-        """Draws so far in which the subtree was never active."""
+        """Draws so far that had no world, or in which the subtree was never active."""
         self.discarded = 0
         """Episodes so far whose judgement an error spoiled."""
         self.ending: Ending | None = None
@@ -111,7 +111,7 @@ class EpisodeEnv(gymnasium.Env[Array, Array]):
             options: ``draw``: the seed of this very world, instead of a random one.
 
         Raises:
-            InputError: In many draws in a row the tree ended without activating the subtree.
+            InputError: Many draws in a row had no world, or the tree ended without activating the subtree.
             ClosedEnvironmentError: It is closed.
         """
         super().reset(seed=seed)

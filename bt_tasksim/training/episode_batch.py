@@ -15,7 +15,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.status import STATUSES
 from bt_tasksim.core.batch_leaf import INVALID, RUNNING, SUCCESS
-from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, LostEngine
+from bt_tasksim.core.errors import BtTasksimError, InputError, LeafError, LostEngine, NoDrawError
 from bt_tasksim.core.outcomes import INTERRUPTED, TIME_OVER, Outcome, outcome_of_error
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.pipeline_worlds import worlds_for
@@ -27,7 +27,7 @@ from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.decision import Decision
 from bt_tasksim.training.drawn_worlds import DrawnWorlds, Draws
 from bt_tasksim.training.endings import BEGAN_ANEW, FOLLOWER_LATE, TREE_ENDED, ending_of
-from bt_tasksim.training.happened import Happened, not_reached
+from bt_tasksim.training.happened import Happened, not_drawn, not_reached
 from bt_tasksim.training.judge import Judgement, SignalOutcome
 from bt_tasksim.training.learning_leaves import checked_actions
 from bt_tasksim.training.learning_tree import LearningTree
@@ -40,7 +40,7 @@ decision, in the middle of a tick; which has come; a control period is due."""
 BEFORE = -1
 """Number of the activation before the first decision."""
 REDRAWS = 50
-"""Draws in a row in which the subtree may stay inactive."""
+"""Draws in a row that may have no world, or in which the subtree may stay inactive."""
 FAILURES = 50
 """Episodes in a row in which an engine may fail in a world; with more, it is not what was drawn."""
 
@@ -245,7 +245,11 @@ class EpisodeBatch:
         if drawn:
             failed |= self._drawn.begin(drawn)
         for row, why in failed.items():
-            self._none(row, why)
+            if isinstance(why, NoDrawError):
+                self._draw_again(row, why)
+            else:
+                self._none(row, why)
+        self._leave()
         for row, world in drawn.items():
             self._left[row] = round(self.longest * world.control_frequency)
             self._judgement.tolerance[row] = world.tolerance
@@ -423,15 +427,16 @@ class EpisodeBatch:
         self._over.append(row)
 
     def _draw_again(self, row: int, error: BtTasksimError | None = None) -> None:
-        """The subtree was never active in the world of a draw, in which an engine may have failed."""
+        """The subtree was never active in a draw: it has no world, or an engine may have failed in it."""
         self._redrawn[row] += 1
         self._phase[row] = DRAWING
         self._over.append(row)
         if self._redrawn[row] < REDRAWS and not self._drawn.has_one_draw(row):
             return
         redrawn, draw = int(self._redrawn[row]), int(self._drawn.seeds[row])
-        why = error or not_reached(self.train.name, self.batch, row, redrawn, draw)
-        self._none(row, why)
+        if isinstance(error, NoDrawError) and redrawn > 1:
+            error = not_drawn(self.train.name, redrawn, error)
+        self._none(row, error or not_reached(self.train.name, self.batch, row, redrawn, draw))
 
     def _leave(self) -> None:
         """End all nodes in worlds whose episode is over."""

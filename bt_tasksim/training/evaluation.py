@@ -38,6 +38,7 @@ from bt_tasksim.core.plugins import loaded
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.batch_runner import BatchRunner
+from bt_tasksim.execution.given import checked_longest
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.runner import LONGEST, Runner
@@ -71,10 +72,11 @@ class Job:
         batch: How many worlds are run at once in each process, by default `usual_batch`. Outcomes do not
             depend on it.
         threads: How many threads step them.
-        longest: Seconds of an episode after which it is stopped.
+        longest: Seconds of an episode after which it is stopped; kept as a float.
 
     Raises:
-        InputError: There is no world or thread, or these engines have no worlds in batches.
+        InputError: The longest time is no positive number, there is no world or thread, or these engines have
+            no worlds in batches.
     """
 
     tree: str
@@ -88,6 +90,7 @@ class Job:
     longest: float = LONGEST
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "longest", checked_longest(self.longest))
         batch = 1 if self.batch is None else self.batch
         if self.batch == 1 and self.options.laws == "torch":
             raise InputError("--laws torch is for batches of worlds: give a --batch of 2 or more, or none")
@@ -348,10 +351,7 @@ class Player(Closing):
             self._batch = BatchRunner(self._build, scene, job.options, worlds, job.threads, job.longest)
         index_of = {seed: index for index, seed in enumerate(seeds)}
         for seed, found in self._batch.run(seeds, stream):
-            if isinstance(found, InputError) and not isinstance(found, NoDrawError | NotToldApartError):
-                raise found
-            outcome = unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else in_short(found)
-            yield index_of[seed], outcome
+            yield index_of[seed], of_batch(seed, found)
 
 
 def play(player: Player, seeds: Sequence[int], stream: str) -> Iterator[tuple[int, EpisodeOutcome]]:
@@ -380,6 +380,17 @@ def episode(runner: Runner, seed: int, stream: str = "evaluation") -> EpisodeOut
         if isinstance(error, MachineError) and (isinstance(error, LostEngine) or runner.options.real):
             raise  # an engine that is not there any more, or a robot, says nothing about the tree
         return unfinished(seed, error, time.perf_counter() - started)
+
+
+def of_batch(seed: int, found: Result | BtTasksimError) -> EpisodeOutcome:
+    """One episode of a batch; errors count as those in `episode`.
+
+    Raises:
+        InputError: Tree or scene are no good.
+    """
+    if isinstance(found, InputError) and not isinstance(found, NoDrawError | NotToldApartError):
+        raise found
+    return unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else in_short(found)
 
 
 def unfinished(seed: int, error: BtTasksimError, seconds: float) -> EpisodeOutcome:
@@ -414,8 +425,14 @@ def _subject(job: Job, runner: Runner, stream: str) -> dict[str, str]:
     code = own_code(runner.tree, job.tree, job.plugins, runner.scene)
     subject = evaluation_subject(runner.tree, runner.scene, job.options, policies_of(runner), code, stream)
     if job.longest != LONGEST:  # earlier files say nothing of it
-        subject["longest time of an episode"] = f"{job.longest!r} s"
+        subject["longest time of an episode"] = f"{_number(job.longest)} s"
     return subject
+
+
+def _number(value: float) -> str:
+    """A number as earlier files have it, where six digits say all of it; else with all its digits."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
 
 
 def _name(job: Job) -> str:

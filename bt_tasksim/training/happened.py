@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from bt_tasksim.concept.status import STATUSES
-from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.errors import BtTasksimError, InputError, NoDrawError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.training.endings import Ending
@@ -49,3 +49,14 @@ def not_reached(train: str, tree: BatchTree, row: int, redrawn: int, draw: int) 
     return InputError(
         f"'{train}' was not reached in {redrawn} draws; the last one (seed {draw}) ended with {status}: {why}"
     )
+
+
+def not_drawn(train: str, redrawn: int, last: NoDrawError) -> InputError:
+    """Says that a Train node was never active, and that the last draw had no world.
+
+    Args:
+        train: Its name.
+        redrawn: In how many draws.
+        last: Why there was none.
+    """
+    return InputError(f"'{train}' was not reached in {redrawn} draws; the last one had no world: {last}")

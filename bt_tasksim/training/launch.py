@@ -9,7 +9,7 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.core.errors import BtTasksimError, InputError
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
 from bt_tasksim.execution.runner import Runner
@@ -20,9 +20,8 @@ from bt_tasksim.scene.scene import WorldSource
 from bt_tasksim.training.evaluation import (
     EvaluationInterrupted,
     episode,
-    in_short,
+    of_batch,
     policies_of,
-    unfinished,
     usual_batch,
 )
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, Evaluation
@@ -101,9 +100,7 @@ def _batch(
     worlds = min(usual_batch(runner.options), len(seeds))
     with BatchRunner(build, runner.scene, runner.options, worlds) as batch:
         for seed, found in batch.run(seeds):
-            if isinstance(found, InputError):
-                raise found
-            yield unfinished(seed, found, 0.0) if isinstance(found, BtTasksimError) else in_short(found)
+            yield of_batch(seed, found)
 
 
 def _alone(

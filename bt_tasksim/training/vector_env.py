@@ -95,7 +95,7 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.redrawn = 0
-        """Draws so far in which the subtree was never active."""
+        """Draws so far that had no world, or in which the subtree was never active."""
         self.discarded = 0
         """Episodes so far that an error spoiled."""
         self._rngs: list[np.random.Generator | None] = [None] * num_envs
@@ -191,7 +191,7 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
             Which worlds ``(k,)``, ascending, and what is new there; none where nothing goes on in any.
 
         Raises:
-            InputError: In many draws in a row the tree ended without activating the subtree.
+            InputError: Many draws in a row had no world, or the tree ended without activating the subtree.
         """
         found: dict[int, Happened] = {}
         while not found:
@@ -221,7 +221,7 @@ class EpisodeVectorEnv(VectorEnv[Array, Array, Array]):
             What is new in all worlds ``(N, ...)``; nothing in those that have not gone on.
 
         Raises:
-            InputError: In many draws in a row the tree ended without activating the subtree.
+            InputError: Many draws in a row had no world, or the tree ended without activating the subtree.
             RuntimeError: One of them was given no action.
         """
         rewards, terminated = np.zeros(self.num_envs), np.zeros(self.num_envs, bool)

@@ -1,6 +1,7 @@
 """Trees by name: scenarios, Python files and XML files, and one sentence for whatever is wrong in them."""
 
 import textwrap
+from pathlib import Path
 
 import pytest
 from py_trees.behaviour import Behaviour
@@ -148,6 +149,54 @@ def test_a_python_file_takes_a_robot_file_by_a_relative_path(write, tmp_path, mo
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.yaml").write_bytes(asset("robots", "panda.yaml").read_bytes())
     assert load_source(write("lift.py", GOOD), "mine.yaml").scene.robot == str(tmp_path / "mine.yaml")
+
+
+WITH_MESH = """
+from bt_tasksim import ObjectSpec, Scene
+from bt_tasksim.concept_nodes import Grasp
+from bt_tasksim.scene.scene import CurriculumStage
+
+
+def scene(robot="panda"):
+    it = ObjectSpec(on="table", mesh="things/pyramid.obj")
+    return Scene(robot, objects={"it": it}, stages=[CurriculumStage("one", objects={"it": it})])
+
+
+def build():
+    return Grasp("it")
+"""
+PYRAMID = """
+v 0 0 0
+v 0.1 0 0
+v 0.1 0.1 0
+v 0 0.1 0
+v 0.05 0.05 0.1
+f 1 3 2
+f 1 4 3
+f 1 2 5
+f 2 3 5
+f 3 4 5
+f 4 1 5
+"""
+
+
+def test_a_mesh_of_a_python_scene_is_looked_for_beside_its_file_and_else_where_one_works(
+    write, tmp_path, monkeypatch
+):
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    file = write("lift.py", WITH_MESH)
+    with pytest.raises(InputError, match=r"^object 'it': no mesh file 'things/pyramid\.obj' in ") as error:
+        load_source(file)
+    assert str(tmp_path) in str(error.value) and str(work) in str(error.value)
+    for folder in (work, tmp_path):
+        (folder / "things").mkdir()
+        (folder / "things" / "pyramid.obj").write_text(PYRAMID)
+        scene = load_source(file).scene
+        there = {Path(o.mesh).resolve() for o in (scene.objects["it"], scene.stages[0].objects["it"])}
+        assert there == {folder / "things" / "pyramid.obj"}
+    assert Path(scene.objects["it"].mesh).is_absolute() and scene.sample(0).objects[0].mesh
 
 
 def test_a_python_file_with_a_named_scene(write):

@@ -89,8 +89,9 @@ class BatchKinematics:
         n: Number of worlds.
         like: An array of the library, type and device of what is to be computed; by default NumPy, float64.
         control_period: Seconds between two calls of `solve`, until `reset` says otherwise.
-        patience: Seconds after which a search for another posture gives up, for real time; by default it goes
-            on to its end, and so does not depend on the machine's speed.
+        patience: Seconds that a call takes which a few iterations do not settle, for real time: going on from
+            the last posture has half of them, and a search for another one what is left. By default both go
+            on to their end, and so do not depend on the machine's speed.
     """
 
     def __init__(

@@ -26,7 +26,7 @@ from bt_tasksim.robot.kinematics.rows import columns
 from bt_tasksim.scene.configuration import ActorConfiguration
 
 PATIENCE = 0.03
-"""Seconds for which the inverse kinematics of a real robot looks for another posture."""
+"""Seconds that a call of a real robot's inverse kinematics takes where a few iterations do not settle it."""
 
 
 @register("engine/kinematics", "pinocchio")
@@ -39,8 +39,9 @@ class PinocchioKinematics(KinematicsEngine):
     Args:
         robot: The robot.
         control_period: Seconds between two calls of `solve`, until `reset` says otherwise.
-        patience: Seconds after which a search for another posture gives up, for real time; by default it goes
-            on to its end, and so does not depend on the machine's speed.
+        patience: Seconds that a call takes which a few iterations do not settle, for real time: going on from
+            the last posture has half of them, and a search for another one what is left. By default both go
+            on to their end, and so do not depend on the machine's speed.
 
     Raises:
         InputError: The description does not fit its URDF.

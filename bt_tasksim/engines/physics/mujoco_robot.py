@@ -13,6 +13,7 @@ from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.mujoco_contacts import FRICTION, TIMESTEP, Body, ContactSurface, Solid
 from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.mesh_hulls import mesh_hull
 from bt_tasksim.robot.urdf_links import Inertial, LinkJoint, load_links, root_pose, still_links
 from bt_tasksim.robot.urdf_visuals import LinkVisual, load_collisions
 
@@ -168,22 +169,3 @@ def _add_shape(mujoco: ModuleType, spec: mj.MjSpec, body: mj.MjsBody, name: str,
 def add_hull(spec: mj.MjSpec, name: str, vertices: Array) -> None:
     """Add the convex hull of points ``(n, 3)`` to a ``mujoco.MjSpec`` as a mesh."""
     spec.add_mesh(name=name, uservert=np.asarray(vertices, np.float32).ravel().tolist())
-
-
-@lru_cache(maxsize=256)
-def mesh_hull(path: str, scale: tuple[float, float, float]) -> Array:
-    """Corners ``(n, 3)`` of the convex hull of a mesh file, scaled; metres.
-
-    Raises:
-        InputError: The file cannot be read.
-    """
-    from bt_tasksim.core.narrow_phase import coal
-
-    try:
-        mesh = coal.MeshLoader().load(path, np.array(scale))
-        mesh.buildConvexHull(True, "Qt")
-        corners = np.array(mesh.convex.points())
-    except (RuntimeError, ValueError) as error:
-        raise InputError(f"mesh '{path}' cannot be read: {' '.join(str(error).split())}") from error
-    corners.setflags(write=False)
-    return corners

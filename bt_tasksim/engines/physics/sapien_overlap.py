@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.sapien_world import array, floats
-from bt_tasksim.scene.hulls import convex
 
 if TYPE_CHECKING:
     import sapien

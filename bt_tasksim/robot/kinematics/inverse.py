@@ -116,7 +116,7 @@ class InverseKinematics:
         robot: The robot.
         model: Its arm alone, with a frame ``tool``.
         like: An array of the library, type and device to compute with.
-        patience: Seconds after which a call that searches for another posture ends with what it has.
+        patience: Seconds after which a call that a few iterations do not settle ends with what it has.
     """
 
     def __init__(

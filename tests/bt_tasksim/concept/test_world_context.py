@@ -110,3 +110,13 @@ def test_it_does_not_begin_by_itself(second):
     for call in (lambda: view.begin([world("cup")]), lambda: view.advance(observed(0.0))):
         with pytest.raises(RuntimeError, match="a world of a batch"):
             call()
+
+
+def test_what_led_nowhere_is_counted_in_its_world_and_successes_of_copies_are_not_kept(second, act):
+    context, view = second
+    view.led_nowhere("holding", "cup", 0)
+    assert context.dead_ends("holding", "cup", np.arange(2)).tolist() == [0, 1]
+    assert view.dead_ends("holding", "cup", ONE).tolist() == [1]
+    model = act("a").model
+    view.note(model, True, ONE)
+    assert not view.succeeded([model], ONE).any() and not context.succeeded([model], np.arange(2)).any()

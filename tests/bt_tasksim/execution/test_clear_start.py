@@ -1,14 +1,20 @@
 """What starts inside the robot is no draw, whoever runs it."""
 
 import dataclasses
+import re
+import warnings
 
+import numpy as np
 import pytest
 
 from bt_tasksim import Fixture, ObjectSpec, Scene, evaluate, load_robot
+from bt_tasksim.checking.recording import record
 from bt_tasksim.concept_nodes import Grasp
-from bt_tasksim.core.errors import NoDrawError
+from bt_tasksim.core.errors import BtTasksimWarning, NoDrawError
 from bt_tasksim.execution.clear_start import clear_draw
 from bt_tasksim.execution.runner import Runner
+from bt_tasksim.scene.configuration import ObjectActor
+from bt_tasksim.scene.shapes import ConvexPiece
 
 pytestmark = pytest.mark.physical
 PANDA = load_robot("panda")
@@ -46,5 +52,68 @@ def test_a_run_refuses_it_and_an_evaluation_counts_it_as_no_draw():
     assert 0 < len(inside) < 6
     with Runner(Grasp("some", timeout=0.1), scene) as runner, pytest.raises(NoDrawError):
         runner.run(inside[0])
-    found = evaluate(Grasp("some", timeout=0.1), scene, episodes=6, seed=0)
-    assert [o.seed for o in found.outcomes if o.reason == "no_draw"] == inside
+    for tree in (Grasp("some", timeout=0.1), lambda: Grasp("some", timeout=0.1)):
+        found = evaluate(tree, scene, episodes=6, seed=0)
+        assert [o.seed for o in found.outcomes if o.reason == "no_draw"] == inside
+
+
+def test_a_recording_for_a_check_refuses_it():
+    found = record(Grasp("near", timeout=0.1), Scene(objects={"near": NEAR}), seeds=(3,))
+    (error,) = found.errors
+    assert isinstance(error, NoDrawError) and found.ends == [str(error)]
+
+
+FLAT_MESH = "v 0 0 0\nv 0.1 0 0\nv 0.1 0.1 0\nv 0 0.1 0\nf 1 2 3\nf 1 3 4\n"
+
+
+def panda_with(mesh, folder):
+    """A panda of which the collision mesh of link 3 is another file."""
+    urdf, before = PANDA.urdf, "collision/link3.stl"
+    text = urdf.read_text()
+    assert before in text
+    absolute = re.sub(r'filename="([^"]+)"', lambda m: f'filename="{(urdf.parent / m[1]).resolve()}"', text)
+    other = re.sub(rf'filename="[^"]*{before}"', f'filename="{mesh}"', absolute)
+    (folder / "panda.urdf").write_text(other)
+    return load_robot("panda", folder / "panda.urdf")
+
+
+def test_a_flat_mesh_is_named_once_and_all_other_links_are_looked_at(tmp_path):
+    (tmp_path / "flat.obj").write_text(FLAT_MESH)
+    robot = panda_with(tmp_path / "flat.obj", tmp_path)
+    near = Scene(objects={"far": FAR, "near": NEAR})
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for seed in (3, 4):
+            with pytest.raises(NoDrawError, match="'near' starts"):
+                clear_draw(near, seed, "evaluation", robot)
+    (only,) = said
+    assert only.category is BtTasksimWarning
+    for word in ("panda", "'panda_link3'", "flat.obj", "one plane"):
+        assert word in str(only.message)
+
+
+def test_without_a_mesh_file_a_warning_says_that_nothing_is_looked_at(tmp_path):
+    robot = panda_with(tmp_path / "nowhere.stl", tmp_path)
+    near = Scene(objects={"near": NEAR})
+    with pytest.warns(
+        BtTasksimWarning, match=r"inside panda is not noticed: .*no mesh file '.*nowhere\.stl'"
+    ) as said:
+        drawn = [clear_draw(near, seed, "evaluation", robot) for seed in (3, 4)]
+    assert len(said) == 1 and drawn[0].to_json() == near.sample(3).to_json()
+
+
+def test_a_piece_of_an_object_that_is_no_body_is_named_and_the_others_are_looked_at(monkeypatch):
+    flat = ConvexPiece(np.array([(0, 0, 0), (0.01, 0, 0), (0.01, 0.01, 0), (0, 0.01, 0)], float))
+    shape = ObjectActor.shape
+    monkeypatch.setattr(
+        ObjectActor,
+        "shape",
+        lambda actor: dataclasses.replace(shape(actor), collision=(flat, *shape(actor).collision)),
+    )
+    with pytest.warns(BtTasksimWarning, match="a piece of 'far' is not looked for"):
+        clear_draw(Scene(objects={"far": FAR}), 3, "evaluation", PANDA)
+    with (
+        pytest.warns(BtTasksimWarning, match="a piece of 'near' is not looked for"),
+        pytest.raises(NoDrawError, match="'near' starts"),
+    ):
+        clear_draw(Scene(objects={"near": NEAR}), 3, "evaluation", PANDA)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.collision import Collisions
 from bt_tasksim.planning.things import box_corners
-from bt_tasksim.scene.hulls import convex
 
 
 def test_they_are_made_once_for_a_robot(panda):

@@ -34,7 +34,8 @@ def test_places_lie_on_solid_ground(name):
 def test_free_height_is_free(name):
     fixture = load_fixture(name)
     for place in fixture.places:
-        if place.kind == "bin":
+        assert place.container == (place.kind == "bin")
+        if place.container:
             continue
         for box in fixture.boxes:
             local = np.array(box.pose[:3]) - np.array(place.position)

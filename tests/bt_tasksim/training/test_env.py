@@ -28,10 +28,12 @@ from toys import (
     play,
 )  # fmt: skip
 
+from bt_tasksim import ObjectSpec, Scene
 from bt_tasksim.concept_nodes import Wait
 from bt_tasksim.core.batch_leaf import RUNNING
-from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
+from bt_tasksim.core.errors import InputError, LeafError, MachineError, NoDrawError, UnreachableError
 from bt_tasksim.core.outcomes import PRECONDITION_UNMET
+from bt_tasksim.execution.clear_start import clear_draw
 from bt_tasksim.policy.network import Network
 from bt_tasksim.policy.policy import LearnedPolicy
 from bt_tasksim.training.env import EpisodeEnv
@@ -359,6 +361,24 @@ def test_what_is_never_reached_is_one_sentence(env_of):
     assert "ended with FAILURE: the tool is 350 mm high" in str(caught.value)
     with pytest.raises(InputError, match=r"not reached in 1 draws; the last one \(seed 7\)"):
         env.reset(options={"draw": 7})
+
+
+def test_what_starts_in_the_robot_is_drawn_again_and_what_always_does_is_one_sentence(env_of):
+    scene = Scene(objects={"cup": ObjectSpec("box", on="table", centre=(-0.38, 0.0), area=(0.12, 0.0))})
+    env = env_of(simple(), scene)
+    counts = [env.reset(seed=k)[1]["redrawn"] for k in range(10)]
+    assert env.redrawn == sum(counts) > 0 and min(counts) == 0
+    _, info = env.reset(seed=0)
+    clear_draw(scene, info["draw"], "training", env.batch.robot)
+    _, terminated, _, info = play(env, honest)
+    assert terminated and info["is_success"]
+    near = Scene(objects={"cup": ObjectSpec("box", on="table", centre=(-0.55, 0.0), area=(0.0, 0.0))})
+    env = env_of(simple(), near)
+    with pytest.raises(NoDrawError, match=r"^with seed 7 'cup' starts \d+ mm inside"):
+        env.reset(options={"draw": 7})
+    said = f"was not reached in {REDRAWS} draws; the last one had no world: with seed \\d+ 'cup' starts"
+    with pytest.raises(InputError, match=said):
+        env.reset(seed=0)
 
 
 def test_a_limit_from_outside_truncates(env_of):

@@ -4,6 +4,7 @@ import dataclasses
 import shutil
 import sys
 
+import numpy as np
 import pytest
 import toys
 
@@ -12,7 +13,7 @@ from bt_tasksim.core.identity import differing
 from bt_tasksim.core.resources import asset
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.robot.description import load_robot
-from bt_tasksim.training.evaluation import Job, Player
+from bt_tasksim.training.evaluation import LONGEST, Job, Player, _subject
 from bt_tasksim.training.subject import _world, evaluation_subject, own_code
 from bt_tasksim.trees import sequence
 
@@ -127,6 +128,22 @@ def test_engines_of_a_job_count():
     other = dataclasses.replace(job, options=EngineOptions(noise="hard"))
     assert differing(subject(job), subject(job)) == ""
     assert differing(subject(job), subject(other)) == "choice of engines"
+
+
+@pytest.mark.parametrize("longest", [60, 60.0, np.float64(60.0)])
+def test_equal_longest_times_are_one_and_the_text_is_that_of_earlier_files(longest):
+    job = Job("pick_and_throw", longest=longest)
+    with Player(job) as player:
+        assert _subject(job, player.runner, "evaluation")["longest time of an episode"] == "60 s"
+
+
+def test_times_that_differ_late_are_told_apart_and_the_usual_one_is_not_said():
+    said = []
+    for longest in (LONGEST, 60.00001, 1 / 3, 0.5):
+        job = Job("pick_and_throw", longest=longest)
+        with Player(job) as player:
+            said.append(_subject(job, player.runner, "evaluation").get("longest time of an episode"))
+    assert said == [None, "60.00001 s", "0.3333333333333333 s", "0.5 s"]
 
 
 def test_goals_in_another_file_take_part(tree, tmp_path):

@@ -13,6 +13,7 @@ from py_trees.common import Status
 from test_rollouts import UP as NETWORK
 from toys import DONE, SCENE, STILL, UP, Below, Check, Even, Move, Raise, Turn, Unprogrammed, alone, honest
 
+from bt_tasksim import ObjectSpec, Scene
 from bt_tasksim.concept.leaf import ONE, ContextLeaf
 from bt_tasksim.concept_nodes import Grasp, Pick, Wait
 from bt_tasksim.core.errors import InputError, LeafError, MachineError, UnreachableError
@@ -334,6 +335,21 @@ def test_worlds_that_are_ready_need_not_wait_for_others(env_of, vector_of):
                 seen, reward, over, _, _ = env.step(np.array(honest(seen)))
                 expected[k].append(reward)
         assert expected == episodes[seed][:4]
+
+
+def test_draws_that_start_in_the_robot_are_drawn_again_without_the_neighbours_feeling_it(vector_of, env_of):
+    scene = Scene(objects={"cup": ObjectSpec("box", on="table", centre=(-0.38, 0.0), area=(0.12, 0.0))})
+    vector = vector_of(simple(), scene, num_envs=4)
+    _, infos = vector.reset(seed=0)
+    alone = env_of(simple(), scene)
+    expected = [alone.reset(seed=k)[1] for k in range(4)]
+    assert infos["draw"].tolist() == [info["draw"] for info in expected]
+    assert infos["redrawn"].tolist() == [info["redrawn"] for info in expected]
+    assert vector.redrawn == sum(info["redrawn"] for info in expected) > 0
+    vector.step(np.array([UP] * 4))
+    near = Scene(objects={"cup": ObjectSpec("box", on="table", centre=(-0.55, 0.0), area=(0.0, 0.0))})
+    with pytest.raises(InputError, match=f"not reached in {REDRAWS} draws; the last one had no world: with"):
+        vector_of(simple(), near, num_envs=2).reset(seed=0)
 
 
 def test_what_is_asked_wrongly_is_one_sentence(vector_of):
