@@ -21,7 +21,7 @@ DOMAIN = 47
 
 
 class TwinPlayer(Player):
-    """Runs one draw after the other on one twin.
+    """Runs one draw after the other on one twin; `left_out` are seconds in which its physics stood still.
 
     Args:
         conditions: What is measured.
@@ -47,6 +47,7 @@ class TwinPlayer(Player):
         runner = Runner(tree, drawn.scene, options, longest=longest(drawn))
         try:
             found = judged_by_truth(runner, self._bench.evaluation, drawn.seed, drawn.stream)
-            return {**asdict(found), "concept": self.concept_of(runner, found.leaf)}
+            lost = self._bench.evaluation.tell()["left_out"]
+            return {**asdict(found), "concept": self.concept_of(runner, found.leaf), "left_out": lost}
         finally:
             runner.close()
