@@ -27,8 +27,8 @@ class AnyOrder(Reporting, Composite):
 
     A child that fails before anything below it has acted is passed over: the next one has its turn, and after
     the last one the first again, but none twice as long as nothing has acted meanwhile. It fails with a child
-    that fails after it has acted, and where none of those that are left can begin. What has succeeded is not
-    ticked again.
+    that fails after it has acted, and where none of those that are left can begin: with the one that failed
+    last then. It says why the others could not begin, too. What has succeeded is not ticked again.
 
     Args:
         name: The node's name.
@@ -43,6 +43,8 @@ class AnyOrder(Reporting, Composite):
 
     def _begin(self) -> None:
         self._at, self._acted = 0, False
+        self._refused = 0
+        """The child that failed last."""
         self._done: set[int] = set()
         self._stuck: set[int] = set()
         self._causes: dict[int, Cause | None] = {}
@@ -79,6 +81,7 @@ class AnyOrder(Reporting, Composite):
             self._done.add(self._at)
             self._causes.pop(self._at, None)
         else:
+            self._refused = self._at
             self._causes[self._at] = cause_of(child)
             if self._acted:
                 return Status.FAILURE
@@ -93,10 +96,9 @@ class AnyOrder(Reporting, Composite):
             if following not in self._done and following not in self._stuck:
                 self._at = following
                 return None
-        left = [k for k in range(count) if k not in self._done]
-        if not left:
+        if len(self._done) == count:
             return Status.SUCCESS
-        self._at = left[0]
+        self._at = self._refused
         self.current_child = self.children[self._at]
         return Status.FAILURE
 
@@ -154,6 +156,8 @@ class BatchAnyOrder(BatchNode):
         self.count = len(place.children)
         self.stands_at = self.arrays.indices(self.count)
         """``(N,)`` the child that was ticked last, or by which a failure is told."""
+        self.refused = self.arrays.indices(self.count)
+        """``(N,)`` the child that failed last."""
         self.acted = self.arrays.full(False, "bool")
         """``(N,)`` that child has acted since it began."""
         self.done = [self.arrays.full(False, "bool") for _ in place.children]
@@ -187,6 +191,7 @@ class BatchAnyOrder(BatchNode):
         self.end(running, RUNNING)
         (good,), (bad,) = self.split(status == SUCCESS, rows)
         self.done[child][good] = True
+        self.refused[bad] = child
         for row in good.tolist() if self._causes else ():
             self._causes.get(row, {}).pop(child, None)
         for row in bad.tolist():
@@ -221,7 +226,7 @@ class BatchAnyOrder(BatchNode):
             self._go(following, there)
         for number in range(self.count):
             (left,), (rows,) = self.split(~self.done[number][rows], rows)
-            self.stands_at[left] = number
+            self.stands_at[left] = self.refused[left]
             self.end(left, FAILURE)
         self.end(rows, SUCCESS)
 

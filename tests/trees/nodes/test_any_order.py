@@ -85,6 +85,17 @@ def test_nothing_is_tried_twice_while_nothing_acts():
     assert run(tree) == 1 and tree.status == Status.FAILURE and world.tried == [0, 1, 2]
 
 
+def test_where_nothing_can_begin_it_is_told_by_what_failed_last():
+    tree, _ = made([{9}, (), {9}])
+    run(tree)
+    assert speaker(tree).name == "task 0" and tree.tip().name == "task 0", "after task 1 has acted"
+    tree, _ = made([{9}, {9}, {9}])
+    run(tree)
+    assert speaker(tree).name == "task 2" and tree.tip().name == "task 2"
+    said = whole_outcome(speaker(tree)).sentence
+    assert said.endswith(": 2 has to wait") and "task 0: 0 has to wait; task 1: 1 has to wait" in said
+
+
 def test_a_task_that_goes_wrong_ends_all_and_what_could_not_begin_is_said():
     tree, world = made([{2}, (), ()], fails={1})
     run(tree)
