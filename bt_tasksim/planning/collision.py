@@ -1,4 +1,4 @@
-"""Whether an arm, its hand and what it holds touch anything, for given joints."""
+"""Whether an arm, its hand and what it holds touch anything, or leave the workspace, for given joints."""
 
 from __future__ import annotations
 
@@ -11,14 +11,18 @@ from bt_tasksim.planning.bodies import RobotBodies
 from bt_tasksim.planning.lines import halves
 from bt_tasksim.planning.pairs import Pairs
 from bt_tasksim.planning.things import Held, Leave, Thing, Touch
+from bt_tasksim.robot.description import RobotDescription
 
 OWN = 0.002
 """Metres: bodies have skins of half a millimetre in physics, and arms lag by some. An SO-100 that took a cube
 near its base with its jaw a millimetre from its own arm pressed on that with 180 N."""
+INSIDE = 0.02
+"""Metres by which a tool stays within the sides and the top of the workspace: a robot is stopped that could
+not stop before them."""
 
 
 class Collisions:
-    """A robot among things.
+    """A robot among things, in its workspace.
 
     Args:
         bodies: The robot's.
@@ -27,6 +31,7 @@ class Collisions:
         held: What is in the hand, if anything.
         leave: What may touch.
         own: Metres that the robot's own bodies keep from each other.
+        workspace: Corners ``(2, 3)`` of the box in which the tool's origin stays, see `bounds`.
     """
 
     def __init__(
@@ -37,7 +42,9 @@ class Collisions:
         held: Held | None = None,
         leave: Leave | None = None,
         own: float = OWN,
+        workspace: Array | None = None,
     ) -> None:
+        self._workspace = None if workspace is None else workspace.tolist()
         self._bodies, self._q = bodies, bodies.configuration(bodies.robot.rest, hand)
         self._arm = bodies.order[: len(bodies.robot.arm_joints)]
         self._pairs = Pairs(bodies.model, bodies.shapes.copy(), bodies.links, leave)
@@ -53,8 +60,8 @@ class Collisions:
         self._pairs.stand(things, moves, hands, inside)
 
     def free(self, arm: Array) -> bool:
-        """Nothing touches with the arm's joints at ``arm (n_arm,)``."""
-        return self._pairs.free(self._at(arm))
+        """Nothing touches with the arm's joints at ``arm (n_arm,)``, and the tool is in the workspace."""
+        return self._pairs.free(self._at(arm)) and self._inside()
 
     def all_free(self, arms: Array) -> bool:
         """Nothing touches at any of ``arms (n, n_arm)``; the middle ones are asked first."""
@@ -62,11 +69,21 @@ class Collisions:
 
     def touches(self, arm: Array) -> list[Touch]:
         """What touches with the arm's joints at ``arm (n_arm,)``."""
-        return self._pairs.touches(self._at(arm))
+        found = self._pairs.touches(self._at(arm))
+        return found if self._inside() else [*found, ("the tool", "the border of its workspace")]
 
     def keys(self, arm: Array) -> list[Touch]:
         """The same by keys of things, see `Thing.key`."""
         return self._pairs.keys(self._at(arm))
+
+    def _inside(self) -> bool:
+        """The tool is in the workspace for the joints that were asked about last."""
+        if self._workspace is None:
+            return True
+        joint, tool = self._pairs.placement(self._bodies.tool_joint), self._bodies.tool_placement
+        low, high = self._workspace
+        at = joint.act(tool.translation).tolist()
+        return all(a <= x <= b for a, x, b in zip(low, at, high, strict=True))
 
     def tool_rotation(self) -> Array:
         """The tool's rotation ``(3, 3)`` for the joints that were asked about last."""
@@ -78,3 +95,17 @@ class Collisions:
         """Pinocchio's ``q``."""
         self._q[self._arm] = arm
         return self._q
+
+
+def bounds(robot: RobotDescription, start: Array) -> Array | None:
+    """Corners ``(2, 3)`` of the box in which a tool's origin stays on its way; None without safety limits.
+
+    Args:
+        robot: The robot.
+        start: Tool pose ``(7,)`` where the way begins, which may be farther out.
+    """
+    if robot.safety is None:
+        return None
+    low, high = robot.safety.workspace
+    sides = np.array([INSIDE, INSIDE, 0.0])
+    return np.array([np.minimum(low + sides, start[:3]), np.maximum(high - INSIDE, start[:3])])

@@ -20,7 +20,7 @@ from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.arm import FULL, LEANS, SWAYS, arm_of
 from bt_tasksim.planning.bodies import bodies_of
-from bt_tasksim.planning.collision import OWN, Collisions
+from bt_tasksim.planning.collision import OWN, Collisions, bounds
 from bt_tasksim.planning.lines import STEP, line
 from bt_tasksim.planning.route import Pace, Route, timed
 from bt_tasksim.planning.search import Search
@@ -88,6 +88,7 @@ class WayFinder:
         self.start = np.clip(joints, robot.arm_lower, robot.arm_upper)
         self._robot, self._held, self._own = robot, held, own
         self._hand, self._things, self._leave = hand, told_apart(things), leave or Leave()
+        self._workspace = bounds(robot, self.arm.tool(self.start))
 
     @property
     def goes_straight(self) -> bool:
@@ -152,7 +153,8 @@ class WayFinder:
 
     def _among(self, things: Sequence[Thing], pairs: Collection[Touch] = ()) -> Collisions:
         leave = replace(self._leave, pairs={*self._leave.pairs, *pairs})
-        return Collisions(bodies_of(self._robot), self._hand, things, self._held, leave, self._own)
+        bodies = bodies_of(self._robot)
+        return Collisions(bodies, self._hand, things, self._held, leave, self._own, self._workspace)
 
     def ends(self, tools: Array, beginning: Array | None = None, leans: float = LEANS) -> Ends:
         """Postures at tool poses ``(k, 7)``, from where the arm is or from ``beginning (n_arm,)``.

@@ -1,13 +1,16 @@
 """What touches: by margins, by what is held, by what may touch, and not by what is far away."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bt_tasksim.core import poses
+from bt_tasksim.planning.arm import arm_of
 from bt_tasksim.planning.bodies import bodies_of
-from bt_tasksim.planning.collision import OWN, Collisions
+from bt_tasksim.planning.collision import INSIDE, OWN, Collisions, bounds
 from bt_tasksim.planning.things import Leave, Thing, box_corners
 from bt_tasksim.robot.description import load_robot
 
@@ -114,3 +117,22 @@ def test_a_robot_keeps_a_little_room_from_itself(name):
     only_near = np.flatnonzero(~free[:, 0] & free[:, 1])
     assert len(only_near) > 0, "the margin tells none apart"
     assert all(near.touches(q) and not touching.touches(q) for q in drawn[only_near])
+
+
+def test_a_tool_beyond_the_border_of_its_workspace_counts_as_touching():
+    robot = load_robot("panda")
+    box = bounds(robot, arm_of(robot).tool(robot.rest))
+    low, high = robot.safety.workspace
+    assert np.allclose(box[0] - low, [INSIDE, INSIDE, 0.0]) and np.allclose(box[1], high - INSIDE)
+    x = arm_of(robot).tool(robot.rest)[0]
+    for workspace, inside in ((box, True), (np.array([box[0], [x - 0.01, *box[1][1:]]]), False)):
+        among = Collisions(bodies_of(robot), robot.hand_open, (), workspace=workspace)
+        assert among.free(robot.rest) is inside
+        assert ("border" in str(among.touches(robot.rest))) is not inside
+
+
+def test_who_begins_beyond_the_border_may_go_back():
+    robot = load_robot("panda")
+    out = np.array([-0.9, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0])
+    assert bounds(robot, out)[0, 0] == -0.9
+    assert bounds(dataclasses.replace(robot, safety=None), out) is None
