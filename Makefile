@@ -8,7 +8,7 @@ SHELL := /bin/bash
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
 EXTRAS := sim,train,report,ros,remote,mujoco,warp,cluster,docs,dev
-PYTEST_FLAGS ?= -n logical --maxprocesses 4
+PYTEST_FLAGS ?= -n logical --maxprocesses 4 --dist worksteal
 
 TWIN := .twin
 
@@ -33,6 +33,7 @@ test-twin: setup twin-environment
 # The tests that stand on physics again, since it rounds differently on another processor: drive targets nudged
 # (rad), worlds drawn with other seeds. PARTS=3: each perturbation has another third of the tests.
 PARTS ?= 1
+PHYSICAL = $(shell grep -rl --include='test_*.py' 'mark\.physical' tests)
 PERTURBED ?= "--nudge=-1e-6" "--nudge=2e-7 --shift-seeds=1000" "--nudge=1e-6 --shift-seeds=2000"
 
 test-perturbed: setup
@@ -40,17 +41,17 @@ test-perturbed: setup
 	for how in $(PERTURBED); do \
 	  how="$$how --part=$$((k % $(PARTS)))/$(PARTS)"; k=$$((k + 1)); \
 	  echo "Physical tests, $$how"; \
-	  $(VENV)/bin/python -m pytest -q $(PYTEST_FLAGS) -m physical $(addprefix --ignore ,$(LIVE)) $$how || failed=1; \
+	  $(VENV)/bin/python -m pytest -q $(PYTEST_FLAGS) -m physical $(PHYSICAL) $$how || failed=1; \
 	done; exit $$failed
 
-# Damaged inputs of every kind, some seconds of each; python -m tests.attacks KIND --cases N counts more.
+# Damaged inputs of every kind, some seconds of each, two kinds at a time; python -m tests.attacks KIND --cases N
+# counts more.
 SECONDS_EACH ?= 30
 ATTACKS := logs trajectories replays yaml_files settings checkpoints ros_messages
 
 attacks: setup
-	@failed=0; for kind in $(ATTACKS); do \
-	  $(VENV)/bin/python -m tests.attacks $$kind --cases 1000000 --seconds $(SECONDS_EACH) || failed=1; \
-	done; exit $$failed
+	@printf '%s\n' $(ATTACKS) | xargs -P 2 -I {} \
+	  $(VENV)/bin/python -m tests.attacks {} --cases 1000000 --seconds $(SECONDS_EACH)
 
 bench: setup
 	$(VENV)/bin/bt-tasksim bench

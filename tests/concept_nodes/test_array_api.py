@@ -117,6 +117,13 @@ class Asking:
         self.single = [s for s in (self.begun(s, rng) for s in situations) if s is not None]
         assert self.single, "it begins in none of the worlds"
         self.batch = together(self.single)
+        self._alone = {}
+
+    def alone(self, name):
+        """What each world is answered by itself; asked once, since one that begins may plan for seconds."""
+        if name not in self._alone:
+            self._alone[name] = [self.ask(name, s) for s in self.single]
+        return self._alone[name]
 
     def begun(self, situation, rng):
         try:
@@ -211,7 +218,7 @@ def test_a_world_gets_the_same_in_every_batch_to_the_last_bit(asking, scenario, 
     two, many_of_them = rng.integers(0, n, 2), rng.integers(0, n, 64)
     planned = [two, np.arange(n)[::-1]]  # a plan takes seconds where there is hardly a way
     for name in functions(at.model):
-        one = [at.ask(name, s) for s in at.single]
+        one = at.alone(name)
         for order in (
             planned if name == "begin" else [*planned, np.arange(n), rng.permutation(n), many_of_them]
         ):
@@ -262,7 +269,7 @@ def test_every_library_gives_the_same(asking, concept, library):
     at, (change, kind) = asking("pick_and_place", concept), libraries()[library]
     batch = at.batch.map(change)
     for name in functions(at.model):
-        one = [at.ask(name, s) for s in at.single]
+        one = at.alone(name)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # torch's words about read-only constants
             found = at.ask(name, batch)

@@ -23,9 +23,8 @@ from bt_tasksim.core.world import Obstacle, WorldModel
 from bt_tasksim.scene.shapes import ShapeSize, object_model
 from bt_tasksim.trees import sequence
 
-pytestmark = pytest.mark.physical
 
-
+@pytest.mark.physical
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf", "pick_and_throw"])
 def test_each_world_is_treated_as_alone(situations, functions, scenario):
     answers = {name: situations(Bring, scenario).check(name) for name in functions}

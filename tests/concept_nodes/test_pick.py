@@ -9,9 +9,8 @@ from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import CANNOT_START, DONE
 
-pytestmark = pytest.mark.physical
 
-
+@pytest.mark.physical
 @pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf"])
 def test_each_world_is_treated_as_alone(situations, functions, scenario):
     answers = {name: situations(Pick, scenario).check(name) for name in functions}
@@ -50,6 +49,7 @@ def test_without_the_object_in_the_hand_it_cannot_start(toy):
     assert stage.context.command.tool is None
 
 
+@pytest.mark.physical
 def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
     from bt_tasksim.concept.seen import Known
 
@@ -60,6 +60,7 @@ def test_a_lift_is_free_of_its_support_and_in_the_hand(recorded_run):
     assert cost[0] == 10.0 and cost[-1] == 0.0
 
 
+@pytest.mark.physical
 def test_what_may_not_be_squeezed_costs_the_hands_force(recorded_run):
     from bt_tasksim.concept.seen import Known
 
@@ -74,6 +75,7 @@ def test_what_may_not_be_squeezed_costs_the_hands_force(recorded_run):
     assert gentle.sufficient_cost(now, decision.memory)[0] < 1.0
 
 
+@pytest.mark.physical
 def test_the_squeeze_counts_at_the_beginning_too(recorded_run):
     import dataclasses
 

@@ -305,10 +305,10 @@ def test_subtrees_that_multiply_are_refused_soon():
         one(f"t{i}", f'<Sequence><SubTree ID="t{i + 1}"/><SubTree ID="t{i + 1}"/></Sequence>')
         for i in range(60)
     )
-    start = time.perf_counter()
+    start = time.process_time()  # whatever else the machine does
     with pytest.raises(InputError, match=f"more than {MOST_NODES} nodes"):
         read('<SubTree ID="t0"/>', uses, one("t60"))
-    assert time.perf_counter() - start < 10
+    assert time.process_time() - start < 10
 
 
 def test_a_missing_file_is_refused(tmp_path):

@@ -26,7 +26,6 @@ from bt_tasksim.trees import force_failure, parallel, retry, sequence, timeout
 from bt_tasksim.trees.load import load_source
 from tests.unlike_worlds import holding, mixed
 
-pytestmark = pytest.mark.physical
 SCENARIO = "pick_and_place_recovering"  # retries, disturbances, and several ways for it to end
 
 
@@ -80,6 +79,7 @@ def test_a_seed_comes_to_the_same_in_mujoco():
     assert in_batch(source.build, source.scene, seeds, 2, 2, engines="mujoco") == alone
 
 
+@pytest.mark.physical
 def test_failures_are_told_as_one_world_tells_them():
     scene = load_source("pick_and_place").scene
 
@@ -93,6 +93,7 @@ def test_failures_are_told_as_one_world_tells_them():
     assert in_batch(build, scene, (0, 1), 2) == alone
 
 
+@pytest.mark.physical
 def test_what_is_out_of_reach_fails_its_leaf():
     scene = load_source("pick_and_place").scene
 
@@ -126,6 +127,7 @@ class Raises(ConceptModel):
         return seen.elapsed > 0.2
 
 
+@pytest.mark.physical
 def test_a_leaf_that_raises_in_one_world_leaves_the_others_alone():
     scene, seeds = load_source("pick_and_place").scene, tuple(range(6))
     alone = one_by_one(lambda: sequence("root", Raises("target")), scene, seeds)
@@ -425,6 +427,7 @@ def test_unlike_objects_share_a_batch():
     assert in_batch(source.build, scene, seeds, 3) == alone
 
 
+@pytest.mark.physical
 @pytest.mark.parametrize(
     ("scenes", "worlds"),
     [
@@ -464,6 +467,7 @@ class Looks(Behaviour):
         return Status.FAILURE
 
 
+@pytest.mark.physical
 def test_behaviours_of_ones_own_know_what_other_leaves_have_reached():
     scene, seeds = load_source("pick_and_place").scene, (0, 1, 2)
 
@@ -487,6 +491,7 @@ class Drops(Behaviour):
         return Status.RUNNING if self.context.now < 3.5 else Status.SUCCESS
 
 
+@pytest.mark.physical
 def test_a_goal_that_is_lost_is_said_alike_at_any_batch():
     scene, seeds = load_source("pick_and_place").scene, (0, 1)
 

@@ -16,8 +16,6 @@ from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report.write import write_run
 from bt_tasksim.trees.scenarios import pick_and_place, shelf_to_shelf
 
-pytestmark = pytest.mark.physical
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

@@ -55,8 +55,6 @@ from bt_tasksim.trees import (
 )
 from bt_tasksim.trees.nodes.train import Train, train_nodes
 
-pytestmark = pytest.mark.physical
-
 HERE = 0.35
 """Where the tool is at first."""
 
