@@ -16,6 +16,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import torch
 
 from bt_tasksim.cli.app import NAME, application
 from bt_tasksim.cli.main import main
@@ -220,12 +221,16 @@ def run_module(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
         words = overridden(words, "--episodes 2")  # one for each log
         monkeypatch.setattr("bt_tasksim.core.resources.asset", two_logs)
     monkeypatch.setattr(sys, "argv", words)
+    threads = torch.get_num_threads()
     try:
         runpy.run_module(words[0], run_name="__main__", alter_sys=True)
     except SystemExit as end:
         assert end.code in (0, None), end.code
+    finally:
+        torch.set_num_threads(threads)  # a measurement takes one
 
 
+@pytest.mark.filterwarnings("ignore:.* found in sys.modules after import:RuntimeWarning")
 @pytest.mark.parametrize("line", commands())
 def test_it_runs_or_is_parsed(line, workplace, monkeypatch):
     words = shlex.split(line)

@@ -161,7 +161,7 @@ def test_a_wrong_address_is_refused_by_the_command(capsys):
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)]
 )
 def test_a_command_that_is_ended_loses_nothing_and_leaves_nothing(tmp_path, whole, number, code):
-    episodes = 40 if number == signal.SIGKILL else 2000  # more than it can do before it is told to end
+    episodes = 96 if number == signal.SIGKILL else 2000  # more than it can do before it is told to end
     words = [
         "evaluate",
         "pick_and_throw",
