@@ -11,8 +11,9 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.execution.batch_runner import BatchRunner
+from bt_tasksim.execution.given import checked_policies
 from bt_tasksim.execution.pipelines import EngineOptions, result_names
-from bt_tasksim.execution.runner import Runner
+from bt_tasksim.execution.runner import LONGEST, Runner
 from bt_tasksim.execution.session import engine_options
 from bt_tasksim.execution.worlds import why_alone
 from bt_tasksim.scene.configuration import check_seed
@@ -40,6 +41,7 @@ def evaluate(
     policy: Mapping[str, str] | None = None,
     progress: Callable[[EpisodeOutcome], None] | None = None,
     options: EngineOptions | None = None,
+    longest: float = LONGEST,
     **engines: Any,
 ) -> Evaluation:
     """Run a tree in many draws of a scene, and count successes.
@@ -53,6 +55,7 @@ def evaluate(
         policy: Policies by concept, as for `bt_tasksim.run`.
         progress: Called after every episode, in the order in which they end.
         options: Which engines; or name them by keyword, such as ``noise="none"``.
+        longest: Seconds of an episode after which it is stopped.
         **engines: See `EngineOptions`.
 
     Returns:
@@ -63,15 +66,19 @@ def evaluate(
         InputError: The tree, the scene, a policy or an option is no good.
         MachineError: A robot has failed, or an engine has gone away.
     """
-    options = engine_options(options, engines, ("episodes", "seed", "policy", "progress", "options"))
+    options = engine_options(
+        options, engines, ("episodes", "seed", "policy", "progress", "options", "longest")
+    )
     if episodes < 1:
         raise InputError(f"an evaluation needs at least one episode, found {episodes}")
     seeds = range(seed, seed + episodes)
     for end in (seeds[0], seeds[-1]):
         check_seed(end)
-    made = with_policies(lambda: tree if isinstance(tree, Behaviour) else tree(), (policy or {}).items())
+    made = with_policies(
+        lambda: tree if isinstance(tree, Behaviour) else tree(), checked_policies(policy).items()
+    )
     started, found = time.perf_counter(), dict[int, EpisodeOutcome]()
-    with Runner(made() if isinstance(tree, Behaviour) else made, scene, options) as runner:
+    with Runner(made() if isinstance(tree, Behaviour) else made, scene, options, longest=longest) as runner:
         at_once = not isinstance(tree, Behaviour) and not why_alone(options) and episodes > 1
         outcomes = _batch(made, runner, seeds) if at_once else _alone(tree, made, runner, seeds)
 
@@ -98,7 +105,7 @@ def _batch(
     build: Callable[[], Behaviour], runner: Runner, seeds: Sequence[int]
 ) -> Generator[EpisodeOutcome, None, None]:
     worlds = min(usual_batch(runner.options), len(seeds))
-    with BatchRunner(build, runner.scene, runner.options, worlds) as batch:
+    with BatchRunner(build, runner.scene, runner.options, worlds, longest=runner.longest) as batch:
         for seed, found in batch.run(seeds):
             yield of_batch(seed, found)
 

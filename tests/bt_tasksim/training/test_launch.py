@@ -7,6 +7,7 @@ import pytest
 from bt_tasksim import InputError, Scene, evaluate
 from concept_nodes import Grasp, Pick
 from trees import sequence
+from trees.load import load_source
 
 SCENE = Scene(objects={"box": "on table"})
 
@@ -39,3 +40,12 @@ def test_outcomes_are_the_same_one_by_one_and_at_once():
 def test_what_makes_no_sense_is_refused(said, wanted):
     with pytest.raises(InputError, match=wanted):
         evaluate(build, SCENE, **said)
+
+
+def test_an_episode_may_be_stopped_early_at_once_and_one_by_one():
+    source = load_source("pick_and_place")
+    for tree in (source.build, source.build()):
+        found = evaluate(tree, source.scene, 2, longest=0.5)
+        assert [outcome.reason for outcome in found.outcomes] == ["time_over"] * 2
+    with pytest.raises(InputError, match="policies are names"):
+        evaluate(source.build, source.scene, 2, policy="grasp=programmed")
