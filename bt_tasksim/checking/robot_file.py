@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bt_tasksim.checking.report import Report
 from bt_tasksim.checking.robot_drives import check_drives
-from bt_tasksim.checking.robot_frames import check_frames, check_limits
+from bt_tasksim.checking.robot_frames import check_frames, check_limits, check_workspace
 from bt_tasksim.checking.robot_reach import check_reach
 from bt_tasksim.checking.robot_touching import check_touching
 from bt_tasksim.robot.description import load_robot
@@ -28,6 +28,7 @@ def check_robot(robot: str) -> Report:
     kinematics, report = PinocchioKinematics(found), Report()
     check_frames(kinematics, report)
     check_limits(found, report)
+    check_workspace(kinematics, report)
     postures = check_reach(kinematics, report)
     check_touching(kinematics, postures, report)
     check_drives(robot, kinematics, report)

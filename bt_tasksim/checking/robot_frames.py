@@ -104,6 +104,26 @@ def _check_middle(robot: RobotDescription, middle: float, report: Report) -> Non
         report.add(ERROR if middle > FAR else WARNING, robot.name, "tool.pose", what, remedy)
 
 
+def check_workspace(kinematics: PinocchioKinematics, report: Report) -> None:
+    """The tool of an arm at rest is in the workspace of its safety limits, if it has any.
+
+    Args:
+        kinematics: Of the robot.
+        report: Where findings go.
+    """
+    robot = kinematics.robot
+    if robot.safety is None:
+        return
+    tool = kinematics.forward(np.concatenate([robot.rest, robot.hand_open]))[:3]
+    low, high = robot.safety.workspace
+    if np.any(tool < low) or np.any(tool > high):
+        at = ", ".join(f"{x:.2f}" for x in tool)
+        what = f"does not hold the tool at rest, at ({at}) m: the robot would be stopped at once"
+        report.add(
+            ERROR, robot.name, "safety.workspace", what, "make the box larger, or take another arm.rest"
+        )
+
+
 def check_limits(robot: RobotDescription, report: Report) -> None:
     """The arm's limits are those of its URDF, and it rests away from them.
 

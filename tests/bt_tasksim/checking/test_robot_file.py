@@ -11,7 +11,7 @@ import yaml
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.checking.robot_drives import check_drives
 from bt_tasksim.checking.robot_file import check_robot
-from bt_tasksim.checking.robot_frames import check_frames, check_limits
+from bt_tasksim.checking.robot_frames import check_frames, check_limits, check_workspace
 from bt_tasksim.checking.robot_reach import check_reach
 from bt_tasksim.checking.robot_touching import check_touching
 from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
@@ -126,3 +126,13 @@ def test_drives_that_are_too_weak_are_named(small, changes, where, what):
     check_drives(robot, PinocchioKinematics(load_robot(robot)), report)
     found = [f for f in report.findings if f.function == where]
     assert found and what in found[0].what, report.lines()
+
+
+def test_a_workspace_that_does_not_hold_the_resting_tool_is_an_error():
+    robot = load_robot("panda")
+    for x, errors in ((0.85, 0), (0.1, 1)):
+        workspace = np.array([robot.safety.workspace[0], [x, *robot.safety.workspace[1][1:]]])
+        safety, report = dataclasses.replace(robot.safety, workspace=workspace), Report()
+        check_workspace(PinocchioKinematics(dataclasses.replace(robot, safety=safety)), report)
+        assert report.errors == errors
+        assert all(finding.function == "safety.workspace" for finding in report.findings)
