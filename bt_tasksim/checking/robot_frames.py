@@ -115,8 +115,7 @@ def check_workspace(kinematics: PinocchioKinematics, report: Report) -> None:
     if robot.safety is None:
         return
     tool = kinematics.forward(np.concatenate([robot.rest, robot.hand_open]))[:3]
-    low, high = robot.safety.workspace
-    if np.any(tool < low) or np.any(tool > high):
+    if not robot.safety.in_workspace(tool):
         at = ", ".join(f"{x:.2f}" for x in tool)
         what = f"does not hold the tool at rest, at ({at}) m: the robot would be stopped at once"
         report.add(

@@ -174,8 +174,7 @@ def _fits(model: ObjectModel, place: PlaceModel) -> bool:
 def _any_reached(robot: RobotDescription, asked: Array) -> bool:
     """The arm reaches one of these tool poses ``(k, 7)``, within its workspace if it has one."""
     if robot.safety is not None:
-        low, high = robot.safety.workspace
-        asked = asked[((asked[:, :3] >= low) & (asked[:, :3] <= high)).all(axis=-1)]
+        asked = asked[robot.safety.in_workspace(asked[:, :3])]
     if not len(asked):
         return False
     _, failures = _kinematics(robot, len(asked)).joints_at(asked)

@@ -70,6 +70,12 @@ class SafetyLimits:
     watchdog: float
     policies: Mapping[str, str] = field(default_factory=dict)
 
+    def in_workspace(self, points: Array) -> Array:
+        """Booleans ``(...)``: the tool's origin may be at ``points (..., 3)``, metres, base frame."""
+        low, high = self.workspace
+        found: Array = ((points >= low) & (points <= high)).all(axis=-1)
+        return found
+
     def clips(self, limit: str) -> bool:
         """The limit's policy says clip."""
         return self.policies.get(limit, STOP) == CLIP

@@ -113,7 +113,7 @@ class WayToStart:
             InputError: It is.
         """
         tool, limits = self._kinematics.forward(goal)[:3], self._limits
-        if np.any(tool < limits.workspace[0]) or np.any(tool > limits.workspace[1]):
+        if not limits.in_workspace(tool):
             at = ", ".join(f"{x:.2f}" for x in tool)
             raise InputError(
                 f"a run would begin with the tool at ({at}), outside of safety.workspace: change that or the "
