@@ -68,8 +68,12 @@ class RealTime(Closing):
         _INTERPRETER.open()
 
     def set_aside(self) -> None:
-        """Collect garbage now, which takes a moment, and have later collections pass over what is left."""
-        _INTERPRETER.set_aside()
+        """Collect garbage now, which takes a moment, and have later collections pass over what is left.
+
+        Closed, it does nothing.
+        """
+        if self._open:
+            _INTERPRETER.set_aside()
 
     def close(self) -> None:
         """Give back what was there before, if no other loop is open; a second call does nothing."""

@@ -192,13 +192,15 @@ class TwinNode(Node):  # type: ignore[misc]
         else:
             self._joints.publish(message)
 
-    def _forget_objects(self) -> None:
-        """End the topics of objects that are not in this world."""
+    def _object_topics(self, configuration: ActorConfiguration) -> list[str]:
+        """Topics of the poses of a world's objects; none where nobody tracks them.
+
+        Raises:
+            InputError: A name makes no topic.
+        """
         if self.setting.objects is None:
-            return
-        here = [self.setting.object_topic(actor.name) for actor in self.cell.configuration.objects]
-        for topic in self._objects.keys() - set(here):
-            self.destroy_publisher(self._objects.pop(topic))
+            return []
+        return [self.setting.object_topic(actor.name) for actor in configuration.objects]
 
     # ---- the evaluation channel -------------------------------------------------------------------------
 
@@ -210,8 +212,10 @@ class TwinNode(Node):  # type: ignore[misc]
                 if not isinstance(text, str) or not isinstance(seed, int):
                     raise InputError("'load' needs a configuration as text, and a number as seed")
                 configuration = ActorConfiguration.from_json(text)
+                topics = self._object_topics(configuration)  # a name that makes none is refused first
                 self.cell.load(configuration, seed)
-                self._forget_objects()
+                for topic in self._objects.keys() - set(topics):
+                    self.destroy_publisher(self._objects.pop(topic))
                 self.fault, self._frozen = "", []
                 self._delayed.clear()
                 self._worlds += 1

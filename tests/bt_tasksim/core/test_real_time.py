@@ -51,6 +51,8 @@ def test_the_last_of_several_loops_gives_back_what_the_first_one_found(usual):
     second.close()
     assert sys.getswitchinterval() == usual and gc.get_freeze_count() == 0
     second.close()
+    second.set_aside()
+    assert gc.get_freeze_count() == 0, "who is closed freezes nothing"
 
 
 def test_what_an_application_has_frozen_stays_so():

@@ -24,7 +24,7 @@ import yaml
 from benchmarks.any_tree.episodes import Conditions, player_of
 from benchmarks.faults import Bench, Seen, bench_of, measure
 from benchmarks.sweep import sweeping
-from bt_tasksim import Runner
+from bt_tasksim import Goal, Runner, Scene
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.real_time import TURNS
 from bt_tasksim.core.world import Hidden
@@ -393,6 +393,16 @@ def test_topics_of_objects_end_with_their_world(bench: Bench) -> None:
         while (told := bench.evaluation.tell()["object_topics"]) != topics(names):
             assert time.monotonic() < end, (told, names)
             time.sleep(0.05)
+
+
+def test_an_object_whose_name_makes_no_topic_is_refused_and_the_world_stays(bench: Bench) -> None:
+    there = load_source("pick_and_throw").scene.sample(0)
+    bench.evaluation.load(there, 0)
+    odd = Scene("panda", objects={"my-cup": "cube on table"}, goal=Goal("my-cup", "table")).sample(0)
+    with pytest.raises(MachineError, match="my-cup"):
+        bench.evaluation.load(odd, 0)
+    truth, _ = bench.evaluation.truth()
+    assert truth.objects.shape == (len(there.objects), 7)
 
 
 def test_a_runner_of_a_robot_is_in_real_time_until_it_is_closed(bench: Bench) -> None:
