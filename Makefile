@@ -8,7 +8,7 @@ SHELL := /bin/bash
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
 EXTRAS := sim,train,report,ros,remote,mujoco,warp,cluster,docs,dev
-PYTEST_FLAGS ?= -n logical --maxprocesses 4 --dist worksteal
+PYTEST_FLAGS ?= -n logical --maxprocesses 4
 
 TWIN := .twin
 
