@@ -34,6 +34,8 @@ from bt_tasksim.trees.load import load_source
 
 EVERY = 10
 """Control periods from one picture to the next, where pictures are drawn."""
+QUICK_EVERY = 100
+"""The same for a quick look."""
 CAMERA = "perception"
 START = 60.0
 """Seconds that a server may take to start."""
@@ -44,15 +46,21 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="What another process costs.")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, and nothing is written")
     options = parser.parse_args()
-    found = measure(rounds=1 if options.quick else 9, episodes=1 if options.quick else 6)
+    found = measure(1, 1, QUICK_EVERY) if options.quick else measure(9, 6, EVERY)
     print(json.dumps(found, indent=2))
     if not options.quick:
         write_text(RESULTS / "remote.json", json.dumps(found, indent=2) + "\n")
     return 0
 
 
-def measure(rounds: int, episodes: int) -> dict[str, Any]:
-    """Control steps per second of every arrangement, in turns, and ratios to that in one process."""
+def measure(rounds: int, episodes: int, every: int) -> dict[str, Any]:
+    """Control steps per second of every arrangement, in turns, and ratios to that in one process.
+
+    Args:
+        rounds: How often each is measured.
+        episodes: In each round.
+        every: Control periods from one picture to the next, where pictures are drawn.
+    """
     here = "mujoco" if importlib.util.find_spec("mujoco") else "sapien"
     found: dict[str, Any] = {"mixed_physics": here}
     with contextlib.ExitStack() as servers:
@@ -63,7 +71,7 @@ def measure(rounds: int, episodes: int) -> dict[str, Any]:
             "physics_served": EngineOptions(engines=physics),
             "two_served": EngineOptions(engines=other, kinematics=kinematics),
         }
-        found |= compared(plain, rounds, episodes, pictures=False)
+        found |= compared(plain, rounds, episodes)
         found["step_us"] = step_times(plain["in_process"])
         found["served_step_us"] = step_times(plain["physics_served"])
     with contextlib.ExitStack() as servers:
@@ -75,7 +83,7 @@ def measure(rounds: int, episodes: int) -> dict[str, Any]:
             "pictures_in_process": EngineOptions(engines=here, rendering=True),
             "pictures_served": EngineOptions(engines=here, rendering=True, renderer=rendering),
         }
-        return found | compared(drawn, max(rounds // 3, 1), 1, pictures=True)
+        return found | compared(drawn, max(rounds // 3, 1), 1, every)
 
 
 @contextlib.contextmanager
@@ -99,17 +107,19 @@ def served(role: str, name: str) -> Iterator[str]:
         process.wait()
 
 
-def compared(ways: dict[str, EngineOptions], rounds: int, episodes: int, pictures: bool) -> dict[str, Any]:
+def compared(
+    ways: dict[str, EngineOptions], rounds: int, episodes: int, every: int | None = None
+) -> dict[str, Any]:
     """Control steps per second of each way, medians, and medians of the ratios to the first one."""
     rates: dict[str, list[float]] = {name: [] for name in ways}
     runners = {name: runner_of(options) for name, options in ways.items()}
     try:
         for runner in runners.values():
-            rate(runner, range(1), pictures)
+            rate(runner, range(1), every)
         for k in range(rounds):
             seeds = range(1 + k * episodes, 1 + (k + 1) * episodes)
             for name, runner in runners.items():
-                rates[name].append(rate(runner, seeds, pictures))
+                rates[name].append(rate(runner, seeds, every))
     finally:
         for runner in runners.values():
             runner.close()
@@ -127,13 +137,13 @@ def runner_of(options: EngineOptions) -> Runner:
     return Runner(source.build(), source.scene, options)
 
 
-def rate(runner: Runner, seeds: range, pictures: bool) -> float:
+def rate(runner: Runner, seeds: range, every: int | None) -> float:
     """Control steps per second of whole episodes with their resets, those at the end too."""
     count = [0]
 
     def record(step: Step) -> None:
         count[0] += 1
-        if pictures and count[0] % EVERY == 0:
+        if every is not None and count[0] % every == 0:
             step.pipeline.render(CAMERA, depth=True)
 
     started = time.perf_counter()

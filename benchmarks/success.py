@@ -63,7 +63,14 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure the rows that are asked for."""
     parser = argparse.ArgumentParser(description="Success rates.")
     sealed.add_arguments(parser)
-    parser.add_argument("--only", nargs="*", default=[], metavar="ROW", help=", ".join(r.name for r in ROWS))
+    parser.add_argument(
+        "--only",
+        nargs="*",
+        default=[],
+        choices=[r.name for r in ROWS],
+        metavar="ROW",
+        help=", ".join(r.name for r in ROWS),
+    )
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--episodes", type=int, metavar="N", help="most episodes of a row, for a look")
     options = parser.parse_args(arguments)

@@ -16,6 +16,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.arm import FULL, LEANS, SWAYS
 from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.collision import beyond, bounds
 from bt_tasksim.planning.hand_collision import HandCollisions
 from bt_tasksim.planning.reach import reach_of
 from bt_tasksim.planning.surroundings import pieces_of
@@ -28,11 +29,16 @@ ABOUT = 12
 
 
 class Around:
-    """What stands around where the target is brought, for all that a grasp has to serve."""
+    """What stands around where the target is brought, for all that a grasp has to serve.
+
+    Attributes:
+        workspace: Corners ``(2, 3)`` of where the tool may be, see `bounds`.
+    """
 
     def __init__(self, view: WorldView, target: str, closer: float) -> None:
         self.view, self.target = view, target
         self.things, self.now = view.things([target], closer=closer), view.objects[target]
+        self.workspace = bounds(view.robot, view.tool)
         self._hands: dict[float, HandCollisions] = {}
         self._asked: tuple[bytes, float] | None = None
         self._finders: dict[frozenset[str], WayFinder] = {}
@@ -63,7 +69,7 @@ class Served:
         words: What is done.
         screens: Poses that are far from all that the arm can have are left out beforehand, see `reach`: worth
             its map where many grasps are asked.
-        too_far: The arm can have none of those that were asked about last.
+        why: Why the arm can have none of those that were asked about last, to be said behind the words.
     """
 
     def __init__(self, around: Around, aim: Aim, aside: bool, higher: bool) -> None:
@@ -74,7 +80,7 @@ class Served:
         self.words = aim.words
         full = len(around.view.arm) >= FULL
         self._leans = LEANS if full or not aim.on_the_way else SWAYS
-        self.screens = self.too_far = False
+        self.screens, self.why = False, ""
         self._asked, self._tools = (b"", b""), np.zeros((0, 7))
 
     def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
@@ -103,9 +109,13 @@ class Served:
         if asked != self._asked:
             around = self._around
             every = poses.multiply(self._possible, poses.relative(around.now, goal)[None])
-            if self.screens and len(every):
+            some, self.why = len(every), ""
+            every = every[beyond(around.workspace, every) == 0.0]
+            if some and not len(every):
+                self.why = f" (outside the workspace of '{around.view.robot.name}')"
+            elif self.screens and some:
                 every = every[~reach_of(around.view.robot).beyond(every, self._leans)]
-                self.too_far = not len(every)
+                self.why = "" if len(every) else " (out of reach)"
             alone = around.alone(hand)
             free = np.array([tool for tool in every if alone.free(tool)]).reshape(-1, 7)
             self._asked, self._tools = asked, free

@@ -21,14 +21,12 @@ from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.hand import depth_at, shorter_at, standing_side, swung_at
 from bt_tasksim.scene.chords import chords
-from bt_tasksim.scene.grips import Grips
+from bt_tasksim.scene.grips import Grips, fits_between
 
 AROUND = 24
 """Directions about a closing axis from which a hand may come."""
 STEEPEST = 0.35
 """Largest upward part of a direction in which a hand comes, of length one."""
-NARROWER = 0.004
-"""Metres by which the hand opens wider than what it takes; one with an uncertain estimate is glad of more."""
 SPARE_DEPTH = 0.004
 """Metres that fingers reach less deep where they come level: the estimate may be wrong."""
 LESS_DEEP = (0.0, 0.007, 0.014)
@@ -141,7 +139,7 @@ def candidates(view: WorldView, target: str, approach: Array, neutral: Array) ->
     if model.solid is None:
         return Candidates(np.zeros((0, 7)), np.zeros(0), np.zeros(0))
     grips = model.solid.grips
-    grips = grips.taken(grips.widths < view.robot.opening - NARROWER)
+    grips = grips.taken(fits_between(grips.widths, view.robot.opening))
     which, along = _directions(pose, grips.closing, grips.approach)
     points = poses.transform(pose[None], grips.points)[which]
     closing = poses.rotate(pose[None, 3:], grips.closing)[which]

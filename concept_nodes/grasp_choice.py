@@ -361,7 +361,7 @@ class Chooser:
         """Whether the arm comes to a grasp without touching anything, from wherever."""
         end = at.ends(goal[None])
         if not end.reached[0]:
-            return self._no("out of reach")
+            return self._no(at.unreached(goal))
         if not end.free[0]:
             return self._no(f"where the hand would touch {_other(at.collisions.touches(end.joints[0]))}")
         return True
@@ -371,8 +371,7 @@ class Chooser:
         closed = self._closed(goal)
         for aim in self._aims:
             if not len(aim.tools(closed, hand.hand)):
-                far = ", which is out of reach" if aim.too_far else ""
-                return self._no(f"that cannot also {aim.words}{far}")
+                return self._no(f"that cannot also {aim.words}{aim.why}")
         return True
 
     def _closed(self, goal: Array) -> Array:
@@ -423,7 +422,7 @@ class Chooser:
         for finder, tool, when in ((coming, back, " on its way"), (at, goal, "")):
             end = finder.ends(tool[None])
             if not end.reached[0]:
-                return "out of reach"
+                return finder.unreached(tool)
             if not end.free[0]:
                 return f"where the hand would touch {_other(finder.collisions.touches(end.joints[0]))}{when}"
         return "to which the hand cannot come straight"

@@ -19,10 +19,10 @@ from bt_tasksim.concept.leaf import ConceptNode, ModelLeaf
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.former import advice
+from bt_tasksim.core.own_files import code_of
 from bt_tasksim.core.plugins import line_in
 from bt_tasksim.policy.policy import concept_name
 from bt_tasksim.robot.description import load_robot
-from bt_tasksim.scene.meshes_beside import with_meshes_beside
 from bt_tasksim.scene.scene import Scene, WorldSource
 from bt_tasksim.trees.check import check_tree
 
@@ -358,7 +358,7 @@ def _made(build: Any, robot: str | None, path: Path) -> Scene:
             f"'{path}': scene() gives robot '{made.robot}', though --robot asks for '{robot}': "
             "pass its argument robot on to Scene(robot)"
         )
-    return with_meshes_beside(made, path.resolve().parent)
+    return made
 
 
 def tree_module(tree: str) -> str:
@@ -383,7 +383,8 @@ def _module(path: Path, what: str = "tree") -> Any:
 def _called(function: Callable[..., Any], path: Path, *arguments: Any) -> Any:
     """What a function of a tree's file returns; whatever it raises is one sentence with the line."""
     try:
-        return function(*arguments)
+        with code_of(path):
+            return function(*arguments)
     except InputError as error:
         line = line_in(error, path)
         if not line or path.name in str(error):

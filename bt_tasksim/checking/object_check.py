@@ -9,10 +9,10 @@ import numpy as np
 
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.checking.scene_file import check_scene
-from bt_tasksim.checking.scene_reach import ROOM, is_reached
+from bt_tasksim.checking.scene_reach import is_reached
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.antipodal import width_at
-from bt_tasksim.scene.grips import GivenGrip
+from bt_tasksim.scene.grips import GivenGrip, fits_between
 from bt_tasksim.scene.object_file import load_object, object_fields
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.scene_file import DENSEST
@@ -89,7 +89,7 @@ def _check_given(name: str, spec: ObjectSpec, opening: float, report: Report) ->
     """The grips that its file names are as wide as it is there, and none is too wide for the hand."""
     for i, grip in enumerate(spec.grasps):
         where = f"grasps[{i}]"
-        if grip.width > opening - ROOM:
+        if not fits_between(np.array(grip.width), opening):
             what = f"is {1000 * grip.width:.0f} mm wide, and the hand opens to {1000 * opening:.0f} mm"
             report.add(WARNING, name, where, what, "name a narrower one, or take another hand")
         measured = _measured(spec, grip)

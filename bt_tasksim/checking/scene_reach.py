@@ -14,7 +14,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import ObjectModel, PlaceModel
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
-from bt_tasksim.scene.grips import Grips
+from bt_tasksim.scene.grips import WIDER, Grips, fits_between
 from bt_tasksim.scene.shapes import ShapeSize, resting_height
 from bt_tasksim.scene.specs import STARTS, Goal
 
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from bt_tasksim.engines.kinematics.batch import BatchKinematics
     from bt_tasksim.scene.scene import Scene
 
-ROOM = 0.006
-"""Metres by which an object should be narrower than the hand opens."""
 ACROSS = 0.5
 """Largest cosine between the direction in which a hand comes and that in which its fingers close."""
 TURNS = 4
@@ -43,7 +41,7 @@ def check_objects(scene: Scene, worlds: Sequence[ActorConfiguration], report: Re
         wide, far, held = [], 0, 0
         for world in worlds:
             grips = grips_of(_actor(world, name))
-            if not (grips.widths < robot.opening - ROOM).any():
+            if not fits_between(grips.widths, robot.opening).any():
                 wide.append(float(grips.widths.min()) if len(grips) else math.inf)
                 continue
             held += 1
@@ -51,7 +49,7 @@ def check_objects(scene: Scene, worlds: Sequence[ActorConfiguration], report: Re
         if wide:
             what = (
                 f"is {1000 * min(wide):.0f} mm wide where it is narrowest, in {len(wide)} of {len(worlds)} "
-                f"draws, and the hand of {robot.name} opens to {1000 * robot.opening:.0f} mm"
+                f"draws, and {_takes(robot)}"
             )
             level = ERROR if len(wide) == len(worlds) else WARNING
             report.add(level, scene.name, name, what, "make it narrower, or take another hand")
@@ -138,7 +136,7 @@ def tool_poses(
     deep = max(half - robot.depth, 0.0)
     turns = [k * math.pi / TURNS for k in range(TURNS)] if model.symmetry == 0 else [0.0]
     for point, closing, width in zip(grips.points, grips.closing, grips.widths, strict=True):
-        if width >= robot.opening - ROOM:
+        if not fits_between(width, robot.opening):
             continue
         for turn in turns:
             about = poses.yaw(turn)
@@ -193,6 +191,12 @@ def _actor(world: ActorConfiguration, name: str) -> ObjectActor:
 
 def _place(world: ActorConfiguration, name: str) -> PlaceModel:
     return next(place for place in world.places if place.name == name)
+
+
+def _takes(robot: RobotDescription) -> str:
+    """What its hand takes."""
+    wide, least = 1000 * robot.opening, 1000 * (robot.opening - WIDER)
+    return f"the hand of {robot.name}, which opens to {wide:.0f} mm, takes less than {least:.0f} mm"
 
 
 def _ahead(robot: RobotDescription) -> str:

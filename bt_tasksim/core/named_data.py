@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.own_files import own_file
 from bt_tasksim.core.plain import shown
 from bt_tasksim.core.registry import part
 from bt_tasksim.core.resources import is_file
@@ -27,7 +28,7 @@ def named_data(kind: str, name: str, value: type[T]) -> Path | T:
     if not is_file(name):
         found: Path | T = part(kind, name)
         return found
-    path = Path(name).resolve()
+    path = own_file(name)
     if not path.is_file():
         raise InputError(f"no {kind} file '{shown(name, 200)}'")
     return path

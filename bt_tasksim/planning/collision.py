@@ -107,5 +107,15 @@ def bounds(robot: RobotDescription, start: Array) -> Array | None:
     if robot.safety is None:
         return None
     low, high = robot.safety.workspace
-    sides = np.array([INSIDE, INSIDE, 0.0])
-    return np.array([np.minimum(low + sides, start[:3]), np.maximum(high - INSIDE, start[:3])])
+    less = np.minimum(INSIDE, (high - low) / 4)  # a box of few centimetres keeps half of its size
+    inner = np.array([low + less * [1.0, 1.0, 0.0], high - less])
+    return np.array([np.minimum(inner[0], start[:3]), np.maximum(inner[1], start[:3])])
+
+
+def beyond(box: Array | None, tools: Array) -> Array:
+    """Metres ``(k,)`` by which tool poses ``(k, 7)`` are outside a box of `bounds`; 0 where there is none."""
+    if box is None:
+        return np.zeros(len(tools))
+    points = tools[:, :3]
+    found: Array = np.maximum(box[0] - points, points - box[1]).max(axis=1).clip(min=0.0)
+    return found

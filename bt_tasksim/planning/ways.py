@@ -20,7 +20,7 @@ from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.arm import FULL, LEANS, SWAYS, arm_of
 from bt_tasksim.planning.bodies import bodies_of
-from bt_tasksim.planning.collision import OWN, Collisions, bounds
+from bt_tasksim.planning.collision import OWN, Collisions, beyond, bounds
 from bt_tasksim.planning.lines import STEP, line
 from bt_tasksim.planning.route import Pace, Route, timed
 from bt_tasksim.planning.search import Search
@@ -188,6 +188,8 @@ class WayFinder:
                 yield q
 
     def _tried(self, tool: Array, begin: Array, leans: float) -> Iterator[tuple[Array, bool]]:
+        if self.beyond(tool[None])[0] > 0.0:
+            return
         for seed in (begin, self._robot.rest, *self.arm.seeds):
             q = self.arm.joints(tool, seed, leans=leans)
             if q is not None:
@@ -271,10 +273,24 @@ class WayFinder:
         end = self.ends(tool[None])
         return self.collisions.touches(end.joints[0]) if end.reached[0] else []
 
+    def beyond(self, tools: Array) -> Array:
+        """Metres ``(k,)`` by which tool poses ``(k, 7)`` are outside the robot's workspace, 0 within it."""
+        return beyond(self._workspace, tools)
+
+    def unreached(self, tool: Array) -> str:
+        """Why the arm does not come to a tool pose ``(7,)``, in few words."""
+        outside = self.beyond(tool[None])[0] > 0.0
+        return f"outside the workspace of '{self._robot.name}'" if outside else "out of reach"
+
     def no_end(self, tools: Array) -> str:
         """Why the hand cannot be at any of the tool poses ``(k, 7)``, in one sentence."""
         ends = self.ends(tools)
         at = ", ".join(f"{v:.2f}" for v in tools[0, :3])
+        if (far := float(np.min(self.beyond(tools), initial=np.inf))) > 0.0:
+            return (
+                f"({at}) m is {1000 * far:.0f} mm beyond where the tool may go in the workspace of "
+                f"'{self._robot.name}': bring things nearer, or widen 'safety.workspace'"
+            )
         if not ends.reached.any():
             return f"the arm does not reach ({at}) m: bring things nearer, or turn them"
         k = int(np.flatnonzero(ends.reached)[0])

@@ -17,6 +17,8 @@ _MOST_AXES = 3
 _FAR = 100.0
 _ALONG = math.cos(math.radians(10.0))
 """Cosine of the least angle between the direction in which a hand comes and that in which it closes."""
+WIDER = 0.004
+"""Metres by which a hand opens wider than what it takes; one with an uncertain estimate is glad of more."""
 ALONG = "a grasp's 'approach' should lie across its 'closing', and they are parallel"
 
 
@@ -24,6 +26,12 @@ def along(closing: Sequence[float], approach: Sequence[float]) -> bool:
     """Whether a hand would come along the direction ``(3,)`` in which its fingers close."""
     dot = sum(a * b for a, b in zip(closing, approach, strict=True))
     return abs(dot) > _ALONG * math.hypot(*closing) * math.hypot(*approach)
+
+
+def fits_between(widths: Array, opening: float) -> Array:
+    """Booleans ``(n,)``: fingers that open so many metres come about what is ``widths (n,)`` metres wide."""
+    found: Array = np.asarray(widths) < opening - WIDER
+    return found
 
 
 @dataclass(frozen=True)

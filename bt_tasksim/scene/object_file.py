@@ -10,6 +10,7 @@ import numpy as np
 from bt_tasksim.core.beside import beside
 from bt_tasksim.core.document import located
 from bt_tasksim.core.errors import FieldError, InputError, nearest, within
+from bt_tasksim.core.own_files import looked_in, own_file
 from bt_tasksim.core.resources import asset
 from bt_tasksim.core.typed_file import load_typed
 from bt_tasksim.scene.antipodal import width_at
@@ -31,12 +32,12 @@ def object_file(name: str, folder: Path | None = None) -> Path:
     Raises:
         InputError: There is none.
     """
-    own = Path(name).resolve() if folder is None else beside(folder, name, "an object file")
+    own = own_file(name) if folder is None else beside(folder, name, "an object file")
     if own.is_file():
         return own
     known = [path.name for path in sorted(asset("objects").glob("*.yaml"))]
     if name not in known:
-        where = Path.cwd() if folder is None else folder
+        where = looked_in() if folder is None else folder
         raise InputError(
             f"no object file '{name}'{nearest(name, known)} (in {where} and among the bundled ones)"
         )

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Protocol, cast
 
 from bt_tasksim.core.errors import FieldError, InputError, NoDrawError, nearest, within
 from bt_tasksim.core.known_arguments import known_arguments
 from bt_tasksim.core.names import TOOL, check_name
+from bt_tasksim.core.own_files import own_file
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.renamed import renamed_arguments, renamed_fields
 from bt_tasksim.core.resources import is_file
@@ -148,7 +148,7 @@ class Scene:
         _check_kinds(
             robot, name, objects, disturbed, {"fixtures": fixtures, "spots": spots, "stages": stages}
         )
-        put("robot", str(Path(robot).resolve()) if is_file(robot) else robot)  # found from every folder
+        put("robot", str(own_file(robot)) if is_file(robot) else robot)  # found from every folder
         put("spots", spots)
         put("disturbed", disturbed)
         put("stages", stages)
@@ -392,12 +392,12 @@ def _fixtures(said: Sequence[str | FixtureSpec]) -> tuple[str | FixtureSpec, ...
             load_fixture(entry)
         if isinstance(entry, FixtureSpec):
             if is_file(entry.fixture):
-                entry = dataclasses.replace(entry, fixture=str(Path(entry.fixture).resolve()))
+                entry = dataclasses.replace(entry, fixture=str(own_file(entry.fixture)))
             if entry.fixture == "table" and not entry.name and out[0] == "table":
                 out[0] = entry
                 continue
         elif is_file(entry):
-            entry = str(Path(entry).resolve())
+            entry = str(own_file(entry))
         if isinstance(entry, FixtureSpec) or entry not in out:
             out.append(entry)
     return tuple(out)

@@ -144,7 +144,7 @@ class GoalFields(Model):
     place: Reference
     relation: str
     position_tolerance: AboveZero
-    angle_tolerance: AboveZero
+    angle_tolerance: Annotated[AboveZero, Field(le=math.pi)]
     height: AboveZero
     when: str
     distance: AboveZero

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from bt_tasksim.core.errors import FieldError, nearest, within
 from bt_tasksim.core.known_arguments import known_arguments
 from bt_tasksim.core.names import check_name
+from bt_tasksim.core.own_files import beside_code, looked_in
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.registry import parts
 from bt_tasksim.core.renamed import renamed_fields
@@ -111,6 +113,10 @@ class ObjectSpec:
             if not isinstance(self.file, str):
                 raise FieldError(f"an object: 'file' should be text, found {short(self.file)}", "file")
             self._complete(self.file)
+        if isinstance(self.mesh, str):
+            object.__setattr__(self, "mesh", beside_code(self.mesh))
+            if not Path(self.mesh).is_file():
+                raise FieldError(f"no mesh file '{shown(self.mesh, 200)}' in {looked_in()}", "mesh")
         if isinstance(self.kinds, str):
             object.__setattr__(self, "kinds", (self.kinds,))
         if self.kinds in ((), []) and self.mesh is not None:
@@ -126,6 +132,8 @@ class ObjectSpec:
         if len(said) != 1:
             found = f"found {' and '.join(map(repr, said))}" if said else "and none is given"
             raise FieldError(f"an object starts 'on', 'inside' or 'beside' one thing: {found}", *said[1:2])
+        if not self.beside and self.distance != ObjectSpec.distance:
+            raise FieldError("'distance' is for an object that starts 'beside' another one", "distance")
         if self.split not in SPLITS:
             raise FieldError(f"unknown split '{self.split}'{nearest(self.split, SPLITS)}", "split")
         if not 0.0 <= self.size_error < 1.0:
@@ -220,7 +228,7 @@ class SpotSpec:
 
     name: str
     on: str
-    centre: tuple[float, float]
+    centre: tuple[float, float] = (0.0, 0.0)
     area: tuple[float, float] = (0.0, 0.0)
     extent: tuple[float, float] = (0.12, 0.12)
     yaw: float | tuple[float, float] = 0.0
@@ -276,7 +284,7 @@ class Goal:
             within an object), ``beside`` (at the same level, ``distance`` away at most), ``lifted`` (held in
             the hand alone, ``height`` above where it stood, and as upright), or one of your own.
         position_tolerance: Metres.
-        angle_tolerance: Radians.
+        angle_tolerance: Radians; pi for any heading and any way up.
         height: Metres, for ``lifted``.
         when: ``end``: true at the end of the run. ``once``: true at some moment of it.
         distance: Metres between the two outlines at most, for ``beside``.

@@ -18,8 +18,8 @@ def quick(monkeypatch):
     def served(role, name):
         yield "remote:127.0.0.1:1"
 
-    def compared(ways, rounds, episodes, pictures):
-        return {"pictures": next(iter(ways.values())).engines} if pictures else {}
+    def compared(ways, rounds, episodes, every=None):
+        return {"pictures": next(iter(ways.values())).engines} if every is not None else {}
 
     monkeypatch.setattr(remote, "served", served)
     monkeypatch.setattr(remote, "compared", compared)
@@ -29,7 +29,7 @@ def quick(monkeypatch):
 @pytest.mark.parametrize("there", [True, False])
 def test_pictures_are_of_mujoco_where_it_is_installed(quick, monkeypatch, there):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: there or None)
-    found = remote.measure(1, 1)
+    found = remote.measure(1, 1, 100)
     assert found["mixed_physics"] == found["pictures"] == ("mujoco" if there else "sapien")
 
 
@@ -44,19 +44,19 @@ def test_pictures_that_cannot_be_served_are_said_to_be_missing(quick, monkeypatc
             yield address
 
     monkeypatch.setattr(remote, "served", without_pictures)
-    found = remote.measure(1, 1)
+    found = remote.measure(1, 1, 100)
     assert found["pictures_missing"] == "no pictures here" and "pictures" not in found
 
 
 def test_a_run_that_fails_is_no_missing_picture(quick, monkeypatch):
-    def compared(ways, rounds, episodes, pictures):
-        if pictures:
+    def compared(ways, rounds, episodes, every=None):
+        if every is not None:
             raise MachineError("the physics blew up")
         return {}
 
     monkeypatch.setattr(remote, "compared", compared)
     with pytest.raises(MachineError, match="blew up"):
-        remote.measure(1, 1)
+        remote.measure(1, 1, 100)
 
 
 @pytest.mark.parametrize("does", ["sleep 60", "false"])

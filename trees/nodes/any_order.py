@@ -57,7 +57,7 @@ class AnyOrder(Reporting, Composite):
                     child.stop(Status.INVALID)
             self._begin()
             self.initialise()
-        found: Status | None = None
+        found: Status | None = None if self.children else Status.SUCCESS
         while found is None:
             child = self.current_child = self.children[self._at]
             if child.status != Status.RUNNING:
@@ -176,6 +176,9 @@ class BatchAnyOrder(BatchNode):
                 flags[begins] = False
             for row in begins.tolist() if self._causes else ():
                 self._causes.pop(row, None)
+        if not self.count:
+            self.end(rows, SUCCESS)
+            return
         for child, there in self.arrays.groups(self.stands_at[rows], rows):
             self._go(child, there)
 

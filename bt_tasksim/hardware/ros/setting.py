@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -120,6 +120,14 @@ class RosSetting:
     approach: float
     cameras: Mapping[str, CameraTopics]
     source: Path
+
+    def object_topics(self, names: Iterable[str]) -> list[str]:
+        """Topics of objects' poses; none where nobody tracks them.
+
+        Raises:
+            InputError: A name makes no topic.
+        """
+        return [] if self.objects is None else [self.object_topic(name) for name in names]
 
     def object_topic(self, name: str) -> str:
         """Topic of an object's pose.

@@ -84,6 +84,7 @@ class Twin(Closing):
         setting, rates = load_setting(robot, ros), load_gap(gap).rates
         if camera and not setting.cameras:
             raise InputError(f"'{setting.source}' names no cameras")
+        setting.object_topics(actor.name for actor in configuration.objects)  # refused before anything starts
         self._python = environment(build)
         self.domain, self._log, self._heard = domain, log, setting.wrench.topic
         self.port = port or free_port()

@@ -192,16 +192,6 @@ class TwinNode(Node):  # type: ignore[misc]
         else:
             self._joints.publish(message)
 
-    def _object_topics(self, configuration: ActorConfiguration) -> list[str]:
-        """Topics of the poses of a world's objects; none where nobody tracks them.
-
-        Raises:
-            InputError: A name makes no topic.
-        """
-        if self.setting.objects is None:
-            return []
-        return [self.setting.object_topic(actor.name) for actor in configuration.objects]
-
     # ---- the evaluation channel -------------------------------------------------------------------------
 
     def answer(self, question: dict[str, Any]) -> dict[str, Any]:
@@ -212,7 +202,8 @@ class TwinNode(Node):  # type: ignore[misc]
                 if not isinstance(text, str) or not isinstance(seed, int):
                     raise InputError("'load' needs a configuration as text, and a number as seed")
                 configuration = ActorConfiguration.from_json(text)
-                topics = self._object_topics(configuration)  # a name that makes none is refused first
+                names = [actor.name for actor in configuration.objects]
+                topics = self.setting.object_topics(names)  # a name that makes none is refused first
                 self.cell.load(configuration, seed)
                 for topic in self._objects.keys() - set(topics):
                     self.destroy_publisher(self._objects.pop(topic))

@@ -19,7 +19,9 @@ from bt_tasksim.scene.specs import Goal
 
 IS_INSIDE = register_reason("is_inside", "{object} is in {place}, {distance} off its middle", distance=METRES)
 NOT_INSIDE = register_reason(
-    "not_inside", "{object} is not in {place}: {distance} off its middle", distance=METRES
+    "not_inside",
+    "{object} is not in {place}: {beyond} outside its walls or above its rim",
+    beyond=METRES,
 )
 
 
@@ -29,9 +31,12 @@ class Inside(GoalRelation):
 
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""
-        reached = bool(beyond_walls(final.whereabouts, goal.object, goal.place)[0] <= 0.0)
+        beyond = float(beyond_walls(final.whereabouts, goal.object, goal.place)[0])
+        reached = beyond <= 0.0
         frame = final.pose(goal.place) if final.is_object(goal.place) else final.place(goal.place).pose
         distance = float(np.linalg.norm(poses.localise(frame, final.pose(goal.object)[:3])[:2]))
-        reason = IS_INSIDE if reached else NOT_INSIDE
-        outcome = reason(object=goal.object, place=goal.place, distance=distance)
+        if reached:
+            outcome = IS_INSIDE(object=goal.object, place=goal.place, distance=distance)
+        else:
+            outcome = NOT_INSIDE(object=goal.object, place=goal.place, beyond=beyond)
         return Placement(reached, outcome, distance, float(poses.tilt(final.pose(goal.object)[3:])))
