@@ -1,4 +1,4 @@
-"""``bt-tasksim check``: the concepts that a Python file defines, checked in real runs."""
+"""``bt-tasksim check``: the concepts and conditions that a Python file defines, checked in real runs."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bt_tasksim.checking.bundles import numbers
+from bt_tasksim.checking.condition_check import check_condition
 from bt_tasksim.checking.declaration import check_declaration
 from bt_tasksim.checking.findings import ERROR, FAILED, WARNING, Case
 from bt_tasksim.checking.purity import check_batches, check_beginning, check_purity
@@ -19,6 +20,7 @@ from bt_tasksim.checking.report import Report
 from bt_tasksim.checking.situations import RecordedDecision, Situations, alike
 from bt_tasksim.checking.values import check_values
 from bt_tasksim.checking.watching import check_observables, check_watching
+from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.errors import InputError
@@ -33,7 +35,7 @@ BESIDE = "train_"
 
 
 def check(file: str | Path, tree: str | None = None) -> Report:
-    """Check the concepts that a Python file defines.
+    """Check the concepts and conditions that a Python file defines.
 
     Args:
         file: The file; one of the shipped concepts' own, too.
@@ -41,21 +43,24 @@ def check(file: str | Path, tree: str | None = None) -> Report:
             the file's own ``build()``, or that of the file ``train_...`` beside it, or a scenario with it.
 
     Raises:
-        InputError: The file is missing, fails or defines no concept; or the tree is no good.
+        InputError: The file is missing, fails or defines none; or the tree is no good.
     """
     from bt_tasksim.trees.load import own_nodes
 
     path = Path(file)
     found = own_nodes(str(path)).values()
     concepts = [c for c in found if issubclass(c, ConceptModel) and not inspect.isabstract(c)]
-    if not concepts:
+    conditions = [c for c in found if issubclass(c, Condition) and not inspect.isabstract(c)]
+    if not concepts and not conditions:
         half = [c for c in found if inspect.isabstract(c)]
         if half:
             missing = ", ".join(f"{name}()" for name in sorted(half[0].__abstractmethods__))
             raise InputError(f"'{file}': {half[0].__name__} has no {missing}: write it")
-        raise InputError(f"'{file}' defines no concept: a class that derives from ConceptModel")
-    source = _own_tree(path, concepts[0]) if tree is None else tree
+        raise InputError(f"'{file}' defines no concept and no condition: a class that derives from one")
+    source = _own_tree(path, (*concepts, *conditions)[0]) if tree is None else tree
     report = Report()
+    if conditions:
+        _check_conditions(conditions, source, report)
     recorded: dict[str, tuple[Any, Recording]] = {}
     names: dict[str, list[type[ConceptModel]]] = {}
     for concept in concepts:
@@ -102,6 +107,35 @@ def check_concept(concept: type[ConceptModel], name: str, root: Any, runs: Recor
     return case, f"{concept.__name__}, {programmed} of {Path(name).name}, one by one, in batches{compared}"
 
 
+def _check_conditions(conditions: Sequence[type[Condition]], source: str | None, report: Report) -> None:
+    """Check conditions in the tree of their file, or in another one.
+
+    Raises:
+        InputError: The tree is no good.
+    """
+    from bt_tasksim.trees.load import load_source
+
+    if source is None:
+        for kind in conditions:
+            what, remedy = (
+                "stands in no tree that is known, so it was not asked",
+                "give the file build() and scene()",
+            )
+            report.add(WARNING, kind.__name__, "", what, remedy)
+            report.done(f"{kind.__name__}, no run")
+        return
+    loaded = load_source(source)
+    root = loaded.build()
+    runs = record(root, loaded.scene, None, range(1, RUNS + 1))
+    every = (decision for notes in runs.decisions.values() for decision in notes)
+    decisions = alike([decision._replace(memory=None) for decision in every])
+    if not decisions:
+        raise InputError(f"in the tree '{source}' no concept ever acts: {runs.ends[-1]}")
+    situations = Situations(spread(decisions, MOST))
+    for kind in conditions:
+        check_condition(kind, root, situations, report)
+
+
 def spread(decisions: Sequence[RecordedDecision], n: int) -> list[RecordedDecision]:
     """At most about ``n`` decisions, as many of each run, spread evenly from its first to its last.
 
@@ -119,7 +153,7 @@ def _even(count: int, n: int) -> list[int]:
     return sorted({round(k) for k in np.linspace(0, count - 1, min(n, count))})
 
 
-def _own_tree(path: Path, concept: type[ConceptModel]) -> str | None:
+def _own_tree(path: Path, concept: type) -> str | None:
     if callable(getattr(sys.modules[concept.__module__], "build", None)):
         return str(path)
     beside = path.with_name(f"{BESIDE}{path.name}")
