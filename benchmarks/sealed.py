@@ -26,7 +26,7 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -240,10 +240,22 @@ def choose(block: str | None, first: int, measure: str, count: int) -> range:
     if block is not None:
         return block_seeds(block, measure, count)
     seeds = range(first, first + count)
-    for number in range(max(0, (first - FIRST) // SIZE), max(0, 1 + (seeds.stop - 1 - FIRST) // SIZE)):
-        if not scored(f"B{number:04d}", measure):  # history may be repeated, and is then no result
-            raise InputError(f"seeds from {FIRST} on are sealed: take --block, or seeds below")
+    check_looked_at(seeds, measure)
     return seeds
+
+
+def check_looked_at(seeds: Iterable[int], measure: str) -> None:
+    """Check that seeds may be run to look at them: they are of no block, or the block was measured.
+
+    Raises:
+        InputError: A seed is of a block on which this was not measured yet.
+    """
+    for number in sorted({(seed - FIRST) // SIZE for seed in seeds if seed >= FIRST}):
+        if not scored(f"B{number:04d}", measure):  # history may be repeated, and is then no result
+            raise InputError(
+                f"seeds from {FIRST + SIZE * number} on are sealed, as '{measure}' was not measured on them: "
+                f"take --block, or seeds below {FIRST}"
+            )
 
 
 def add_arguments(parser: argparse.ArgumentParser, first: int = DEVELOPMENT) -> None:

@@ -79,6 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         try:
             if options.only:
+                sealed.check_looked_at(options.only, f"any_tree/{options.name or _name(asked)}")
                 draws = list(_shown(_played(asked, options.only, options.workers)))
                 print("\n".join(lines(draws, asked.robot)))
                 return 0

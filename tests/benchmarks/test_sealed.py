@@ -139,6 +139,14 @@ def test_every_benchmark_refuses_a_block_that_is_not_open(name: str, monkeypatch
     assert status == 2 and "B9999 is sealed" in capsys.readouterr().err
 
 
+def test_single_draws_of_a_sealed_block_are_not_looked_at(capsys: Any):
+    from benchmarks.any_tree.__main__ import main
+
+    last = str(sealed.FIRST + 9_999 * sealed.SIZE)
+    assert main(["--only", "900009", last]) == 2
+    assert f"seeds from {last} on are sealed" in capsys.readouterr().err
+
+
 def test_the_ledger_of_this_repository_is_sound():
     for name, block in sealed.read_ledger((sealed.ROOT / LEDGER).read_text()).items():
         assert block.seeds == sealed.seeds_of(name) and block.measures
