@@ -25,7 +25,7 @@ from bt_tasksim.trees import sequence
 
 
 @pytest.mark.physical
-@pytest.mark.parametrize("scenario", ["pick_and_place", "shelf_to_shelf", "pick_and_throw"])
+@pytest.mark.parametrize("scenario", ["shelf_to_shelf", "pick_and_throw"])
 def test_each_world_is_treated_as_alone(situations, functions, scenario):
     answers = {name: situations(Bring, scenario).check(name) for name in functions}
     for name in ("done", "maintained", "necessary_cost", "sufficient_cost"):

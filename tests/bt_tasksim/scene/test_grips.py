@@ -18,7 +18,7 @@ from tests.bt_tasksim.scene.solids import MADE, solids
 EXPONENTS = (0.2, 1.2)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(solids(exponents=EXPONENTS))
 def test_contacts_lie_on_the_surface_a_width_apart(case):
     kind, size = case

@@ -145,7 +145,7 @@ def test_rollouts_are_those_of_an_environment_of_their_own(env_of, batch_of, tre
             batched(batch_of(tree(), worlds=3, longest=longest), tasks)
         assert str(caught.value).startswith(str(error).split("draws")[0])
         return
-    for worlds in (1, 3, 5):
+    for worlds in (1, 5):
         assert batched(batch_of(tree(), worlds=worlds, longest=longest), tasks) == expected
     again = batch_of(tree(), worlds=2, longest=longest)
     assert batched(again, tasks[::-1])[::-1] == expected
