@@ -286,7 +286,10 @@ class WayFinder:
         """Why the hand cannot be at any of the tool poses ``(k, 7)``, in one sentence."""
         ends = self.ends(tools)
         at = ", ".join(f"{v:.2f}" for v in tools[0, :3])
-        if (far := float(np.min(self.beyond(tools), initial=np.inf))) > 0.0:
+        nearest = tools[int(np.argmin(self.beyond(tools)))]
+        far = float(self.beyond(nearest[None])[0])
+        if far > 0.0 and any(self.arm.joints(nearest, seed) is not None for seed in self.arm.seeds):
+            at = ", ".join(f"{v:.2f}" for v in nearest[:3])
             return (
                 f"({at}) m is {1000 * far:.0f} mm beyond where the tool may go in the workspace of "
                 f"'{self._robot.name}': bring things nearer, or widen 'safety.workspace'"

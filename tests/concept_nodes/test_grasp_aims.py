@@ -49,8 +49,10 @@ def test_the_tools_at_which_an_aim_is_served_are_where_the_hand_has_room_and_in_
     for ends, tools in ((heights, 1), (heights[:1], 1), (heights[1:], 0)):
         served = Served(around, Aim(np.array([now + end for end in ends]), "go"), False, False)
         assert len(served.tools(goal, hand)) == tools and served.by(goal, hand) == (tools > 0)
-    far = Served(around, Aim((now + np.array([2.0, 0, 0.3, 0, 0, 0, 0]))[None], "go"), False, False)
+    far = Served(around, Aim((now + np.array([0.3, 0.75, 0.9, 0, 0, 0, 0]))[None], "go"), False, False)
     assert len(far.tools(goal, hand)) == 1 and not far.by(goal, hand), "room there, and out of reach"
+    beyond = Served(around, Aim((now + np.array([2.0, 0, 0.3, 0, 0, 0, 0]))[None], "go"), False, False)
+    assert not len(beyond.tools(goal, hand)) and "outside the workspace of 'panda'" in beyond.why
 
 
 def test_where_many_grasps_are_asked_no_joints_are_looked_for_where_the_arm_surely_is_not(view, monkeypatch):
@@ -63,5 +65,5 @@ def test_where_many_grasps_are_asked_no_joints_are_looked_for_where_the_arm_sure
             Around(view, "box", 1.0), Aim(np.array([now + by for by in some]), "go"), False, False
         )
         served.screens = True
-        assert len(served.tools(goal, hand)) == left and served.too_far == (left == 0)
+        assert len(served.tools(goal, hand)) == left and bool(served.why) == (left == 0)
     assert not served.by(goal, hand)

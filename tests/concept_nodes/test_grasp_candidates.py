@@ -10,7 +10,6 @@ from bt_tasksim.concept_nodes import Grasp
 from bt_tasksim.concept_nodes.grasp_candidates import (
     AROUND,
     HOLD,
-    NARROWER,
     PAD,
     STEEPEST,
     THIN,
@@ -23,7 +22,7 @@ from bt_tasksim.concept_nodes.grasp_candidates import (
 from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
 from bt_tasksim.robot.description import load_robot
-from bt_tasksim.scene.grips import GivenGrip
+from bt_tasksim.scene.grips import WIDER, GivenGrip
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -118,7 +117,7 @@ def test_directions_are_across_an_axis_all_around(axis):
 
 
 def test_what_is_wider_than_the_hand_opens_has_none(view):
-    most = view.robot.opening - NARROWER
+    most = view.robot.opening - WIDER
     assert len(found_of(with_grips(view, (0.0, most - 1e-4))).tools)
     assert not len(found_of(with_grips(view, (0.0, most + 1e-4))).tools)
 

@@ -111,7 +111,9 @@ def test_none_says_how_many_were_excluded_by_what(view):
     far = {**view.objects, "box": poses.pose([3.0, 0.0, 0.05])}
     view = view._replace(objects=far)
     most = min(FARTHEST, len(candidates(view, "box", DOWN, view.tool[3:]).tools))
-    with pytest.raises(NoWayError, match=rf"no grasp of box serves: of {most}, {most} out of reach"):
+    with pytest.raises(
+        NoWayError, match=rf"no grasp of box serves: of {most}, {most} outside the workspace of 'panda'"
+    ):
         chosen(view)
 
 

@@ -1,5 +1,7 @@
 """Ways: straight where that is clear, round what is in the way, and a sentence where there is none."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -8,7 +10,7 @@ from hypothesis import strategies as st
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.planning.bodies import bodies_of
-from bt_tasksim.planning.collision import Collisions
+from bt_tasksim.planning.collision import INSIDE, Collisions, bounds
 from bt_tasksim.planning.route import Pace
 from bt_tasksim.planning.things import Leave
 from bt_tasksim.planning.ways import _LEANING, LEAVING, WayFinder
@@ -138,6 +140,26 @@ def test_no_way_says_why(panda):
         NoWayError, match=r"at \(0\.45, 0\.30, 0\.25\) m \S+ would touch chest: make room there"
     ):
         finder(panda, panda.box(LEFT, (0.2, 0.2, 0.2), name="chest")).search(panda.pose(*LEFT)[None], PACE)
+
+
+def test_what_the_arm_reaches_and_its_workspace_leaves_out_is_said_to_be_so(panda):
+    low, high = panda.robot.safety.workspace
+    narrow = dataclasses.replace(panda.robot.safety, workspace=np.array([low, [high[0], 0.1, high[2]]]))
+    found = WayFinder(dataclasses.replace(panda.robot, safety=narrow), panda.posture(*RIGHT), panda.hand, ())
+    wanted = panda.pose(*LEFT)[None]
+    assert found.beyond(wanted) == pytest.approx(LEFT[1] - 0.1 + INSIDE)
+    with pytest.raises(NoWayError, match=r"220 mm beyond where the tool may go in the workspace of 'panda'"):
+        found.search(wanted, PACE)
+
+
+def test_a_box_of_few_centimetres_is_not_turned_inside_out(panda):
+    low = np.array([0.4, 0.0, 0.2])
+    for side in (0.01, 0.03, 0.3):
+        tiny = dataclasses.replace(panda.robot.safety, workspace=np.array([low, low + side]))
+        lower, upper = bounds(
+            dataclasses.replace(panda.robot, safety=tiny), np.array([*(low + side / 2), 1, 0, 0, 0])
+        )
+        assert (low <= lower).all() and (lower < upper).all() and (upper <= low + side).all()
 
 
 def test_a_closed_wall_has_no_way(panda):
