@@ -166,7 +166,7 @@ class KeptEvaluation:
     @property
     def line(self) -> str:
         """What people read: how many episodes there are."""
-        words = f"going on after {len(self.outcomes)} episodes of '{self.path}'"
+        words = f"found {len(self.outcomes)} episodes in '{self.path}'"
         return words if not self.lost else f"{words}, whose end is torn (lines lost: {self.lost})"
 
     def check(self, subject: Mapping[str, str], seeds: Collection[int]) -> None:
