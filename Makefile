@@ -8,8 +8,7 @@ SHELL := /bin/bash
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
 EXTRAS := sim,train,report,ros,remote,mujoco,warp,cluster,docs,dev
-# A file's tests run in one process, since they share what is dear to make.
-PYTEST_FLAGS ?= -n logical --maxprocesses 4 --dist loadscope
+PYTEST_FLAGS ?= -n logical --maxprocesses 4
 
 TWIN := .twin
 

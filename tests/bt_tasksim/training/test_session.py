@@ -204,11 +204,10 @@ def test_progress_in_words():
 
 
 @pytest.mark.parametrize(
-    ("number", "code", "said"),
-    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+    ("kept", "number", "code", "said"),
+    [(True, signal.SIGINT, 130, "interrupted"), (False, signal.SIGTERM, 143, "terminated")],
     ids=["interrupt", "terminate"],
 )
-@pytest.mark.parametrize("kept", [True, False])
 def test_an_interrupt_says_how_to_go_on(tiny, tmp_path, kept, number, code, said):
     settings = tiny(steps=1_000_000, evaluate_every=0, checkpoint_every=1 if kept else 100_000)
     words = ["train", "grasp_then_pick", "--out", "p", "--workers", "2", "--settings", settings.name]
