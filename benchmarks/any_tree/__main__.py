@@ -79,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         try:
             if options.only:
-                sealed.check_looked_at(options.only, f"any_tree/{options.name or _name(asked)}")
+                sealed.check_looked_at(options.only, _measure_name(asked, options))
                 draws = list(_shown(_played(asked, options.only, options.workers)))
                 print("\n".join(lines(draws, asked.robot)))
                 return 0
@@ -89,8 +89,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 2
 
 
+def _measure_name(asked: Conditions, options: argparse.Namespace) -> str:
+    """Under which name a result is kept."""
+    return f"any_tree/{options.name or _name(asked)}"
+
+
 def _measure(asked: Conditions, options: argparse.Namespace) -> int:
-    measure = f"any_tree/{options.name or _name(asked)}"
+    measure = _measure_name(asked, options)
     seeds = sealed.choose(options.block, options.seed, measure, options.episodes)
     about = {**asked.to_data(), "oracle": asked.oracle, "block": options.block, "versions": identity()}
     kept = sealed.OUT / f"{measure.replace('/', '-')}-{options.block or seeds.start}.jsonl"

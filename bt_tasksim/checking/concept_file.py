@@ -117,11 +117,8 @@ def _check_conditions(conditions: Sequence[type[Condition]], source: str | None,
 
     if source is None:
         for kind in conditions:
-            what, remedy = (
-                "stands in no tree that is known, so it was not asked",
-                "give the file build() and scene()",
-            )
-            report.add(WARNING, kind.__name__, "", what, remedy)
+            what = "stands in no tree that is known, so it was not asked"
+            report.add(WARNING, kind.__name__, "", what, "give the file build() and scene()")
             report.done(f"{kind.__name__}, no run")
         return
     loaded = load_source(source)
@@ -133,7 +130,9 @@ def _check_conditions(conditions: Sequence[type[Condition]], source: str | None,
         raise InputError(f"in the tree '{source}' no concept ever acts: {runs.ends[-1]}")
     situations = Situations(spread(decisions, MOST))
     for kind in conditions:
-        check_condition(kind, root, situations, report)
+        case, checked = check_condition(kind, root, situations)
+        report.findings += case.findings
+        report.done(checked)
 
 
 def spread(decisions: Sequence[RecordedDecision], n: int) -> list[RecordedDecision]:

@@ -23,16 +23,16 @@ FAILED: Any = object()
 
 
 class Case:
-    """One concept that is checked, with what is known of it and what was found.
+    """One concept or condition that is checked, with what is known of it and what was found.
 
     Args:
-        concept: The concept.
+        concept: The concept, or the condition.
         decisions: What a leaf of it decided on in real runs; empty where there is no such run.
         followed: In its tree something follows that judges it.
     """
 
     def __init__(
-        self, concept: type[ConceptModel], decisions: Sequence[RecordedDecision] = (), followed: bool = False
+        self, concept: type[Any], decisions: Sequence[RecordedDecision] = (), followed: bool = False
     ) -> None:
         self.concept, self.followed = concept, followed
         self.decisions = list(decisions)

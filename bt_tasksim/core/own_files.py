@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
+from bt_tasksim.core.plain import shown
+
 _FOLDER: ContextVar[Path | None] = ContextVar("folder of the Python file whose code runs", default=None)
 
 
@@ -29,6 +31,11 @@ def beside_code(name: str) -> str:
 def own_file(name: str) -> Path:
     """Absolute path of a file that somebody's code names; it may not exist."""
     return Path(beside_code(name)).resolve()
+
+
+def not_there(what: str, name: str) -> str:
+    """That there is no such file, and where it was looked for, in one sentence."""
+    return f"no {what} '{shown(name, 200)}'" + ("" if Path(name).is_absolute() else f" in {looked_in()}")
 
 
 def looked_in() -> str:

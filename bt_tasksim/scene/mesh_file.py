@@ -13,6 +13,7 @@ import numpy as np
 
 from bt_tasksim.core.errors import BtTasksimWarning, InputError, MachineError
 from bt_tasksim.core.files import file_version
+from bt_tasksim.core.own_files import not_there
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.convex_parts import convex_parts
 from bt_tasksim.scene.geometry import ConvexPiece, Piece, Shape
@@ -128,7 +129,7 @@ def check_size(what: str, size: tuple[float, float, float]) -> None:
 def _read(path: str, version: tuple[int, ...]) -> tuple[TriangleMesh, tuple[TriangleMesh, ...]]:
     """The surface of all that is in this version of a file, and its bodies."""
     if not Path(path).is_file():
-        raise InputError(f"no mesh file '{path}'" + ("" if Path(path).is_absolute() else f" in {Path.cwd()}"))
+        raise InputError(not_there("mesh file", path))
     try:
         import trimesh
     except ImportError:

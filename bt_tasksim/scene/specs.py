@@ -13,7 +13,7 @@ import numpy as np
 from bt_tasksim.core.errors import FieldError, nearest, within
 from bt_tasksim.core.known_arguments import known_arguments
 from bt_tasksim.core.names import check_name
-from bt_tasksim.core.own_files import beside_code, looked_in
+from bt_tasksim.core.own_files import beside_code, not_there
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.registry import parts
 from bt_tasksim.core.renamed import renamed_fields
@@ -116,7 +116,7 @@ class ObjectSpec:
         if isinstance(self.mesh, str):
             object.__setattr__(self, "mesh", beside_code(self.mesh))
             if not Path(self.mesh).is_file():
-                raise FieldError(f"no mesh file '{shown(self.mesh, 200)}' in {looked_in()}", "mesh")
+                raise FieldError(not_there("mesh file", self.mesh), "mesh")
         if isinstance(self.kinds, str):
             object.__setattr__(self, "kinds", (self.kinds,))
         if self.kinds in ((), []) and self.mesh is not None:

@@ -176,9 +176,6 @@ class BatchAnyOrder(BatchNode):
                 flags[begins] = False
             for row in begins.tolist() if self._causes else ():
                 self._causes.pop(row, None)
-        if not self.count:
-            self.end(rows, SUCCESS)
-            return
         for child, there in self.arrays.groups(self.stands_at[rows], rows):
             self._go(child, there)
 

@@ -187,6 +187,8 @@ def test_headings_are_within_their_range_and_one_number_is_half_its_width(low, w
         (lambda: SpotSpec("a", "table", (0, 0), heading=1), "a spot has no 'heading'; it is 'yaw'"),
         (lambda: SpotSpec("a", "table", (0, 0), yaw=(1.0, 0.5)), "'yaw' should be the lowest heading first"),
         (lambda: SpotSpec("a", "table", (0, 0), yaw=(1, 2, 3)), "'yaw' should be 2 numbers"),
+        (lambda: box(distance=0.2), "'distance' is for an object that starts 'beside' another one"),
+        (lambda: Goal("a", "b", angle_tolerance=10.0), "'angle_tolerance'"),
         (lambda: Goal("a", "b", heigth=1), "a goal has no 'heigth'; did you mean 'height'"),
     ],
 )

@@ -68,6 +68,11 @@ def made(needs, ticks=1, fails=()):
     return trees.any_order("all", *tasks), world
 
 
+def test_nothing_to_do_is_done_at_once():
+    tree, _ = made([])
+    assert run(tree) == 1 and tree.status == Status.SUCCESS
+
+
 def test_what_can_begin_is_done_from_left_to_right():
     tree, world = made([(), (), ()])
     assert run(tree) == 4 and tree.status == Status.SUCCESS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
 import signal
@@ -82,6 +83,14 @@ def test_a_port_that_is_taken(made) -> None:
         pytest.raises(MachineError, match="somebody listens at port"),
     ):
         Twin(robot, WORLD, port=taken.getsockname()[1], domain=domain)
+
+
+def test_an_object_whose_name_makes_no_topic_is_refused_before_anything_starts() -> None:
+    named = dataclasses.replace(
+        WORLD, objects=tuple(dataclasses.replace(o, name="my-cup") for o in WORLD.objects)
+    )
+    with pytest.raises(InputError, match="the topic of object 'my-cup' should be"):
+        Twin(load_robot("panda"), named)
 
 
 def test_a_robot_without_its_topics(made, tmp_path) -> None:
