@@ -116,9 +116,7 @@ class Served:
             elif self.screens and some:
                 every = every[~reach_of(around.view.robot).beyond(every, self._leans)]
                 self.why = "" if len(every) else " (out of reach)"
-            alone = around.alone(hand)
-            free = np.array([tool for tool in every if alone.free(tool)]).reshape(-1, 7)
-            self._asked, self._tools = asked, free
+            self._asked, self._tools = asked, every[around.alone(hand).which_free(every)]
         return self._tools
 
     def far(self, tools: Array) -> Array:
@@ -137,7 +135,8 @@ class Served:
         alone = Held(target, STILL, pieces_of(view.model(target)))
         leave = Leave(hand={thing.name for thing in things}, held=supports)
         object_ = HandCollisions(bodies_of(robot), robot.hand_open, things, alone, leave)
-        return np.array([pose for pose in self._poses if object_.free(pose)]).reshape(-1, 7)
+        found: Array = self._poses[object_.which_free(self._poses)]
+        return found
 
 
 def aims_of(view: WorldView, target: str, later: Sequence[Any]) -> list[Aim]:
