@@ -296,6 +296,7 @@ class Grasp(ConceptModel[GraspMemory]):
         goals, backs, comes, eases, *ways = host_numbers(arrays)
         routes: dict[int, Sequence[Route]] = {}
         standoffs, tight, known, closure = np.empty((4, len(goals)))
+        swaying: list[int] = []
         for k, view in enumerate(found):
             failed = 0 if seen.failures is None else int(seen.failures[k])
             asked = _Asked(
@@ -306,8 +307,12 @@ class Grasp(ConceptModel[GraspMemory]):
             tight[k], known[k], closure[k] = choice.tight, not choice.usual, choice.closure
             if choice.routes:
                 routes[k] = choice.routes
-            elif sways(way := [*(way[k] for way in ways), backs[k]], goals[k], self.speed):
-                routes[k] = [at_rest(way, self.speed), at_rest([backs[k], goals[k]], self.speed, GENTLE)]
+            elif sways([*(way[k] for way in ways), backs[k]], goals[k], self.speed):
+                swaying.append(k)
+        if swaying:
+            coming = at_rest([way[swaying] for way in (*ways, backs)], self.speed)
+            on = at_rest([backs[swaying], goals[swaying]], self.speed, GENTLE)
+            routes |= {k: pieces for k, pieces in zip(swaying, zip(coming, on, strict=True), strict=True)}
         goal, standoff = constant(goals, usual), constant(standoffs, usual)
         room, known, closed = (constant(values, usual) for values in (tight, known, closure))
         return _Chosen(goal, standoff, room, known, closed, routes)

@@ -130,11 +130,10 @@ class Served:
     @cached_property
     def _possible(self) -> Array:
         """Poses ``(k, 7)`` of the aim in which the object alone touches nothing, whoever holds it."""
-        view, things, supports = self._around.view, self._around.things, self._aim.supports
-        robot, target = view.robot, self._around.target
+        view, things, target = self._around.view, self._around.things, self._around.target
         alone = Held(target, STILL, pieces_of(view.model(target)))
-        leave = Leave(hand={thing.name for thing in things}, held=supports)
-        object_ = HandCollisions(bodies_of(robot), robot.hand_open, things, alone, leave)
+        leave = Leave(held=self._aim.supports)
+        object_ = HandCollisions(bodies_of(view.robot), None, things, alone, leave)
         found: Array = self._poses[object_.which_free(self._poses)]
         return found
 

@@ -362,9 +362,11 @@ def from_matrix(m: Array) -> Array:
 
 def to_matrix(q: Array) -> Array:
     """Rotation matrices ``(..., 3, 3)`` of unit quaternions ``(..., 4)``."""
+    turned = rotate(q[..., None, :], constant(_AXES, q))
+    if isinstance(turned, np.ndarray):
+        return np.ascontiguousarray(turned.swapaxes(-1, -2))
     xp = array_namespace(q)
-    axes = constant(_AXES, q)
-    return xp.stack([rotate(q, axes[i, :]) for i in range(3)], axis=-1)
+    return xp.stack([turned[..., i, :] for i in range(3)], axis=-1)
 
 
 def shifted(pose: Array, by: Array) -> Array:

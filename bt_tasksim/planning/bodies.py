@@ -8,7 +8,7 @@ pairs that touch in the rest posture are not asked about.
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,12 +45,14 @@ class _Scratch(threading.local):
     Attributes:
         data: What Pinocchio writes into.
         boxes: Boxes about the bodies, by the positions of the hand's joints.
+        hands: The hand's bodies, by the same.
     """
 
     data: pin.Data | None = None
 
     def __init__(self) -> None:
-        self.boxes: dict[bytes, list[Array]] = {}
+        self.boxes: dict[bytes, Array] = {}
+        self.hands: dict[bytes, list[tuple[str, Any, Any, Array]]] = {}
 
     def __reduce__(self) -> tuple[type[_Scratch], tuple[()]]:
         return _Scratch, ()
@@ -105,6 +107,7 @@ class RobotBodies:
         self.frames = ArmFrames(arm_model(robot, self.model))
         self._scratch = _Scratch()  # a robot's bodies are made once for all threads
         self._rests: Array = np.linalg.inv(self.frames(robot.rest[None])[0])
+        self._own_boxes: Array = np.array([box_of(g.geometry, np.eye(4)) for g in self.shapes.geometryObjects])
         self.of_frames = [self._carriers[g.parentJoint] for g in self.shapes.geometryObjects]
         self.carriers = {joint: self._carrier(joint) for joint in {0, self.tool_joint}}
 
@@ -116,28 +119,55 @@ class RobotBodies:
             found = self._scratch.data = self.model.createData()
         return found
 
-    def boxes(self, hand: Array) -> list[Array]:
-        """Boxes about the bodies ``(4, 4)`` in their frames, see `box_of`.
+    def boxes(self, hand: Array) -> Array:
+        """Boxes about the bodies ``(n, 4, 4)`` in their frames, see `box_of`.
 
         Args:
             hand: Positions ``(n_hand,)`` of the hand's joints.
         """
-        asked, kept = hand.tobytes(), self._scratch.boxes
-        found = kept.get(asked)
-        if found is None:
-            if len(kept) >= _KEPT:
-                kept.clear()
-            found = kept[asked] = self._boxes(hand)
+        found: Array = self._kept(hand, self._scratch.boxes, self._boxes)
         return found
 
-    def _boxes(self, hand: Array) -> list[Array]:
+    def hand_bodies(self, hand: Array) -> Sequence[tuple[str, Any, Any, Array]]:
+        """Links of the hand, their placements in the tool frame, their shapes, and boxes about them there.
+
+        Args:
+            hand: Positions ``(n_hand,)`` of the hand's joints.
+        """
+        found: Sequence[tuple[str, Any, Any, Array]] = self._kept(hand, self._scratch.hands, self._hand_bodies)
+        return found
+
+    def _hand_bodies(self, hand: Array) -> list[tuple[str, Any, Any, Array]]:
         data, placed = self.data, self.shapes.createData()
         q = self.configuration(self.robot.rest, hand)
         pin.updateGeometryPlacements(self.model, data, self.shapes, placed, q)
-        return [
-            box_of(shape.geometry, self._rests[frame] @ at.homogeneous)
-            for shape, frame, at in zip(self.shapes.geometryObjects, self.of_frames, placed.oMg, strict=True)
-        ]
+        tool = data.oMi[self.tool_joint] * self.tool_placement
+        found = []
+        for i in self.hands:
+            at = tool.actInv(placed.oMg[i])
+            found.append((self.links[i], at, self.shapes.geometryObjects[i].geometry, at.homogeneous @ self._own_boxes[i]))
+        return found
+
+    @staticmethod
+    def _kept(hand: Array, kept: dict[bytes, Any], make: Callable[[Array], Any]) -> Any:
+        """What is made of the hand's joints ``(n_hand,)``, if it is not there already."""
+        asked = hand.tobytes()
+        if asked not in kept:
+            if len(kept) >= _KEPT:
+                kept.clear()
+            kept[asked] = make(hand)
+        return kept[asked]
+
+    def _boxes(self, hand: Array) -> Array:
+        found: Array = self._rests[self.of_frames] @ self._placed(hand) @ self._own_boxes
+        return found
+
+    def _placed(self, hand: Array) -> Array:
+        """Where the bodies are ``(n, 4, 4)`` with the arm at rest."""
+        data, placed = self.data, self.shapes.createData()
+        q = self.configuration(self.robot.rest, hand)
+        pin.updateGeometryPlacements(self.model, data, self.shapes, placed, q)
+        return np.array([at.homogeneous for at in placed.oMg])
 
     def _carrier(self, joint: int) -> Carrier:
         """With which of the arm's frames a joint moves that the hand's joints do not move."""

@@ -28,7 +28,7 @@ class HandCollisions:
 
     Args:
         bodies: The robot's.
-        hand: Positions ``(n_hand,)`` of the hand's joints.
+        hand: Positions ``(n_hand,)`` of the hand's joints; None: only what is held is looked at.
         things: What stands around.
         held: What is in the hand, if anything.
         leave: What may touch.
@@ -37,7 +37,7 @@ class HandCollisions:
     def __init__(
         self,
         bodies: RobotBodies,
-        hand: Array,
+        hand: Array | None,
         things: Sequence[Thing],
         held: Held | None = None,
         leave: Leave | None = None,
@@ -45,10 +45,9 @@ class HandCollisions:
         model, joint, still = _flying(), 1, np.eye(4)
         carriers = {0: Carrier(0, still), joint: Carrier(1, still)}
         self._pairs = Pairs(model, pin.GeometryModel(), (), leave, (), (), carriers)
-        shapes = hand_shapes(bodies, hand)
-        for name, placement, shape in shapes:
-            self._pairs.add(name, joint, placement, [shape])
-        own = range(len(shapes))
+        own = range(0)
+        for name, placement, shape, box in () if hand is None else bodies.hand_bodies(hand):
+            own = range(self._pairs.add_body(name, joint, placement, shape, box) + 1)
         inside = self._pairs.add_held(held, joint, pin.SE3.Identity())
         self._pairs.stand(things, own, own, inside)
 
@@ -113,12 +112,4 @@ def _corners(shape: Any) -> Array:
 
 def hand_shapes(bodies: RobotBodies, hand: Array) -> list[tuple[str, Any, Any]]:
     """Links of the hand, their placements in the tool frame, and their shapes."""
-    data, placed = bodies.data, bodies.shapes.createData()
-    q = bodies.configuration(bodies.robot.rest, hand)
-    pin.updateGeometryPlacements(bodies.model, data, bodies.shapes, placed, q)
-    tool = data.oMi[bodies.tool_joint] * bodies.tool_placement
-    shapes = bodies.shapes.geometryObjects
-    return [
-        (bodies.links[i], tool.actInv(placed.oMg[i]), shapes[i].geometry)
-        for i in np.flatnonzero(bodies.hand).tolist()
-    ]
+    return [(name, placement, shape) for name, placement, shape, _ in bodies.hand_bodies(hand)]

@@ -106,6 +106,16 @@ class Pairs:
             self._boxes.append(box_of(shape, at))
         return range(first, len(self._names))
 
+    def add_body(self, name: str, joint: int, placement: Any, shape: Any, box: Array) -> int:
+        """Add a shape with the box ``(4, 4)`` about it in its joint's frame; its number."""
+        carrier = self._carriers[joint]
+        self._added.append(_Added(joint, placement, shape))
+        self._names.append(name)
+        self._keys.append(name)
+        self._frames.append(carrier.frame)
+        self._boxes.append(carrier.placement.dot(box))
+        return len(self._names) - 1
+
     def add_held(self, held: Held | None, joint: int, tool: Any) -> range:
         """Add what is in the hand, if anything, where ``tool`` is the tool's placement on its joint."""
         if held is None:
@@ -129,7 +139,7 @@ class Pairs:
             movers = [i for i in robot if not (thing.name in leave.hand and i in hand)]
             if thing.name not in leave.held:
                 movers += held
-            self.compare((i, k) for i in movers for k in solids)
+            self.compare([(i, k) for i in movers for k in solids])
 
     def _add_thing(self, thing: Thing) -> range:
         first, placement = len(self._names), thing.solids.placement
@@ -182,8 +192,13 @@ class Pairs:
     @cached_property
     def _looked_at(self) -> Boxes:
         """The boxes of the pairs."""
-        pairs, margins = np.array(self._compared), np.array(self._within)
+        pairs, margins = self._numbers, np.array(self._within)
         return Boxes.of(np.array(self._boxes), np.array(self._frames), pairs, margins)
+
+    @cached_property
+    def _numbers(self) -> Array:
+        """Numbers ``(k, 2)`` of the pairs."""
+        return np.array(self._compared, int).reshape(-1, 2)
 
     @property
     def _working(self) -> _Work:
@@ -201,7 +216,7 @@ class Pairs:
                 called = f"{self._names[self._first + k]} {self._first + k}"
                 shapes.addGeometryObject(pin.GeometryObject(called, *added))
         # One at a time Pinocchio adds pairs a hundred times as slowly: it looks for each among all others.
-        pairs = np.sort(np.array(self._compared, int).reshape(-1, 2)[self._active], axis=1)
+        pairs = np.sort(self._numbers[self._active], axis=1)
         first, second = pairs.T
         compared = np.zeros((shapes.ngeoms,) * 2, bool)
         compared[first, second] = True
