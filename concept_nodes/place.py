@@ -255,7 +255,7 @@ class Place(ConceptModel[PlaceMemory]):
         routes = {k: [route] for k, (_, route, _) in enumerate(found)}
         tool_goal = poses.constant(np.array([goal for goal, _, _ in found]), now)
         around = xp.asarray([around for _, _, around in found], device=now.device)
-        path = plan([seen.tool, tool_goal], self.speed, samples=SAMPLES)
+        path = plan([seen.tool], self.speed, samples=SAMPLES)  # there is a route in each world
         path = with_routes(path, routes, len(seen.robot.arm_joints))
         nothing = xp.zeros_like(path.duration)
         felt = xp.astype(nothing, xp.int64)

@@ -240,7 +240,9 @@ class Arm:
                 step = across.dot(dgesv(square, e)[2])
             else:
                 step = z + across.dot(dgesv(square, e - jf.dot(z))[2])
-            step *= _LONGEST / max(_largest(step), _LONGEST)
+            largest = _largest(step)
+            if not largest <= _LONGEST:
+                step *= _LONGEST / largest
             after: Array = q + step
             joints = after.tolist()
             if not (any(map(lt, joints, lower)) or any(map(gt, joints, upper))):

@@ -44,6 +44,7 @@ class _Scratch(threading.local):
 
     Attributes:
         data: What Pinocchio writes into.
+        framed: Joints that were asked about last, and the frames' placements for them.
         boxes: Boxes about the bodies, by the positions of the hand's joints.
         hands: The hand's bodies, by the same.
     """
@@ -51,6 +52,7 @@ class _Scratch(threading.local):
     data: pin.Data | None = None
 
     def __init__(self) -> None:
+        self.framed: tuple[bytes, Array] = b"", np.empty(0)
         self.boxes: dict[bytes, Array] = {}
         self.hands: dict[bytes, list[tuple[str, Any, Any, Array]]] = {}
 
@@ -117,6 +119,14 @@ class RobotBodies:
         found = self._scratch.data
         if found is None:
             found = self._scratch.data = self.model.createData()
+        return found
+
+    def framed(self, arm: Array) -> Array:
+        """The frames' placements ``(1, f, 4, 4)`` for joints of the arm ``(n_arm,)``; nobody writes to them."""
+        asked, (last, found) = arm.tobytes(), self._scratch.framed
+        if asked != last:
+            found = self.frames(arm[None])
+            self._scratch.framed = asked, found
         return found
 
     def boxes(self, hand: Array) -> Array:

@@ -8,7 +8,7 @@ what it needs for a pair takes longer to make than to use.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -38,53 +38,45 @@ def box_of(shape: Any, placement: Array) -> Array:
     return found
 
 
-class Boxes(NamedTuple):
-    """Pairs of boxes in frames, some of which move.
+class Boxes:
+    """Pairs of boxes in frames.
+
+    Args:
+        boxes: Boxes ``(n, 4, 4)`` in their frames, see `box_of`.
+        frames: Numbers ``(n,)`` of the frames; 0 is the base's, which stands still.
+        pairs: Numbers ``(k, 2)`` of boxes.
+        margins: Metres ``(k,)`` within which their shapes count as touching.
 
     Attributes:
-        still: Boxes ``(s, 4, 4)`` in the base's frame, see `box_of`.
-        moving: Boxes ``(n, 4, 4)`` in frames that move.
-        frames: Numbers ``(n,)`` of these.
-        first, second: Numbers ``(k,)`` of the boxes of each pair, those that move before those that do not.
-        margins: Metres ``(k, 1)`` within which their shapes count as near.
+        pairs: The pairs, those first of which both move.
+        margins: Their margins.
     """
 
-    still: tuple[Array, Array]
-    moving: Array
-    frames: Array
-    first: Array
-    second: Array
-    margins: Array
-
-    @classmethod
-    def of(cls, boxes: Array, frames: Array, pairs: Array, margins: Array) -> Boxes:
-        """Those of all shapes.
-
-        Args:
-            boxes: Boxes ``(n, 4, 4)`` in their frames.
-            frames: Numbers ``(n,)`` of the frames; 0 is the base's.
-            pairs: Numbers ``(k, 2)`` of boxes.
-            margins: Metres ``(k,)`` within which their shapes count as touching.
-        """
+    def __init__(self, boxes: Array, frames: Array, pairs: Array, margins: Array) -> None:
         moves = frames > 0
-        places = np.empty(len(frames), int)
-        order = np.concatenate([np.flatnonzero(moves), np.flatnonzero(~moves)])
-        places[order] = np.arange(len(order))
-        first, second = places[pairs].T
-        still = _upright(boxes[~moves])
-        return cls(still, boxes[moves], frames[moves], first, second, (margins + _SLACK)[:, None])
+        first, second = moves[pairs].T
+        both = first & second
+        order = np.concatenate([both.nonzero()[0], (~both).nonzero()[0]])
+        self.pairs, self.margins, self._both = pairs[order], margins[order], int(both.sum())
+        self._moving, self._frames = boxes[moves], frames[moves]
+        places = np.cumsum(moves) - 1
+        moved, other = np.where(first[order], self.pairs.T, self.pairs.T[::-1])
+        room = (self.margins + _SLACK)[:, None]
+        self._first, self._second = places[moved], places[other[: self._both]]
+        half, self._middle = _upright(boxes[other[self._both :]])
+        self._room_both, self._room = room[: self._both], room[self._both :] + half
 
     def near(self, frames: Array) -> Array:
         """Whether ``(m, k)`` boxes of pairs come near each other where frames are at ``(m, f, 4, 4)``."""
-        half, middle = _upright(frames.take(self.frames, axis=1) @ self.moving)
-        m, more = len(frames), self.still[0].shape
-        half = np.concatenate([half, np.broadcast_to(self.still[0], (m, *more))], axis=1)
-        middle = np.concatenate([middle, np.broadcast_to(self.still[1], (m, *more))], axis=1)
-        room = half.take(self.first, axis=1)
-        room += half.take(self.second, axis=1)
-        room += self.margins
-        apart = middle.take(self.first, axis=1)
-        apart -= middle.take(self.second, axis=1)
+        half, middle = _upright(frames.take(self._frames, axis=1) @ self._moving)
+        room, apart = half.take(self._first, axis=1), middle.take(self._first, axis=1)
+        both = self._both
+        if both:
+            room[:, :both] += half.take(self._second, axis=1)
+            room[:, :both] += self._room_both
+            apart[:, :both] -= middle.take(self._second, axis=1)
+        room[:, both:] += self._room
+        apart[:, both:] -= self._middle
         near = np.abs(apart, out=apart) <= room
         found: Array = near[..., 0] & near[..., 1] & near[..., 2]
         return found
@@ -94,6 +86,10 @@ def _upright(boxes: Array) -> tuple[Array, Array]:
     """Half the sizes and the middles, both ``(..., 3)``, of the upright boxes about boxes ``(..., 4, 4)``."""
     axes = np.abs(boxes[..., :3, :3])
     return axes[..., 0] + axes[..., 1] + axes[..., 2], boxes[..., :3, 3]
+
+
+_STILL = np.eye(4)
+"""Where the base is."""
 
 
 class ArmFrames:
@@ -115,7 +111,11 @@ class ArmFrames:
             sine = np.where(self._slides, joints, sine)
         steps = self._fixed + sine[..., None, None] * self._first + cosine[..., None, None] * self._second
         found = np.empty((joints.shape[0], joints.shape[1] + 1, 4, 4))
-        found[:, 0] = np.eye(4)
+        found[:, 0] = here = _STILL
+        if len(joints) == 1:
+            for i, step in enumerate(steps[0], 1):
+                found[0, i] = here = here.dot(step)
+            return found
         for i in range(joints.shape[1]):
             np.matmul(found[:, i], steps[:, i], out=found[:, i + 1])
         return found

@@ -91,7 +91,7 @@ class Collisions:
 
     def _frames(self, arm: Array) -> Array:
         """Where the frames are that the arm moves ``(1, f, 4, 4)``."""
-        return self._bodies.frames(arm[None])
+        return self._bodies.framed(arm)
 
     def _inside(self, arm: Array) -> bool:
         """The tool is in the workspace with the arm's joints at ``arm (n_arm,)``."""

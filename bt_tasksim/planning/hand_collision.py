@@ -44,7 +44,7 @@ class HandCollisions:
     ) -> None:
         model, joint, still = _flying(), 1, np.eye(4)
         carriers = {0: Carrier(0, still), joint: Carrier(1, still)}
-        self._pairs = Pairs(model, pin.GeometryModel(), (), leave, (), (), carriers)
+        self._pairs = Pairs(model, pin.GeometryModel(), (), leave, (), np.empty((0, 4, 4)), carriers)
         own = range(0)
         for name, placement, shape, box in () if hand is None else bodies.hand_bodies(hand):
             own = range(self._pairs.add_body(name, joint, placement, shape, box) + 1)

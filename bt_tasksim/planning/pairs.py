@@ -40,14 +40,6 @@ class _Work(NamedTuple):
     tree: Any
 
 
-class _Added(NamedTuple):
-    """A shape that moves with a joint."""
-
-    joint: int
-    placement: Any
-    shape: Any
-
-
 class Carrier(NamedTuple):
     """With which frame a joint moves, and where ``(4, 4)`` it is in that."""
 
@@ -78,15 +70,15 @@ class Pairs:
         names: Iterable[str],
         leave: Leave | None,
         frames: Sequence[int],
-        boxes: Sequence[Array],
+        boxes: Array,
         carriers: Mapping[int, Carrier],
         data: Any = None,
     ) -> None:
         self._model, self._shapes, self._names, self._leave = model, shapes, list(names), leave or Leave()
         self._keys = list(self._names)
         self._first = len(self._names)
-        self._added: list[_Added] = []
-        self._frames, self._boxes, self._carriers = list(frames), list(boxes), carriers
+        self._added: list[tuple[int, Any, Any]] = []  # with which joint a shape moves, where it is, and itself
+        self._frames, self._boxes, self._carriers = list(frames), [boxes], carriers
         self._data = data
         self._compared: list[tuple[int, int]] = []
         self._within: list[float] = []
@@ -99,21 +91,21 @@ class Pairs:
         first, carrier = len(self._names), self._carriers[joint]
         at = carrier.placement.dot(placement.homogeneous)
         for shape in shapes:
-            self._added.append(_Added(joint, placement, shape))
+            self._added.append((joint, placement, shape))
             self._names.append(name)
             self._keys.append(key or name)
             self._frames.append(carrier.frame)
-            self._boxes.append(box_of(shape, at))
+            self._boxes.append(box_of(shape, at)[None])
         return range(first, len(self._names))
 
     def add_body(self, name: str, joint: int, placement: Any, shape: Any, box: Array) -> int:
         """Add a shape with the box ``(4, 4)`` about it in its joint's frame; its number."""
         carrier = self._carriers[joint]
-        self._added.append(_Added(joint, placement, shape))
+        self._added.append((joint, placement, shape))
         self._names.append(name)
         self._keys.append(name)
         self._frames.append(carrier.frame)
-        self._boxes.append(carrier.placement.dot(box))
+        self._boxes.append(carrier.placement.dot(box)[None])
         return len(self._names) - 1
 
     def add_held(self, held: Held | None, joint: int, tool: Any) -> range:
@@ -142,11 +134,10 @@ class Pairs:
             self.compare([(i, k) for i in movers for k in solids])
 
     def _add_thing(self, thing: Thing) -> range:
-        first, placement = len(self._names), thing.solids.placement
-        for shape, box in zip(thing.solids.shapes, thing.solids.boxes, strict=True):
-            self._added.append(_Added(0, placement, shape))
-            self._boxes.append(box)
-        count = len(thing.solids.shapes)
+        first, (placement, shapes, boxes) = len(self._names), thing.solids
+        self._added += [(0, placement, shape) for shape in shapes]
+        self._boxes.append(boxes)
+        count = len(shapes)
         self._names += [thing.name] * count
         self._keys += [thing.known_as] * count
         self._frames += [0] * count
@@ -175,8 +166,11 @@ class Pairs:
         if not self._compared:
             return np.zeros(len(frames), bool)
         found = self._looked_at.near(frames)
+        if not found.any():
+            return np.zeros(len(frames), bool)
         self._compare_too(found.any(axis=0))
-        return found.any(axis=1)
+        near: Array = found.any(axis=1)
+        return near
 
     def _compare_too(self, pairs: Array) -> None:
         """Compare pairs ``(k,)``, as booleans, from now on."""
@@ -186,19 +180,14 @@ class Pairs:
 
     @cached_property
     def _active(self) -> Array:
-        """Which pairs ``(k,)`` are compared."""
+        """Which pairs ``(k,)`` are compared, in the order of `Boxes.pairs`."""
         return np.zeros(len(self._compared), bool)
 
     @cached_property
     def _looked_at(self) -> Boxes:
         """The boxes of the pairs."""
-        pairs, margins = self._numbers, np.array(self._within)
-        return Boxes.of(np.array(self._boxes), np.array(self._frames), pairs, margins)
-
-    @cached_property
-    def _numbers(self) -> Array:
-        """Numbers ``(k, 2)`` of the pairs."""
-        return np.array(self._compared, int).reshape(-1, 2)
+        pairs = np.array(self._compared, int).reshape(-1, 2)
+        return Boxes(np.concatenate(self._boxes), np.array(self._frames), pairs, np.array(self._within))
 
     @property
     def _working(self) -> _Work:
@@ -216,14 +205,14 @@ class Pairs:
                 called = f"{self._names[self._first + k]} {self._first + k}"
                 shapes.addGeometryObject(pin.GeometryObject(called, *added))
         # One at a time Pinocchio adds pairs a hundred times as slowly: it looks for each among all others.
-        pairs = np.sort(self._numbers[self._active], axis=1)
+        pairs = np.sort(self._looked_at.pairs[self._active], axis=1)
         first, second = pairs.T
         compared = np.zeros((shapes.ngeoms,) * 2, bool)
         compared[first, second] = True
         shapes.setCollisionPairs(compared)
         found = shapes.createData()
         margins = np.full(compared.shape, _TOUCHING)
-        margins[first, second] = margins[second, first] = np.array(self._within)[self._active]
+        margins[first, second] = margins[second, first] = self._looked_at.margins[self._active]
         found.setSecurityMargins(shapes, margins)
         tree = None
         if len(pairs) > _FEW:

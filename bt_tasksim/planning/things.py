@@ -33,12 +33,12 @@ class Solids(NamedTuple):
     Attributes:
         placement: Where it is, in Pinocchio's form.
         shapes: Its solids with its margin swept about them.
-        boxes: Boxes about these ``(4, 4)``, robot base frame, see `box_of`.
+        boxes: Boxes about these ``(k, 4, 4)``, robot base frame, see `box_of`.
     """
 
     placement: Any
     shapes: Sequence[Any]
-    boxes: Sequence[Array]
+    boxes: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Thing:
         for shape in shapes:
             shape.setSweptSphereRadius(self.margin)
         at = placement.homogeneous
-        return Solids(placement, shapes, [box_of(shape, at) for shape in shapes])
+        return Solids(placement, shapes, np.array([box_of(shape, at) for shape in shapes]).reshape(-1, 4, 4))
 
     @property
     def known_as(self) -> str:
