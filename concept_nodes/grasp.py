@@ -312,7 +312,7 @@ class Grasp(ConceptModel[GraspMemory]):
         if swaying:
             coming = at_rest([way[swaying] for way in (*ways, backs)], self.speed)
             on = at_rest([backs[swaying], goals[swaying]], self.speed, GENTLE)
-            routes |= {k: pieces for k, pieces in zip(swaying, zip(coming, on, strict=True), strict=True)}
+            routes |= dict(zip(swaying, zip(coming, on, strict=True), strict=True))
         goal, standoff = constant(goals, usual), constant(standoffs, usual)
         room, known, closed = (constant(values, usual) for values in (tight, known, closure))
         return _Chosen(goal, standoff, room, known, closed, routes)

@@ -59,7 +59,7 @@ def sways(way: Sequence[Array], goal: Array, speed: float) -> bool:
 
 
 def at_rest(way: Sequence[Array], speed: float, acceleration: float = ACCELERATION) -> list[Route]:
-    """Motions of the tool through poses ``(k, 7)``, from rest to rest, in whatever posture, one for each row."""
+    """Motions of the tool through poses ``(k, 7)``, one each, from rest to rest, in whatever posture."""
     path = plan(way, speed, blend=0.03, acceleration=acceleration, samples=SAMPLES)
     any_posture = np.full((SAMPLES, 0), np.nan)
     return [

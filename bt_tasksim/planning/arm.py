@@ -283,7 +283,7 @@ class Arm:
 
 def _largest(values: Array) -> float:
     """The largest of some numbers ``(n,)``, whatever their signs."""
-    return max(map(abs, values.tolist()))
+    return float(max(map(abs, values.tolist())))
 
 
 def arm_of(robot: RobotDescription) -> Arm:

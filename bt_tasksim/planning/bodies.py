@@ -109,7 +109,9 @@ class RobotBodies:
         self.frames = ArmFrames(arm_model(robot, self.model))
         self._scratch = _Scratch()  # a robot's bodies are made once for all threads
         self._rests: Array = np.linalg.inv(self.frames(robot.rest[None])[0])
-        self._own_boxes: Array = np.array([box_of(g.geometry, np.eye(4)) for g in self.shapes.geometryObjects])
+        self._own_boxes: Array = np.array(
+            [box_of(g.geometry, np.eye(4)) for g in self.shapes.geometryObjects]
+        )
         self.of_frames = [self._carriers[g.parentJoint] for g in self.shapes.geometryObjects]
         self.carriers = {joint: self._carrier(joint) for joint in {0, self.tool_joint}}
 
@@ -122,7 +124,7 @@ class RobotBodies:
         return found
 
     def framed(self, arm: Array) -> Array:
-        """The frames' placements ``(1, f, 4, 4)`` for joints of the arm ``(n_arm,)``; nobody writes to them."""
+        """The frames' placements ``(1, f, 4, 4)`` for joints of the arm ``(n_arm,)``, not to be written."""
         asked, (last, found) = arm.tobytes(), self._scratch.framed
         if asked != last:
             found = self.frames(arm[None])
@@ -144,7 +146,9 @@ class RobotBodies:
         Args:
             hand: Positions ``(n_hand,)`` of the hand's joints.
         """
-        found: Sequence[tuple[str, Any, Any, Array]] = self._kept(hand, self._scratch.hands, self._hand_bodies)
+        found: Sequence[tuple[str, Any, Any, Array]] = self._kept(
+            hand, self._scratch.hands, self._hand_bodies
+        )
         return found
 
     def _hand_bodies(self, hand: Array) -> list[tuple[str, Any, Any, Array]]:
@@ -155,7 +159,14 @@ class RobotBodies:
         found = []
         for i in self.hands:
             at = tool.actInv(placed.oMg[i])
-            found.append((self.links[i], at, self.shapes.geometryObjects[i].geometry, at.homogeneous @ self._own_boxes[i]))
+            found.append(
+                (
+                    self.links[i],
+                    at,
+                    self.shapes.geometryObjects[i].geometry,
+                    at.homogeneous @ self._own_boxes[i],
+                )
+            )
         return found
 
     @staticmethod

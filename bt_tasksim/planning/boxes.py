@@ -122,7 +122,7 @@ class ArmFrames:
 
 
 def _moved(model: pin.Model, i: int) -> tuple[Array, Array, Array]:
-    """A joint's placement in the frame of the one before: ``(4, 4)`` at all times, by its sine, by its cosine.
+    """A joint's placement ``(4, 4)`` in the frame of the one before: always, by its sine, by its cosine.
 
     Of a slide there is no cosine, and in place of the sine stands how far it is out.
     """

@@ -26,7 +26,7 @@ along a diagonal, coal may say that they are 2e-12 m apart when it is not asked 
 
 
 _OFTEN = 24
-"""Questions about one posture each from which on all pairs are compared: boxes are looked at faster for many."""
+"""Questions about one posture each from which on all pairs are compared: to look at boxes is for many."""
 _FEW = 12
 """Pairs up to which a tree of boxes is not worth it."""
 
@@ -77,7 +77,9 @@ class Pairs:
         self._model, self._shapes, self._names, self._leave = model, shapes, list(names), leave or Leave()
         self._keys = list(self._names)
         self._first = len(self._names)
-        self._added: list[tuple[int, Any, Any]] = []  # with which joint a shape moves, where it is, and itself
+        self._added: list[
+            tuple[int, Any, Any]
+        ] = []  # with which joint a shape moves, where it is, and itself
         self._frames, self._boxes, self._carriers = list(frames), [boxes], carriers
         self._data = data
         self._compared: list[tuple[int, int]] = []

@@ -208,7 +208,7 @@ def _rounded(waypoints: Sequence[Array], blend: float, pieces: int = 6) -> tuple
         go(a)
         curve = _curve(a, corner, b, pieces)
         curve = xp.where(rounds[:, None], curve, corner)
-        far = poses.norm(curve[:, :, :3] - xp.concat([a[None], curve[:-1, ...]])[:, :, :3])
+        far = poses.norm(curve[:, :, :3] - xp.concat([a[None, ...], curve[:-1, ...]])[:, :, :3])
         # Even steps of a Bezier curve's parameter: even acceleration.
         far = xp.where(back, 2 * first / (pieces - 1), far)
         for j in range(pieces - 1):
@@ -227,5 +227,7 @@ def _curve(a: Array, corner: Array, b: Array, pieces: int) -> Array:
     like = {"dtype": a.dtype, "device": a.device}
     shares = xp.asarray([j / (pieces - 1) for j in range(1, pieces)], **like)
     t = shares[:, None] + xp.zeros_like(a[:, 0])
-    legs = poses.interpolate(xp.stack([a, corner])[:, None], xp.stack([corner, b])[:, None], t[None])
+    legs = poses.interpolate(
+        xp.stack([a, corner])[:, None, ...], xp.stack([corner, b])[:, None, ...], t[None, ...]
+    )
     return poses.interpolate(legs[0, ...], legs[1, ...], t)
