@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any
+
+import numpy as np
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array, array_namespace
@@ -19,8 +22,8 @@ def parts(bundle: Any) -> dict[str, Any] | None:
     """The parts of a bundle, by name; None for an array or anything else that has none."""
     if isinstance(bundle, tuple) and hasattr(bundle, "_asdict"):
         return dict(bundle._asdict())
-    if dataclasses.is_dataclass(bundle) and not isinstance(bundle, type):
-        return {f.name: getattr(bundle, f.name) for f in dataclasses.fields(bundle) if f.init}
+    if not isinstance(bundle, type) and (names := _fields(type(bundle))) is not None:
+        return {name: getattr(bundle, name) for name in names}
     if isinstance(bundle, Mapping):
         return {str(k): v for k, v in bundle.items()}
     if isinstance(bundle, tuple | list):
@@ -28,10 +31,16 @@ def parts(bundle: Any) -> dict[str, Any] | None:
     return None
 
 
+@lru_cache(maxsize=256)
+def _fields(kind: type) -> tuple[str, ...] | None:
+    """Names of what a dataclass is made with; None for other classes."""
+    return tuple(f.name for f in dataclasses.fields(kind) if f.init) if dataclasses.is_dataclass(kind) else None
+
+
 def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
     """A bundle like the first one, whose arrays are made by ``function`` from those of all of them."""
     first = bundles[0]
-    if hasattr(first, "dtype"):
+    if isinstance(first, np.ndarray) or hasattr(first, "dtype"):
         return function(*bundles)
     named = isinstance(first, tuple) and hasattr(first, "_fields")
     if named and all(type(b) is type(first) for b in bundles):

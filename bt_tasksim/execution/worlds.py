@@ -336,6 +336,8 @@ def _hands(last: Array, hand: Array) -> Array:
 
 def _sent(state: WorldState, like: Array) -> WorldState:
     """A state in the library and on the device of an array."""
+    if isinstance(like, np.ndarray):
+        return state
     known = {name: value for name in STATE if (value := getattr(state, name)) is not None}
     there = sent(list(known.values()), like)
     return replace(state, **dict(zip(known, there, strict=True)))

@@ -287,7 +287,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
                 when = f"after {state.time[k]:.2f} s: see the last target"
                 self.errors[rows[k]] = MachineError(f"{self.library}'s state is no longer finite {when}")
             rows, worlds = rows[finite], [world for world, fine in zip(worlds, finite, strict=True) if fine]
-            state, hidden = taken(state, finite), taken(hidden, finite)
+            state, hidden = (taken(bundle, np.flatnonzero(finite)) for bundle in (state, hidden))
         if self._state is None or self._hidden is None:
             self._state, self._hidden = rows_for(state, self.worlds), rows_for(hidden, self.worlds)
         put(self._state, rows, state)
@@ -298,9 +298,10 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
     def _note_motion(worlds: list[W], state: WorldState, hidden: Hidden) -> None:
         assert state.velocities is not None
         free = hidden.hand_force == 0.0
-        u, v, w, x, y, z = (np.where(free, state.velocities[..., i], 0.0) for i in range(6))
-        speed, spin = np.sqrt(u * u + v * v + w * w), np.sqrt(x * x + y * y + z * z)
+        moving = np.where(free[..., None], state.velocities, 0.0)
+        u, v, w, x, y, z = np.moveaxis(moving * moving, -1, 0)
+        speed, spin = np.sqrt(u + v + w), np.sqrt(x + y + z)
         falling = ((speed > FALLING[0]) | (spin > FALLING[1])).any(axis=1)
         fastest = spin.max(axis=1, initial=0.0)
-        for k, world in enumerate(worlds):
-            world.note_motion(bool(falling[k]), float(fastest[k]))
+        for world, falls, turns in zip(worlds, falling.tolist(), fastest.tolist(), strict=True):
+            world.note_motion(falls, turns)
