@@ -45,12 +45,7 @@ from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.arm import arm_of
-from bt_tasksim.planning.reference_motion import (
-    plan,
-    posture,
-    sample,
-    searched_for,
-)
+from bt_tasksim.planning.reference_motion import at_times, plan, searched_for
 from bt_tasksim.planning.route import Pace, Route
 from bt_tasksim.planning.routes import SAMPLES, in_postures, joints_along, with_routes
 from bt_tasksim.robot.description import RobotDescription
@@ -430,8 +425,8 @@ class Grasp(ConceptModel[GraspMemory]):
         delay = memory.delay + seen.world.control_period * (1.0 - scaling)
         offset = grasp_features.moved_offset(action, met, seen, memory)
         middle = grasp_features.found_middle(offset, met, memory)
-        target = grasp_features.displaced(sample(memory.path, seen.elapsed - delay), offset)
-        arm = posture(memory.path, seen.elapsed - delay)
+        reference, arm = at_times(memory.path, seen.elapsed - delay)
+        target = grasp_features.displaced(reference, offset)
         closed = grasp_features.closed(scaling, self._asked(offset), self.tightening, seen, memory)
         return GraspMotion(delay, offset, middle, target, closed, arm)
 

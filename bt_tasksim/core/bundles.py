@@ -34,7 +34,9 @@ def parts(bundle: Any) -> dict[str, Any] | None:
 @lru_cache(maxsize=256)
 def _fields(kind: type) -> tuple[str, ...] | None:
     """Names of what a dataclass is made with; None for other classes."""
-    return tuple(f.name for f in dataclasses.fields(kind) if f.init) if dataclasses.is_dataclass(kind) else None
+    return (
+        tuple(f.name for f in dataclasses.fields(kind) if f.init) if dataclasses.is_dataclass(kind) else None
+    )
 
 
 def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
@@ -64,7 +66,7 @@ def taken(bundle: Any, rows: Array | Index) -> Any:
     return mapped(_index(rows).of, bundle)
 
 
-def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
+def merged(whole: Any, rows: Array | Index, new: Any, worlds: int, was: Any = None) -> Any:
     """A bundle of ``worlds`` worlds in which those at ``rows (k,)`` are ``new``; nothing given is changed.
 
     Args:
@@ -72,6 +74,8 @@ def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
         rows: Which worlds.
         new: Of these worlds.
         worlds: How many there are in all.
+        was: What was taken of ``whole`` for these worlds, if anything was: arrays of it that are still there
+            in ``new`` need not be put back.
 
     Raises:
         InputError: The worlds do not fit together, since their parts are of unlike kinds, or their arrays of
@@ -85,7 +89,9 @@ def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
     index = _index(rows)
     if whole is None:
         return mapped(lambda values: _spread(values, index, worlds), new)
-    return mapped(lambda before, values: _replaced(before, index, values), whole, new)
+    if was is None:
+        return mapped(index.replaced, whole, new)
+    return mapped(lambda all_, old, now: all_ if old is now else index.replaced(all_, now), whole, was, new)
 
 
 def _index(rows: Array | Index) -> Index:
@@ -158,10 +164,6 @@ def _spread(values: Array, index: Index, worlds: int) -> Array:
     out = xp.zeros((worlds, *values.shape[1:]), dtype=values.dtype, device=values.device)
     index.put(out, values)
     return out
-
-
-def _replaced(before: Array, index: Index, values: Array) -> Array:
-    return index.replaced(before, values)
 
 
 class Rows:

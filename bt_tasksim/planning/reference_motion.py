@@ -106,17 +106,29 @@ def plan(
 
 def sample(path: Path, time: Array) -> Array:
     """Poses ``(N, 7)`` of paths at ``time (N,)`` seconds since their begin; they stay at their ends."""
-    table = path.table
     index, share = _between(path, time)
-    return poses.interpolate(take_rows(table, index), take_rows(table, index + 1), share)
+    return poses.interpolate(take_rows(path.table, index), take_rows(path.table, index + 1), share)
 
 
-def posture(path: Path, time: Array) -> Array | None:
-    """Joints ``(N, n_arm)`` of the arm on paths at ``time (N,)``, NaN where they may be any; see `sample`."""
-    if path.joints is None:
-        return None
+def position(path: Path, time: Array) -> Array:
+    """Positions ``(N, 3)`` on paths, those of `sample`."""
     index, share = _between(path, time)
-    first, last = take_rows(path.joints, index), take_rows(path.joints, index + 1)
+    return _shared(path.table[..., :3], index, share)
+
+
+def at_times(path: Path, time: Array) -> tuple[Array, Array | None]:
+    """Poses of `sample`, and joints ``(N, n_arm)`` of the arm there, NaN where they may be any.
+
+    They are None where no world has any.
+    """
+    index, share = _between(path, time)
+    pose = poses.interpolate(take_rows(path.table, index), take_rows(path.table, index + 1), share)
+    return pose, None if path.joints is None else _shared(path.joints, index, share)
+
+
+def _shared(table: Array, index: Array, share: Array) -> Array:
+    """Between the rows ``(N,)`` of tables ``(N, n, k)`` and the next ones, by shares ``(N,)`` of the way."""
+    first, last = take_rows(table, index), take_rows(table, index + 1)
     return first + share[:, None] * (last - first)
 
 
