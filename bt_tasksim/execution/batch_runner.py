@@ -116,7 +116,7 @@ class BatchRunner(Closing):
         self._phase = np.full(worlds, IDLE)
         self._quiet, self._left = np.zeros(worlds, int), np.zeros(worlds, int)
         self._steps, self._longest = np.zeros(worlds, int), np.zeros(worlds, int)
-        self._watches = False
+        self._watches, self._looked = False, np.zeros(worlds, bool)
         self.control_steps = 0
         """Control periods of all worlds so far, those included in which things come to rest."""
 
@@ -190,10 +190,21 @@ class BatchRunner(Closing):
             on &= self._phase != IDLE
         refused = {miss.row: self.context.refusal(miss.row, miss.error) for miss in unreached}
         on[begun] = True
-        seen = np.flatnonzero(on)
-        if len(seen):
-            self.context.advance(self.worlds.observe(seen), seen)
+        self._observe(on)
         self.context.refused.update(refused)
+
+    def _observe(self, on: Array) -> None:
+        """Look at worlds ``on (N,)``, boolean, in which the next tick comes.
+
+        Worlds that rest were looked at before, and are looked at with the others: nothing has changed there,
+        and all worlds together take less than some of them, which have to be put among the others.
+        """
+        rows = np.flatnonzero(on)
+        if not len(rows):
+            return
+        self._looked |= on
+        observed = self.worlds.observe(self.context.rows if self._looked.all() else rows)
+        self.context.advance(observed, rows)
 
     def _look(self) -> None:
         """Look whether goals that have to be true once are so now."""
@@ -287,9 +298,9 @@ class BatchRunner(Closing):
         """Begin in all worlds that are idle, and look."""
         begun: list[int] = []
         yield from self._begin(np.flatnonzero(self._phase == IDLE), waiting, stream, begun)
-        if begun:
-            rows = np.array(sorted(begun))
-            self.context.advance(self.worlds.observe(rows), rows)
+        on = np.zeros(self.context.worlds, bool)
+        on[begun] = True
+        self._observe(on)
 
     def _begin(
         self, rows: Array, waiting: Iterator[int], stream: str, begun: list[int]
@@ -306,6 +317,7 @@ class BatchRunner(Closing):
                 continue
             self._episodes_of(drawn, worlds)
             taken = np.array([row for row, _ in drawn])
+            self._looked[taken] = False
             self.worlds.reset(taken, worlds)
             failed = self.worlds.errors(taken)
             for row, seed in drawn:
@@ -353,7 +365,7 @@ class BatchRunner(Closing):
             episode = self._episodes[row]
             assert episode is not None
             self.batch.reset(np.array([row]))
-            self._phase[row], self._episodes[row] = IDLE, None
+            self._phase[row], self._episodes[row], self._looked[row] = IDLE, None, False
             yield episode.seed, error
 
     def _alone(self, error: BtTasksimError, stream: str) -> Iterator[tuple[int, Result | BtTasksimError]]:

@@ -268,6 +268,8 @@ class BatchWorlds(Worlds):
 
     def errors(self, rows: Array) -> dict[int, BtTasksimError]:
         """See `Worlds.errors`."""
+        if not self._unplaced and not any(self.physics.errors):
+            return {}
         numbers = rows.tolist()
         found = {row: error for row in numbers if (error := self.physics.errors[row]) is not None}
         if self._unplaced:

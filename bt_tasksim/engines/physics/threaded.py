@@ -169,8 +169,9 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             self.errors[rows[k]] = self.errors[rows[k]] or MachineError(
                 f"the joint target is not finite: {position[k]}, {velocity[k]}"
             )
-        going = np.array([self.errors[row] is None for row in rows.tolist()], bool)
-        rows, position, velocity = rows[going], position[going], velocity[going]
+        if any(self.errors):
+            going = np.array([self.errors[row] is None for row in rows.tolist()], bool)
+            rows, position, velocity = rows[going], position[going], velocity[going]
         if self._state is not None:
             position = shutting(self.robot, position, self._state.joint_position[rows])
         self._position[rows], self._velocity[rows] = position, velocity
@@ -273,11 +274,11 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
 
     def _gather(self, rows: Array) -> None:
         """Take the readings of those worlds of these rows that have not failed into the arrays of all."""
-        found = [(row, self.simulated[row]) for row in rows.tolist() if self.errors[row] is None]
-        worlds = [world for _, world in found if world is not None]
+        fine = [row for row in rows.tolist() if self.errors[row] is None and self.simulated[row] is not None]
+        worlds = [world for row in fine if (world := self.simulated[row]) is not None]
         if not worlds:
             return
-        rows = np.array([row for row, world in found if world is not None], int)
+        rows = np.array(fine, int)
         layout = Layout(np.array([world.n_objects for world in worlds]), *self._most)
         with np.errstate(invalid="ignore", over="ignore"):  # of worlds that blew up
             state, hidden = self._read(rows, worlds, layout)
