@@ -125,7 +125,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
 
     @abstractmethod
     def _read(self, rows: Array, worlds: list[W], layout: Layout) -> tuple[WorldState, Hidden]:
-        """States ``(k, ...)`` of these worlds, from the readings that they took last."""
+        """States ``(k, ...)`` of these worlds, in fresh arrays, from the readings that they took last."""
 
     def _effort(self, rows: Array, q: Array, v: Array) -> Array:
         """Efforts ``(k, n_joints)`` of the drives by their own law, which simulators do not report."""
@@ -289,10 +289,13 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
                 self.errors[rows[k]] = MachineError(f"{self.library}'s state is no longer finite {when}")
             rows, worlds = rows[finite], [world for world, fine in zip(worlds, finite, strict=True) if fine]
             state, hidden = (taken(bundle, np.flatnonzero(finite)) for bundle in (state, hidden))
-        if self._state is None or self._hidden is None:
-            self._state, self._hidden = rows_for(state, self.worlds), rows_for(hidden, self.worlds)
-        put(self._state, rows, state)
-        put(self._hidden, rows, hidden)
+        if len(rows) == self.worlds and (rows[:-1] < rows[1:]).all():
+            self._state, self._hidden = state, hidden
+        else:
+            if self._state is None or self._hidden is None:
+                self._state, self._hidden = rows_for(state, self.worlds), rows_for(hidden, self.worlds)
+            put(self._state, rows, state)
+            put(self._hidden, rows, hidden)
         self._note_motion(worlds, state, hidden)
 
     @staticmethod
