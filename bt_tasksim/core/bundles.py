@@ -22,7 +22,8 @@ def parts(bundle: Any) -> dict[str, Any] | None:
     """The parts of a bundle, by name; None for an array or anything else that has none."""
     if isinstance(bundle, tuple) and hasattr(bundle, "_asdict"):
         return dict(bundle._asdict())
-    if not isinstance(bundle, type) and (names := _fields(type(bundle))) is not None:
+    kind: Any = type(bundle)
+    if not isinstance(bundle, type) and (names := _fields(kind)) is not None:
         return {name: getattr(bundle, name) for name in names}
     if isinstance(bundle, Mapping):
         return {str(k): v for k, v in bundle.items()}
@@ -32,7 +33,7 @@ def parts(bundle: Any) -> dict[str, Any] | None:
 
 
 @lru_cache(maxsize=256)
-def _fields(kind: type) -> tuple[str, ...] | None:
+def _fields(kind: Any) -> tuple[str, ...] | None:
     """Names of what a dataclass is made with; None for other classes."""
     return (
         tuple(f.name for f in dataclasses.fields(kind) if f.init) if dataclasses.is_dataclass(kind) else None
