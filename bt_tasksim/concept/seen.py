@@ -140,13 +140,19 @@ class Seen:
         if self._made is None:
             self._made = {}
         if key not in self._made:
-            whole, index = self._whole or (None, None)
-            if by_world and whole is not None and index is not None and key in (whole._made or ()):
-                self._made[key] = index.of(whole.once(key, make))
-            else:
-                self._made[key] = make()
+            there = self._of_whole(key) if by_world else None
+            self._made[key] = make() if there is None else there
         found: Made = self._made[key]
         return found
+
+    def _of_whole(self, key: Hashable) -> Array | None:
+        """The rows of what was made of the view that this one was taken of; None where nothing was."""
+        if self._whole is None:
+            return None
+        whole, index = self._whole
+        made = (whole._made or {}).get(key)
+        made = whole._of_whole(key) if made is None else made
+        return None if made is None else index.of(made)
 
     @property
     def tool(self) -> Array:
