@@ -316,7 +316,11 @@ class _Leaving:
 
     def all_free(self, postures: Array) -> bool:
         """Nothing touches at any of ``postures (n, n_arm)``."""
-        return all(self.free(q) for q in postures)
+        there = np.abs(postures - self._start).max(axis=-1) < LEAVING
+        if not self._usual.all_free(postures[~there]):
+            return False
+        begins = postures[there]
+        return self._less.all_free(begins) or all(self.free(q) for q in begins)
 
     def tool_rotation(self) -> Array:
         """See `Collisions.tool_rotation`."""
