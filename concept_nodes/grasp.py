@@ -249,7 +249,13 @@ class Grasp(ConceptModel[GraspMemory]):
         goal = poses.shifted(goal, -(scale * support)[:, None] * approach)
         back = poses.shifted(goal, -standoff[:, None] * approach)
         way = [*way_out(seen, back), back, goal]
-        path = plan(way, self.speed, blend=0.03, acceleration=ACCELERATION, samples=SAMPLES)
+        path = plan(
+            way if len(routes) < len(found) else way[:1],
+            self.speed,
+            blend=0.03,
+            acceleration=ACCELERATION,
+            samples=SAMPLES,
+        )
         path = with_routes(path, routes, len(seen.robot.arm_joints))
         usual_ways = {k: view.arm for k, view in enumerate(found) if k not in routes}
         path = in_postures(path, joints_along(path, arm_of(seen.robot), usual_ways))

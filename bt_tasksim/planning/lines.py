@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -14,8 +15,9 @@ STEP = 0.06
 
 def line(a: Array, b: Array, step: float = STEP) -> Array:
     """Joints ``(n, n_arm)`` from ``a`` to ``b``, both ``(n_arm,)`` and both among them."""
-    n = max(2, int(np.ceil(float(np.abs(b - a).max()) / step)) + 1)
-    found: Array = a + _shares(n) * (b - a)
+    way = b - a
+    n = max(2, math.ceil(max(map(abs, way.tolist())) / step) + 1)
+    found: Array = a + _shares(n) * way
     return found
 
 
