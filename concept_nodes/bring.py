@@ -190,7 +190,9 @@ class Bring(Carry):
         most = max(len(way) for way in ways)
         padded = np.array([[*way, *[way[-1]] * (most - len(way))] for way in ways])
         points = [constant(padded[:, k], tool_goal) for k in range(most)]
-        path = plan(points, self.speed, blend=0.04, samples=SAMPLES)
+        path = plan(
+            points if len(routes) < len(found) else points[:1], self.speed, blend=0.04, samples=SAMPLES
+        )
         arm = arm_of(seen.robot)
         usual = joints_along(path, arm, {k: view.arm for k, view in enumerate(found) if k not in routes})
         slow = hurried(usual, arm, Pace(self.speed))

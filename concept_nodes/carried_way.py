@@ -101,9 +101,6 @@ def way_over(
     Raises:
         NoWayError: There is no way.
     """
-    few = len(view.arm) < FULL
-    leaning = None if few else _leaning(view, target, goals)
-
     grip = poses.relative(view.objects[target], view.tool)
 
     def find(room: tuple[WayEnds, float, float, float, float, float]) -> tuple[list[Array], Route | None]:
@@ -117,17 +114,19 @@ def way_over(
         rounded = None if straight is None else way.rounded(straight)
         return [view.tool, ends.first], way.searched() if rounded is None else rounded
 
-    tried = [(goals, *room, LEANS) for room in ROOMS]
-    if goals.aside is not None and len(goals.aside):
-        aside = goals._replace(first=poses.multiply(goals.aside[0], grip), options=goals.aside)
-        tried += [(aside, *room, LEANS) for room in BESIDE]
-    if few:
-        tried += [(goals, *room, SET_DOWN) for room in SLANTED]
-    elif leaning is not None:
-        tried += [(leaning, *room, SET_DOWN) for room in TIPPING]
-    if goals.floor is not None:
-        tried += [(goals, *room, LEANS) for room in FROM_HIGHER]
-    return with_room(tried, find)
+    def tried() -> Iterator[tuple[WayEnds, float, float, float, float, float]]:
+        yield from ((goals, *room, LEANS) for room in ROOMS)
+        if goals.aside is not None and len(goals.aside):
+            aside = goals._replace(first=poses.multiply(goals.aside[0], grip), options=goals.aside)
+            yield from ((aside, *room, LEANS) for room in BESIDE)
+        if len(view.arm) < FULL:
+            yield from ((goals, *room, SET_DOWN) for room in SLANTED)
+        elif (leaning := _leaning(view, target, goals)) is not None:
+            yield from ((leaning, *room, SET_DOWN) for room in TIPPING)
+        if goals.floor is not None:
+            yield from ((goals, *room, LEANS) for room in FROM_HIGHER)
+
+    return with_room(tried(), find)
 
 
 def _leaning(view: WorldView, target: str, goals: WayEnds) -> WayEnds | None:

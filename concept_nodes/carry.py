@@ -18,7 +18,7 @@ from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.units import METRES, NEWTONS
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.arm import FULL, arm_of
-from bt_tasksim.planning.reference_motion import Path, plan, posture, sample, searched_for
+from bt_tasksim.planning.reference_motion import Path, at_times, plan, searched_for
 from bt_tasksim.planning.route import Pace, followed
 from bt_tasksim.planning.routes import SAMPLES, hurried, in_postures, with_routes
 
@@ -79,8 +79,8 @@ class Carry(ConceptModel[MoveMemory]):
 
     def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
         """Follow the path; the hand keeps its grip."""
-        path = memory.path
-        return Command(tool=sample(path, seen.elapsed), posture=posture(path, seen.elapsed))
+        tool, arm = at_times(memory.path, seen.elapsed)
+        return Command(tool=tool, posture=arm)
 
     def planned(self, memory: MoveMemory) -> Array | float:
         """How long the way takes, where it was searched for."""

@@ -5,7 +5,7 @@ What is planned first keeps more room than what follows it, since arms lag and e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from bt_tasksim.core.errors import NoWayError
@@ -37,16 +37,17 @@ ROOMS = (0.4, 0.8, 1.0)
 taken where there is one."""
 
 
-def with_room(rooms: Sequence[_Room], find: Callable[[_Room], _Found]) -> _Found:
-    """What is found with the first of some rooms that will do.
+def with_room(rooms: Iterable[_Room], find: Callable[[_Room], _Found]) -> _Found:
+    """What is found with the first of some rooms that will do; the others are not asked for.
 
     Raises:
         NoWayError: None will; what it says of the last one.
     """
-    *others, last = rooms
-    for room in others:
+    reason: NoWayError | None = None
+    for room in rooms:
         try:
             return find(room)
-        except NoWayError:
-            continue
-    return find(last)
+        except NoWayError as error:
+            reason = error
+    assert reason is not None, "there is a room to try"
+    raise reason

@@ -45,12 +45,7 @@ from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.arm import arm_of
-from bt_tasksim.planning.reference_motion import (
-    plan,
-    posture,
-    sample,
-    searched_for,
-)
+from bt_tasksim.planning.reference_motion import at_times, plan, searched_for
 from bt_tasksim.planning.route import Pace, Route
 from bt_tasksim.planning.routes import SAMPLES, in_postures, joints_along, with_routes
 from bt_tasksim.robot.description import RobotDescription
@@ -254,7 +249,13 @@ class Grasp(ConceptModel[GraspMemory]):
         goal = poses.shifted(goal, -(scale * support)[:, None] * approach)
         back = poses.shifted(goal, -standoff[:, None] * approach)
         way = [*way_out(seen, back), back, goal]
-        path = plan(way, self.speed, blend=0.03, acceleration=ACCELERATION, samples=SAMPLES)
+        path = plan(
+            way if len(routes) < len(found) else way[:1],
+            self.speed,
+            blend=0.03,
+            acceleration=ACCELERATION,
+            samples=SAMPLES,
+        )
         path = with_routes(path, routes, len(seen.robot.arm_joints))
         usual_ways = {k: view.arm for k, view in enumerate(found) if k not in routes}
         path = in_postures(path, joints_along(path, arm_of(seen.robot), usual_ways))
@@ -296,6 +297,7 @@ class Grasp(ConceptModel[GraspMemory]):
         goals, backs, comes, eases, *ways = host_numbers(arrays)
         routes: dict[int, Sequence[Route]] = {}
         standoffs, tight, known, closure = np.empty((4, len(goals)))
+        swaying: list[int] = []
         for k, view in enumerate(found):
             failed = 0 if seen.failures is None else int(seen.failures[k])
             asked = _Asked(
@@ -306,8 +308,12 @@ class Grasp(ConceptModel[GraspMemory]):
             tight[k], known[k], closure[k] = choice.tight, not choice.usual, choice.closure
             if choice.routes:
                 routes[k] = choice.routes
-            elif sways(way := [*(way[k] for way in ways), backs[k]], goals[k], self.speed):
-                routes[k] = [at_rest(way, self.speed), at_rest([backs[k], goals[k]], self.speed, GENTLE)]
+            elif sways([*(way[k] for way in ways), backs[k]], goals[k], self.speed):
+                swaying.append(k)
+        if swaying:
+            coming = at_rest([way[swaying] for way in (*ways, backs)], self.speed)
+            on = at_rest([backs[swaying], goals[swaying]], self.speed, GENTLE)
+            routes |= dict(zip(swaying, zip(coming, on, strict=True), strict=True))
         goal, standoff = constant(goals, usual), constant(standoffs, usual)
         room, known, closed = (constant(values, usual) for values in (tight, known, closure))
         return _Chosen(goal, standoff, room, known, closed, routes)
@@ -430,8 +436,8 @@ class Grasp(ConceptModel[GraspMemory]):
         delay = memory.delay + seen.world.control_period * (1.0 - scaling)
         offset = grasp_features.moved_offset(action, met, seen, memory)
         middle = grasp_features.found_middle(offset, met, memory)
-        target = grasp_features.displaced(sample(memory.path, seen.elapsed - delay), offset)
-        arm = posture(memory.path, seen.elapsed - delay)
+        reference, arm = at_times(memory.path, seen.elapsed - delay)
+        target = grasp_features.displaced(reference, offset)
         closed = grasp_features.closed(scaling, self._asked(offset), self.tightening, seen, memory)
         return GraspMotion(delay, offset, middle, target, closed, arm)
 

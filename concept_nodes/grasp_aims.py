@@ -116,9 +116,7 @@ class Served:
             elif self.screens and some:
                 every = every[~reach_of(around.view.robot).beyond(every, self._leans)]
                 self.why = "" if len(every) else " (out of reach)"
-            alone = around.alone(hand)
-            free = np.array([tool for tool in every if alone.free(tool)]).reshape(-1, 7)
-            self._asked, self._tools = asked, free
+            self._asked, self._tools = asked, every[around.alone(hand).which_free(every)]
         return self._tools
 
     def far(self, tools: Array) -> Array:
@@ -132,12 +130,12 @@ class Served:
     @cached_property
     def _possible(self) -> Array:
         """Poses ``(k, 7)`` of the aim in which the object alone touches nothing, whoever holds it."""
-        view, things, supports = self._around.view, self._around.things, self._aim.supports
-        robot, target = view.robot, self._around.target
+        view, things, target = self._around.view, self._around.things, self._around.target
         alone = Held(target, STILL, pieces_of(view.model(target)))
-        leave = Leave(hand={thing.name for thing in things}, held=supports)
-        object_ = HandCollisions(bodies_of(robot), robot.hand_open, things, alone, leave)
-        return np.array([pose for pose in self._poses if object_.free(pose)]).reshape(-1, 7)
+        leave = Leave(held=self._aim.supports)
+        object_ = HandCollisions(bodies_of(view.robot), None, things, alone, leave)
+        found: Array = self._poses[object_.which_free(self._poses)]
+        return found
 
 
 def aims_of(view: WorldView, target: str, later: Sequence[Any]) -> list[Aim]:

@@ -58,10 +58,14 @@ def sways(way: Sequence[Array], goal: Array, speed: float) -> bool:
     return there * aside * LAG > SWAY
 
 
-def at_rest(way: Sequence[Array], speed: float, acceleration: float = ACCELERATION) -> Route:
-    """A motion of the tool through poses ``(7,)``, from rest to rest, in whatever posture."""
-    path = plan([p[None] for p in way], speed, blend=0.03, acceleration=acceleration, samples=SAMPLES)
-    return Route(path.table[0], np.full((SAMPLES, 0), np.nan), float(path.duration[0]))
+def at_rest(way: Sequence[Array], speed: float, acceleration: float = ACCELERATION) -> list[Route]:
+    """Motions of the tool through poses ``(k, 7)``, one each, from rest to rest, in whatever posture."""
+    path = plan(way, speed, blend=0.03, acceleration=acceleration, samples=SAMPLES)
+    any_posture = np.full((SAMPLES, 0), np.nan)
+    return [
+        Route(table, any_posture, float(duration))
+        for table, duration in zip(path.table, path.duration, strict=True)
+    ]
 
 
 def way_out(seen: Seen, goal: Array) -> list[Array]:

@@ -95,13 +95,13 @@ class Opening:
         """Whether the hand alone touches nothing at a tool pose ``(7,)``, and a little beside it, either."""
         if not self.alone.free(goal):
             return False
-        return not any(self._aside) or all(self.alone.free(tool) for tool in _beside(goal, *self._aside))
+        return not any(self._aside) or bool(self.alone.which_free(_beside(goal, *self._aside)).all())
 
     def tight(self, goal: Array) -> bool:
         """Whether it has little room at a tool pose ``(7,)``, beside the object and what else is around."""
         things = self._view.things(closer=TOUCHING, taken=self._target, palm=False)
         hand = HandCollisions(bodies_of(self._view.robot), self.hand, things)
-        return not all(hand.free(tool) for tool in _beside(goal, TIGHT, TIGHT))
+        return not hand.which_free(_beside(goal, TIGHT, TIGHT)).all()
 
 
 class Closed:
@@ -145,7 +145,9 @@ def wide_along(view: WorldView, target: str, axis: Array) -> float:
     return float(every.max() - every.min())
 
 
-def _beside(tool: Array, across: float, along: float) -> list[Array]:
-    """Tool poses ``(7,)`` beside one, so many metres across the closing axis and along it, both ways."""
-    axes = zip(poses.to_matrix(tool[3:])[:, :2].T, (across, along), strict=True)
-    return [poses.shifted(tool, sign * far * axis) for axis, far in axes for sign in (1.0, -1.0)]
+def _beside(tool: Array, across: float, along: float) -> Array:
+    """Tool poses ``(4, 7)`` beside one, so many metres across the closing axis and along it, both ways."""
+    aside = poses.to_matrix(tool[3:])[:, :2].T * np.array([[across], [along]])
+    found = np.repeat(tool[None], 4, axis=0)
+    found[:, :3] += np.concatenate([aside, -aside])
+    return found

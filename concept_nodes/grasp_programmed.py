@@ -15,7 +15,7 @@ from bt_tasksim.concept_nodes.limits import gentler
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.planning.hand_collision import beyond
-from bt_tasksim.planning.reference_motion import sample
+from bt_tasksim.planning.reference_motion import position
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.hand import standing_side, tips_in_tool
 
@@ -74,7 +74,7 @@ def feeling(seen: Seen, memory: GraspMemory, target: str) -> Array:
     touching = xp.astype(seen.contacts, memory.middle.dtype)
     outwards = poses.clip(xp.sum(touching * constant(_sides(seen.robot), touching), axis=-1), -1.0, 1.0)
     now, period = seen.elapsed - memory.delay, seen.world.control_period
-    ahead = sample(memory.path, now + period)[:, :3] - sample(memory.path, now)[:, :3]
+    ahead = position(memory.path, now + period) - position(memory.path, now)
     near = (poses.norm(seen.tool[:, :3] - memory.goal[:, :3]) < DEEP) | _among(seen, memory, target)
     share = gentler(seen.tool)
     most = FEELING * xp.where(near, share, xp.ones_like(share))

@@ -53,7 +53,7 @@ from bt_tasksim.core.transfer import fetched
 from bt_tasksim.core.units import METRES, NEWTONS, RADIANS
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.arm import FULL, LEANS, SET_DOWN
-from bt_tasksim.planning.reference_motion import Path, plan, posture, sample, searched_for
+from bt_tasksim.planning.reference_motion import Path, at_times, plan, position, searched_for
 from bt_tasksim.planning.route import Pace, Route, followed
 from bt_tasksim.planning.routes import SAMPLES, with_routes
 from bt_tasksim.planning.things import Leave
@@ -255,7 +255,7 @@ class Place(ConceptModel[PlaceMemory]):
         routes = {k: [route] for k, (_, route, _) in enumerate(found)}
         tool_goal = poses.constant(np.array([goal for goal, _, _ in found]), now)
         around = xp.asarray([around for _, _, around in found], device=now.device)
-        path = plan([seen.tool, tool_goal], self.speed, samples=SAMPLES)
+        path = plan([seen.tool], self.speed, samples=SAMPLES)  # there is a route in each world
         path = with_routes(path, routes, len(seen.robot.arm_joints))
         nothing = xp.zeros_like(path.duration)
         felt = xp.astype(nothing, xp.int64)
@@ -272,7 +272,7 @@ class Place(ConceptModel[PlaceMemory]):
     def _standing(self, seen: Seen) -> Array:
         """Poses ``(N, 7)`` of the object where it should stand."""
         key = ("standing", self.target, self.on, self.beside, self.anywhere)
-        return seen.once(key, lambda: self._stands(seen))
+        return seen.once(key, lambda: self._stands(seen), by_world=True)
 
     def _stands(self, seen: Seen) -> Array:
         now, model = seen.object(self.target), seen.model(self.target)
@@ -440,7 +440,8 @@ class Place(ConceptModel[PlaceMemory]):
         return self._commanded(memory, progress), self._after(seen, memory, progress)
 
     def _commanded(self, memory: PlaceMemory, progress: Array) -> Command:
-        return Command(tool=sample(memory.path, progress), posture=posture(memory.path, progress))
+        tool, arm = at_times(memory.path, progress)
+        return Command(tool=tool, posture=arm)
 
     def _after(self, seen: Seen, memory: PlaceMemory, progress: Array) -> PlaceMemory:
         xp = array_namespace(seen.tool)
@@ -499,8 +500,12 @@ class Place(ConceptModel[PlaceMemory]):
 
     def _force(self, seen: Seen) -> Array:
         """Force ``(N,)`` in N against the direction of placing."""
-        force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
-        return -poses.dot(force, poses.constant(self.direction, force))
+
+        def against() -> Array:
+            force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+            return -poses.dot(force, poses.constant(self.direction, force))
+
+        return seen.once(("force", *self.direction), against, by_world=True)
 
     def _progress(self, seen: Seen, memory: PlaceMemory) -> Array:
         xp = array_namespace(seen.tool)
@@ -508,7 +513,7 @@ class Place(ConceptModel[PlaceMemory]):
         gently, unsure = GENTLY * share, UNSURE * (1.0 - share)
         pace = xp.minimum(xp.maximum((self._above(seen) - unsure) / SLOWLY, gently), xp.ones_like(gently))
         period = seen.world.control_period
-        here, ahead = (sample(memory.path, memory.progress + later)[:, :3] for later in (0.0, period))
+        here, ahead = (position(memory.path, memory.progress + later) for later in (0.0, period))
         least = SLOWEST * period / poses.clip(poses.norm(ahead - here), SLOWEST * period, math.inf)
         pace = xp.maximum(pace, least)
         pace = xp.where(memory.progress >= memory.path.duration, xp.ones_like(pace), pace)

@@ -32,7 +32,7 @@ from bt_tasksim.core.units import COUNT, METRES, NEWTONS, RADIANS, SHARE
 from bt_tasksim.core.world import Command
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.hand_collision import HandCollisions
-from bt_tasksim.planning.reference_motion import Path, posture, sample
+from bt_tasksim.planning.reference_motion import Path, at_times
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Leave, Thing
 from bt_tasksim.robot.kinematics.hand import SPARE, opened_about, standing_side, wide_at
@@ -165,9 +165,9 @@ class Release(ConceptModel[ReleaseMemory]):
         """Open, then draw back."""
         share = poses.clip(1.0 - seen.elapsed / self.opening, 0.0, 1.0)
         since = poses.clip(memory.opened, 0.0, math.inf)
-        arm = posture(memory.path, since)
+        tool, arm = at_times(memory.path, since)
         hand = memory.end + (memory.start - memory.end) * share
-        return Command(tool=sample(memory.path, since), hand=hand[:, None], posture=arm)
+        return Command(tool=tool, hand=hand[:, None], posture=arm)
 
     def advance(self, action: Array, seen: Seen, memory: ReleaseMemory) -> ReleaseMemory:
         """Notice when the hand is open, or opens no farther."""

@@ -22,7 +22,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS, SHARE
 from bt_tasksim.core.world import Command
-from bt_tasksim.planning.reference_motion import Path, posture, sample
+from bt_tasksim.planning.reference_motion import Path, at_times
 
 WITHDRAWN = Form(
     "hand {opening} open, tool {distance} from its goal, {force} at the wrist",
@@ -100,8 +100,8 @@ class Withdraw(ConceptModel[WithdrawMemory]):
         """Open, then draw back."""
         closed = memory.start * poses.clip(1.0 - 2.0 * seen.elapsed / max(self.opening, 1e-9), 0.0, 1.0)
         since = poses.clip(seen.elapsed - self.opening, 0.0, 3600.0)
-        arm = posture(memory.path, since)
-        return Command(tool=sample(memory.path, since), hand=closed[:, None], posture=arm)
+        tool, arm = at_times(memory.path, since)
+        return Command(tool=tool, hand=closed[:, None], posture=arm)
 
     def limits(self, seen: Seen, memory: WithdrawMemory) -> tuple[Limit, ...]:
         """The force at the wrist; and the tool has had the time to draw back, and has not."""

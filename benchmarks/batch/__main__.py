@@ -12,7 +12,17 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.batch import device, episodes, executor, kinematics, laws, physics, same_bits, same_ticks
+from benchmarks.batch import (
+    begins,
+    device,
+    episodes,
+    executor,
+    kinematics,
+    laws,
+    physics,
+    same_bits,
+    same_ticks,
+)
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.files import write_text
 
@@ -22,6 +32,7 @@ SECTIONS = {
     "laws": laws,
     "physics": physics,
     "episodes": episodes,
+    "begins": begins,
     "device": device,
     "same-ticks": same_ticks,
     "same-bits": same_bits,

@@ -212,7 +212,8 @@ class Activation:
         command, after = self._contract.carried(found)
         context.write(command, judged.rows, self._leaf)
         if after is not judged.memory:
-            self._remember(judged.rows, after, self._contract.giver("carry_out", "advance"))
+            giver = self._contract.giver("carry_out", "advance")
+            self._remember(judged.rows, after, giver, judged.memory)
         return statuses
 
     def going_on(self, rows: Array) -> Judged:
@@ -360,11 +361,11 @@ class Activation:
         failed = broken | lost
         return judged.at(np.flatnonzero(~failed)) if failed.any() else judged
 
-    def _remember(self, rows: Array, memory: Any, function: str) -> None:
-        """Keep what a function gave for some worlds."""
+    def _remember(self, rows: Array, memory: Any, function: str, was: Any = None) -> None:
+        """Keep what a function gave for some worlds; before that they remembered ``was``, if anything."""
         context = self._context
         with self._contract.kept(function):
-            self.memory = merged(self.memory, context.index(rows), memory, context.worlds)
+            self.memory = merged(self.memory, context.index(rows), memory, context.worlds, was)
 
     # ---- saying -----------------------------------------------------------------------------------------
 

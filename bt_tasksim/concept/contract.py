@@ -42,10 +42,13 @@ class Contract:
 
     def __init__(self, leaf: Behaviour, model: Any) -> None:
         self._leaf, self._model = leaf, model
+        self._called: dict[str, str] = {}
 
     def where(self, function: str) -> str:
         """``leaf 'push cup': Push.done (push.py:12)``."""
-        return f"leaf '{self._leaf.name}': {function_of(type(self._model), function)}"
+        if function not in self._called:  # a file is read for it
+            self._called[function] = function_of(type(self._model), function)
+        return f"leaf '{self._leaf.name}': {self._called[function]}"
 
     def answers(self, found: Any, worlds: int, function: str) -> None:
         """Booleans ``(N,)``."""

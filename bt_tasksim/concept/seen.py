@@ -45,6 +45,7 @@ class Seen:
         "_believed",
         "_derived",
         "_made",
+        "_whole",
         "elapsed",
         "failures",
         "later",
@@ -75,6 +76,7 @@ class Seen:
         self._believed = believed
         self._derived: dict[str, Array] | None = None
         self._made: dict[Hashable, Any] | None = None
+        self._whole: tuple[Seen, Index] | None = None
 
     def at(self, rows: Array) -> Seen:
         """The view of some of these worlds.
@@ -84,7 +86,7 @@ class Seen:
         """
         index = Index(rows)
         picked: Observation = Rows(self.observation, index.of)  # type: ignore[assignment]
-        return Seen(
+        found = Seen(
             picked,
             self.world.map(index.of),
             self.robot,
@@ -94,6 +96,8 @@ class Seen:
             lambda: index.of(self.objects),
             None if self.succeeded is None else self.succeeded[rows],
         )
+        found._whole = self, index
+        return found
 
     def believing(self, objects: Array) -> Seen:
         """The same view with the objects taken to be at other poses ``(N, n_objects, 7)``."""
@@ -125,19 +129,30 @@ class Seen:
             self._derived[name] = observable(name).read(self.observation, self.world)
         return self._derived[name]
 
-    def once(self, key: Hashable, make: Callable[[], Made]) -> Made:
+    def once(self, key: Hashable, make: Callable[[], Made], by_world: bool = False) -> Made:
         """What is made of this view, when it is first asked for; nobody writes to it.
 
         Args:
             key: Says what it is, with all that it is made of beside the view.
             make: Makes it.
+            by_world: It is an array ``(N, ...)``, and a view of some of the worlds has their rows of it.
         """
         if self._made is None:
             self._made = {}
         if key not in self._made:
-            self._made[key] = make()
+            there = self._of_whole(key) if by_world else None
+            self._made[key] = make() if there is None else there
         found: Made = self._made[key]
         return found
+
+    def _of_whole(self, key: Hashable) -> Array | None:
+        """The rows of what was made of the view that this one was taken of; None where nothing was."""
+        if self._whole is None:
+            return None
+        whole, index = self._whole
+        made = (whole._made or {}).get(key)
+        made = whole._of_whole(key) if made is None else made
+        return None if made is None else index.of(made)
 
     @property
     def tool(self) -> Array:

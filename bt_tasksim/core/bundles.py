@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any
+
+import numpy as np
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array, array_namespace
@@ -19,8 +22,9 @@ def parts(bundle: Any) -> dict[str, Any] | None:
     """The parts of a bundle, by name; None for an array or anything else that has none."""
     if isinstance(bundle, tuple) and hasattr(bundle, "_asdict"):
         return dict(bundle._asdict())
-    if dataclasses.is_dataclass(bundle) and not isinstance(bundle, type):
-        return {f.name: getattr(bundle, f.name) for f in dataclasses.fields(bundle) if f.init}
+    kind: Any = type(bundle)
+    if not isinstance(bundle, type) and (names := _fields(kind)) is not None:
+        return {name: getattr(bundle, name) for name in names}
     if isinstance(bundle, Mapping):
         return {str(k): v for k, v in bundle.items()}
     if isinstance(bundle, tuple | list):
@@ -28,10 +32,18 @@ def parts(bundle: Any) -> dict[str, Any] | None:
     return None
 
 
+@lru_cache(maxsize=256)
+def _fields(kind: Any) -> tuple[str, ...] | None:
+    """Names of what a dataclass is made with; None for other classes."""
+    return (
+        tuple(f.name for f in dataclasses.fields(kind) if f.init) if dataclasses.is_dataclass(kind) else None
+    )
+
+
 def mapped(function: Callable[..., Any], *bundles: Any) -> Any:
     """A bundle like the first one, whose arrays are made by ``function`` from those of all of them."""
     first = bundles[0]
-    if hasattr(first, "dtype"):
+    if isinstance(first, np.ndarray) or hasattr(first, "dtype"):
         return function(*bundles)
     named = isinstance(first, tuple) and hasattr(first, "_fields")
     if named and all(type(b) is type(first) for b in bundles):
@@ -55,7 +67,7 @@ def taken(bundle: Any, rows: Array | Index) -> Any:
     return mapped(_index(rows).of, bundle)
 
 
-def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
+def merged(whole: Any, rows: Array | Index, new: Any, worlds: int, was: Any = None) -> Any:
     """A bundle of ``worlds`` worlds in which those at ``rows (k,)`` are ``new``; nothing given is changed.
 
     Args:
@@ -63,6 +75,8 @@ def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
         rows: Which worlds.
         new: Of these worlds.
         worlds: How many there are in all.
+        was: What was taken of ``whole`` for these worlds, if anything was: arrays of it that are still there
+            in ``new`` need not be put back.
 
     Raises:
         InputError: The worlds do not fit together, since their parts are of unlike kinds, or their arrays of
@@ -76,7 +90,9 @@ def merged(whole: Any, rows: Array | Index, new: Any, worlds: int) -> Any:
     index = _index(rows)
     if whole is None:
         return mapped(lambda values: _spread(values, index, worlds), new)
-    return mapped(lambda before, values: _replaced(before, index, values), whole, new)
+    if was is None:
+        return mapped(index.replaced, whole, new)
+    return mapped(lambda all_, old, now: all_ if old is now else index.replaced(all_, now), whole, was, new)
 
 
 def _index(rows: Array | Index) -> Index:
@@ -149,10 +165,6 @@ def _spread(values: Array, index: Index, worlds: int) -> Array:
     out = xp.zeros((worlds, *values.shape[1:]), dtype=values.dtype, device=values.device)
     index.put(out, values)
     return out
-
-
-def _replaced(before: Array, index: Index, values: Array) -> Array:
-    return index.replaced(before, values)
 
 
 class Rows:

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+import numpy as np
+
 from bt_tasksim.core.poses import Array, array_namespace
 
 _T = TypeVar("_T", bound="FactArrays")
@@ -126,6 +128,8 @@ FILLING: Mapping[str, Any] = {
 
 def take_rows(values: Array, index: Array) -> Array:
     """Of ``values (N, n, ...)`` the entry ``index (N,)`` of each row: ``(N, ...)``."""
+    if isinstance(values, np.ndarray):
+        return values[np.arange(values.shape[0]), index]
     xp = array_namespace(values)
     if values.ndim == 2:
         return xp.take_along_axis(values, index[:, None], axis=1)[:, 0]

@@ -344,27 +344,25 @@ def from_matrix(m: Array) -> Array:
     wx, wy, wz = m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
     xy, xz, yz = m[..., 0, 1] + m[..., 1, 0], m[..., 0, 2] + m[..., 2, 0], m[..., 1, 2] + m[..., 2, 1]
     # The four candidates are the rows of 4 q q^T; the longest one is well conditioned.
-    rows = xp.stack(
-        [
-            xp.stack([1 + xx + yy + zz, wx, wy, wz], axis=-1),
-            xp.stack([wx, 1 + xx - yy - zz, xy, xz], axis=-1),
-            xp.stack([wy, xy, 1 - xx + yy - zz, yz], axis=-1),
-            xp.stack([wz, xz, yz, 1 - xx - yy + zz], axis=-1),
-        ],
-        axis=-2,
-    )
-    best = xp.argmax(xp.stack([rows[..., i, i] for i in range(4)], axis=-1), axis=-1)
-    chosen = rows[..., 0, :]
+    sizes = [1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz]
+    ww, xx, yy, zz = sizes
+    rows = [[ww, wx, wy, wz], [wx, xx, xy, xz], [wy, xy, yy, yz], [wz, xz, yz, zz]]
+    best = xp.argmax(xp.stack(sizes, axis=-1), axis=-1)
+    chosen = xp.stack(rows[0], axis=-1)
     for i in range(1, 4):
-        chosen = xp.where((best == i)[..., None], rows[..., i, :], chosen)
+        here = best == i
+        if not isinstance(here, np.ndarray) or here.any():
+            chosen = xp.where(here[..., None], xp.stack(rows[i], axis=-1), chosen)
     return normalise(chosen)
 
 
 def to_matrix(q: Array) -> Array:
     """Rotation matrices ``(..., 3, 3)`` of unit quaternions ``(..., 4)``."""
+    turned = rotate(q[..., None, :], constant(_AXES, q))
+    if isinstance(turned, np.ndarray):
+        return np.ascontiguousarray(turned.swapaxes(-1, -2))
     xp = array_namespace(q)
-    axes = constant(_AXES, q)
-    return xp.stack([rotate(q, axes[i, :]) for i in range(3)], axis=-1)
+    return xp.stack([turned[..., i, :] for i in range(3)], axis=-1)
 
 
 def shifted(pose: Array, by: Array) -> Array:

@@ -41,7 +41,9 @@ class Index:
     def of(self, values: Array) -> Array:
         """These rows ``(k, ...)`` of values ``(N, ...)``."""
         if isinstance(values, np.ndarray):
-            return values[self.rows]
+            if values.ndim == 1:
+                return values[self.rows]
+            return values.take(self.rows, axis=0)  # twice as fast as an index where rows are short
         return array_namespace(values).take(values, self.on(values), axis=0)
 
     def along(self, values: Array, axis: int) -> Array:

@@ -115,6 +115,8 @@ class BatchRunner(Closing):
         self._episodes: list[_Episode | None] = [None] * worlds
         self._phase = np.full(worlds, IDLE)
         self._quiet, self._left = np.zeros(worlds, int), np.zeros(worlds, int)
+        self._steps, self._longest = np.zeros(worlds, int), np.zeros(worlds, int)
+        self._watches, self._looked = False, np.zeros(worlds, bool)
         self.control_steps = 0
         """Control periods of all worlds so far, those included in which things come to rest."""
 
@@ -173,28 +175,41 @@ class BatchRunner(Closing):
         yield from self._judged(rested)
         begun: list[int] = []
         yield from self._begin(rested, waiting, stream, begun)
-        going = np.setdiff1d(np.flatnonzero(self._phase != IDLE), np.array(begun, int))
+        on = self._phase != IDLE
+        on[begun] = False
+        going = np.flatnonzero(on)
         unreached: list[Unreached] = []
         if len(going):
             index = Index(going)
             tool, hand = (None if part is None else index.of(part) for part in (written.tool, written.hand))
             unreached = self.worlds.step(tool, hand, going)
             self.control_steps += len(going)
-            for row in going.tolist():
-                episode = self._episodes[row]
-                if episode is not None and self._phase[row] == TICKING:
-                    episode.steps += 1
+            self._steps[going] += self._phase[going] == TICKING
             self._left[going] -= 1
             yield from self._broken(going)
-            going = going[self._phase[going] != IDLE]
+            on &= self._phase != IDLE
         refused = {miss.row: self.context.refusal(miss.row, miss.error) for miss in unreached}
-        seen = np.union1d(going, np.array(begun, int))
-        if len(seen):
-            self.context.advance(self.worlds.observe(seen), seen)
+        on[begun] = True
+        self._observe(on)
         self.context.refused.update(refused)
+
+    def _observe(self, on: Array) -> None:
+        """Look at worlds ``on (N,)``, boolean, in which the next tick comes.
+
+        Worlds that rest were looked at before, and are looked at with the others: nothing has changed there,
+        and all worlds together take less than some of them, which have to be put among the others.
+        """
+        rows = np.flatnonzero(on)
+        if not len(rows):
+            return
+        self._looked |= on
+        observed = self.worlds.observe(self.context.rows if self._looked.all() else rows)
+        self.context.advance(observed, rows)
 
     def _look(self) -> None:
         """Look whether goals that have to be true once are so now."""
+        if not self._watches:
+            return
         watched = {
             row: episode
             for row, episode in enumerate(self._episodes)
@@ -214,12 +229,14 @@ class BatchRunner(Closing):
         status = self.batch.tick(rows, self.context.times[rows])
         if self.batch.unknown and (status == INVALID).any():
             raise no_status(self.tree)  # alone, that world says which leaf it is
-        for k, row in enumerate(rows.tolist()):
+        ended = (status != RUNNING) | (self._steps[rows] >= self._longest[rows])
+        for k in np.flatnonzero(ended).tolist():
+            row = int(rows[k])
             episode = self._episodes[row]
             assert episode is not None
             if status[k] != RUNNING:
                 self._ended(row, episode, STATUSES[int(status[k])])
-            elif episode.steps >= round(self.longest * episode.configuration.control_frequency):
+            else:
                 self.batch.reset(np.array([row]))
                 episode.outcome = TIME_OVER(limit=self.longest)
                 self._settle(row, episode)
@@ -233,7 +250,7 @@ class BatchRunner(Closing):
         self._settle(row, episode)
 
     def _settle(self, row: int, episode: _Episode) -> None:
-        episode.sim_time = float(self.context.times[row])
+        episode.sim_time, episode.steps = float(self.context.times[row]), int(self._steps[row])
         self._phase[row], self._quiet[row] = SETTLING, 0
         self._left[row] = round(SETTLE * episode.configuration.control_frequency)
 
@@ -281,9 +298,9 @@ class BatchRunner(Closing):
         """Begin in all worlds that are idle, and look."""
         begun: list[int] = []
         yield from self._begin(np.flatnonzero(self._phase == IDLE), waiting, stream, begun)
-        if begun:
-            rows = np.array(sorted(begun))
-            self.context.advance(self.worlds.observe(rows), rows)
+        on = np.zeros(self.context.worlds, bool)
+        on[begun] = True
+        self._observe(on)
 
     def _begin(
         self, rows: Array, waiting: Iterator[int], stream: str, begun: list[int]
@@ -300,6 +317,7 @@ class BatchRunner(Closing):
                 continue
             self._episodes_of(drawn, worlds)
             taken = np.array([row for row, _ in drawn])
+            self._looked[taken] = False
             self.worlds.reset(taken, worlds)
             failed = self.worlds.errors(taken)
             for row, seed in drawn:
@@ -335,8 +353,11 @@ class BatchRunner(Closing):
         self.context.begin(models, rows)
         now = time.perf_counter()
         for (row, seed), configuration, model in zip(drawn, worlds, models, strict=True):
-            self._episodes[row] = _Episode(seed, configuration, model, now, Moments(configuration, model))
-            self._phase[row] = TICKING
+            moments = Moments(configuration, model)
+            self._episodes[row] = _Episode(seed, configuration, model, now, moments)
+            self._phase[row], self._steps[row] = TICKING, 0
+            self._longest[row] = round(self.longest * configuration.control_frequency)
+            self._watches = self._watches or moments.open
 
     def _broken(self, rows: Array) -> Iterator[tuple[int, Result | BtTasksimError]]:
         """The worlds that have failed in the last step."""
@@ -344,7 +365,7 @@ class BatchRunner(Closing):
             episode = self._episodes[row]
             assert episode is not None
             self.batch.reset(np.array([row]))
-            self._phase[row], self._episodes[row] = IDLE, None
+            self._phase[row], self._episodes[row], self._looked[row] = IDLE, None, False
             yield episode.seed, error
 
     def _alone(self, error: BtTasksimError, stream: str) -> Iterator[tuple[int, Result | BtTasksimError]]:

@@ -22,6 +22,29 @@ TOUCHING = 0.001
 """Metres that an object may be in a link."""
 
 
+REMEMBERED = 64
+"""Fixtures of which it is remembered how deep they are in a robot."""
+
+
+class LinksThere(NamedTuple):
+    """Parts of a robot's links where they are.
+
+    Attributes:
+        parts: Each part, and where it is as coal has it.
+        low: Lowest corners ``(n, 3)`` of boxes around them, along the axes of the robot's base.
+        high: Highest corners.
+    """
+
+    parts: list[tuple[LinkPart, Any]]
+    low: Array
+    high: Array
+
+    def near(self, form: Any, at: Any) -> list[tuple[LinkPart, Any]]:
+        """The parts that something, as coal has it, may overlap: the box around it meets theirs."""
+        low, high = _around(form, at)
+        return [self.parts[k] for k in np.flatnonzero(((self.low <= high) & (low <= self.high)).all(axis=1))]
+
+
 class Inside(NamedTuple):
     """Something that starts in the robot.
 
@@ -65,9 +88,9 @@ def clear_draw(
     world = scene.sample(seed, stream, stage)
     if real or not isinstance(scene, Scene) or world.joint_position or world.hand_start:
         return world
-    links: list[tuple[LinkPart, Any]] = robot.derived("links that may be started in", _links_there)
+    links: LinksThere = robot.derived("links that may be started in", _links_there)
     for fixture in world.fixtures:
-        found = fixture_in_robot(links, fixture)
+        found = _of_fixture(robot, links, fixture)
         if found.depth > DEEP:
             raise NoDrawError(
                 _sentence(seed, f"the fixture '{fixture.name}'", found, robot, "put it elsewhere")
@@ -81,6 +104,16 @@ def clear_draw(
     return world
 
 
+def _of_fixture(robot: RobotDescription, links: LinksThere, fixture: Fixture) -> Inside:
+    """How deep a fixture is in the robot, which is remembered: most are in every draw."""
+    known: dict[Fixture, Inside] = robot.derived("fixtures that were looked at", lambda robot: {})
+    if fixture not in known:
+        if len(known) >= REMEMBERED:
+            known.clear()
+        known[fixture] = fixture_in_robot(links, fixture)
+    return known[fixture]
+
+
 def _sentence(seed: int, what: str, found: Inside, robot: RobotDescription, remedy: str) -> str:
     return (
         f"with seed {seed} {what} starts {1000 * found.depth:.0f} mm inside '{found.link}' of {robot.name}: "
@@ -88,39 +121,39 @@ def _sentence(seed: int, what: str, found: Inside, robot: RobotDescription, reme
     )
 
 
-def _links_there(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
+def _links_there(robot: RobotDescription) -> LinksThere:
     """Links at rest that can be looked at, with a warning about others."""
     try:
         links = links_at_rest(robot)
     except InputError as error:
         said = f"what starts inside {robot.name} is not noticed: {error}"
         warnings.warn(said, BtTasksimWarning, stacklevel=2)
-        return []
+        return LinksThere([], np.zeros((0, 3)), np.zeros((0, 3)))
     for left_out in link_parts(robot).left_out:
         said = f"what starts inside {robot.name} is not noticed everywhere: {left_out}"
         warnings.warn(said, BtTasksimWarning, stacklevel=2)
     return links
 
 
-def links_at_rest(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
-    """The parts of a robot's links, and where they are at rest with an open hand, as coal has it.
+def links_at_rest(robot: RobotDescription) -> LinksThere:
+    """The parts of a robot's links, and where they are at rest with an open hand.
 
     Parts that are no bodies are not among them, see `bt_tasksim.robot.link_parts.LinkParts`.
 
     Raises:
         InputError: The URDF, or a file of its shapes, is missing or cannot be read.
     """
-    found: list[tuple[LinkPart, Any]] = robot.derived("links at rest", _links)
+    found: LinksThere = robot.derived("links at rest", _links)
     return found
 
 
-def fixture_in_robot(links: Sequence[tuple[LinkPart, Any]], fixture: Fixture) -> Inside:
+def fixture_in_robot(links: LinksThere, fixture: Fixture) -> Inside:
     """How deep a fixture is in the robot."""
     boxes = [BoxPiece(np.array(box.pose), np.array(box.size) / 2) for box in fixture.boxes]
     return _deepest(links, _solids(fixture.name, fixture.pose_array(), boxes))
 
 
-def object_in_robot(links: Sequence[tuple[LinkPart, Any]], world: ActorConfiguration, name: str) -> Inside:
+def object_in_robot(links: LinksThere, world: ActorConfiguration, name: str) -> Inside:
     """How deep an object of a draw is in the robot.
 
     Warns:
@@ -144,7 +177,7 @@ def _solids(name: str, pose: Array, pieces: Sequence[Piece]) -> list[tuple[Any, 
     return solids
 
 
-def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
+def _links(robot: RobotDescription) -> LinksThere:
     from bt_tasksim.core.narrow_phase import coal
     from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 
@@ -153,16 +186,26 @@ def _links(robot: RobotDescription) -> list[tuple[LinkPart, Any]]:
     at = PinocchioKinematics(robot).link_poses(joints, sorted({part.link for part in parts}))
     frames = [poses.multiply(at[part.link], part.pose) for part in parts]
     where = [coal.Transform3s(poses.to_matrix(f[3:]), f[:3]) for f in frames]
-    return list(zip(parts, where, strict=True))
+    rooms = [_around(part.form, here) for part, here in zip(parts, where, strict=True)]
+    corners = np.array(rooms, float).reshape(-1, 2, 3)
+    return LinksThere(list(zip(parts, where, strict=True)), corners[:, 0], corners[:, 1])
 
 
-def _deepest(links: Sequence[tuple[LinkPart, Any]], solids: Sequence[tuple[Any, Any]]) -> Inside:
+def _around(form: Any, at: Any) -> tuple[Array, Array]:
+    """The lowest and the highest corner ``(3,)`` of a box around something, as coal has it."""
+    from bt_tasksim.core.narrow_phase import coal
+
+    room = coal.CollisionObject(form, at).getAABB()
+    return room.min_.copy(), room.max_.copy()
+
+
+def _deepest(links: LinksThere, solids: Sequence[tuple[Any, Any]]) -> Inside:
     """The link that solids overlap most."""
     from bt_tasksim.core.narrow_phase import coal
 
     request, found = coal.DistanceRequest(), Inside("", 0.0)
     for form, at in solids:
-        for part, here in links:
+        for part, here in links.near(form, at):
             depth = -float(coal.distance(part.form, here, form, at, request, coal.DistanceResult()))
             if depth > found.depth:
                 found = Inside(part.link, depth)

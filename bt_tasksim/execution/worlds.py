@@ -268,6 +268,8 @@ class BatchWorlds(Worlds):
 
     def errors(self, rows: Array) -> dict[int, BtTasksimError]:
         """See `Worlds.errors`."""
+        if not self._unplaced and not any(self.physics.errors):
+            return {}
         numbers = rows.tolist()
         found = {row: error for row in numbers if (error := self.physics.errors[row]) is not None}
         if self._unplaced:
@@ -336,6 +338,8 @@ def _hands(last: Array, hand: Array) -> Array:
 
 def _sent(state: WorldState, like: Array) -> WorldState:
     """A state in the library and on the device of an array."""
+    if isinstance(like, np.ndarray):
+        return state
     known = {name: value for name in STATE if (value := getattr(state, name)) is not None}
     there = sent(list(known.values()), like)
     return replace(state, **dict(zip(known, there, strict=True)))

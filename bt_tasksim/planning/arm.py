@@ -11,14 +11,18 @@ T. Yoshikawa, "Task-priority based redundancy control of robot manipulators", In
 
 from __future__ import annotations
 
+import math
 import threading
+from operator import gt, lt
 
 import numpy as np
 import pinocchio as pin
+from scipy.linalg.lapack import dgesv
 
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.robot.kinematics.chain import Chain, poses_of
 from bt_tasksim.robot.kinematics.models import arm_model, pose_of, se3
 
 _JUMP = 1.5
@@ -59,6 +63,8 @@ corrects where it goes, is to have joints left for that."""
 
 _KEPT = 20_000
 """Answers that are kept, a few MB."""
+_MANY = 8
+"""Postures from which on their tool poses are computed together."""
 
 
 class _Scratch(threading.local):
@@ -94,13 +100,15 @@ class Arm:
         self._model = arm_model(robot, bodies_of(robot).model)
         self._scratch = _Scratch()  # the arm of a robot is made once for all threads
         self._frame = self._model.getFrameId("tool")
+        self._chain = Chain.of(self._model, "tool", robot.rest)
         self._rows = np.flatnonzero(robot.task_mask > 0.0)
         self._all = len(self._rows) == len(robot.task_mask)
         weights = robot.task_mask * ([1.0] * 3 + [_LENGTH] * 3)
-        self._weights = weights[self._rows]
+        self._weights, self._down = weights[self._rows], weights[self._rows][:, None]
         self._posture = _PULL * robot.posture
         within = np.minimum(_WITHIN, (robot.arm_upper - robot.arm_lower) / 4)
         self._lower, self._upper = robot.arm_lower + within, robot.arm_upper - within
+        self._ends: tuple[list[float], list[float]] = (self._lower.tolist(), self._upper.tolist())
         rng = np.random.default_rng(3)
         spread = rng.uniform(robot.arm_lower, robot.arm_upper, (_SEEDS, len(robot.arm_joints)))
         self.seeds: Array = robot.rest + _AWAY * (spread - robot.rest)
@@ -122,7 +130,16 @@ class Arm:
 
     def tools(self, joints: Array) -> Array:
         """Tool poses ``(n, 7)`` of joints ``(n, n_arm)``."""
-        return np.array([self.tool(q) for q in joints])
+        if len(joints) < _MANY:
+            return np.array([self.tool(q) for q in joints])
+        return poses_of(self._chain.seen(np.ascontiguousarray(joints.T))[0])
+
+    def _place(self, joints: Array) -> Array:
+        """Where the tool is ``(3,)`` for joints ``(n_arm,)``."""
+        data = self._data
+        pin.forwardKinematics(self._model, data, joints)
+        found: Array = pin.updateFramePlacement(self._model, data, self._frame).translation
+        return found
 
     def joints(
         self, tool: Array, start: Array, *, follow: bool = False, leans: float = LEANS
@@ -146,13 +163,13 @@ class Arm:
     def _solve(self, tool: Array, start: Array, follow: bool, leans: float) -> Array | None:
         """See `joints`."""
         robot, target = self.robot, se3(tool)
-        q = np.clip(start, self._lower, self._upper)
+        q = np.minimum(np.maximum(start, self._lower), self._upper)
         if len(q) < FULL:
             return self._nearest(q, target, leans)
         pull = None
         if follow:
             pull = self._posture * (robot.rest - q)
-            pull *= _PULL_LIMIT / max(float(np.abs(pull).max()), _PULL_LIMIT)
+            pull *= _PULL_LIMIT / max(_largest(pull), _PULL_LIMIT)
         data, before = self._data, list[float]()
         for k in range(_ITERATIONS + 1):
             pin.computeJointJacobians(self._model, data, q)
@@ -160,7 +177,7 @@ class Arm:
             error = pin.log6(here.actInv(target)).vector
             if not self._all:
                 error = error[self._rows]
-            left = float(np.abs(error).max())
+            left = _largest(error)
             if pull is None and left <= _TOLERANCE:
                 return q
             if k == _ITERATIONS or (k >= _PATIENCE and left > _PROGRESS * before[k - _PATIENCE]):
@@ -211,21 +228,26 @@ class Arm:
         return np.clip(q + step, self._lower, self._upper)
 
     def _moved(self, q: Array, error: Array, jacobian: Array, pull: Array | None) -> Array:
-        e, j = error * self._weights, jacobian * self._weights[:, None]
-        damping, free = 0.5 * float(e @ e) + _DAMPING, None
+        e, j = error * self._weights, jacobian * self._down
+        damping, free = 0.5 * float(e.dot(e)) + _DAMPING, None
+        lower, upper = self._ends
         for _ in range(2):
             jf, z = (j, pull) if free is None else (j * free, None if pull is None else pull * free)
-            square = jf @ jf.T
+            across = jf.T
+            square = jf.dot(across)
             square.ravel()[:: len(e) + 1] += damping
             if z is None:
-                step = jf.T @ np.linalg.solve(square, e)
+                step = across.dot(dgesv(square, e)[2])
             else:
-                step = z + jf.T @ np.linalg.solve(square, e - jf @ z)
-            step *= _LONGEST / max(float(np.abs(step).max()), _LONGEST)
+                step = z + across.dot(dgesv(square, e - jf.dot(z))[2])
+            largest = _largest(step)
+            if not largest <= _LONGEST:
+                step *= _LONGEST / largest
             after: Array = q + step
-            past = (after < self._lower) | (after > self._upper)
-            if not past.any():
+            joints = after.tolist()
+            if not (any(map(lt, joints, lower)) or any(map(gt, joints, upper))):
                 return after
+            past = (after < self._lower) | (after > self._upper)
             free = np.where(past, 0.0, 1.0 if free is None else free)
         return np.minimum(np.maximum(after, self._lower), self._upper)
 
@@ -253,10 +275,15 @@ class Arm:
 
     def _between(self, a: Array, b: Array, before: Array, after: Array) -> bool:
         """Half way between two postures the tool is about half way between their poses."""
-        if float(np.abs(b - a).max()) > _JUMP:
+        if _largest(b - a) > _JUMP:
             return False
-        middle = self.tool(0.5 * (a + b))
-        return float(np.linalg.norm(middle[:3] - 0.5 * (before[:3] + after[:3]))) <= _ASIDE
+        aside = self._place(0.5 * (a + b)) - 0.5 * (before[:3] + after[:3])
+        return math.sqrt(aside.dot(aside)) <= _ASIDE
+
+
+def _largest(values: Array) -> float:
+    """The largest of some numbers ``(n,)``, whatever their signs."""
+    return float(max(map(abs, values.tolist())))
 
 
 def arm_of(robot: RobotDescription) -> Arm:

@@ -7,7 +7,8 @@ pairs that touch in the rest posture are not asked about.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,10 @@ from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.errors import InputError, NoVolumeError
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.boxes import ArmFrames, box_of, carriers
+from bt_tasksim.planning.pairs import Carrier
 from bt_tasksim.robot.description import RobotDescription
-from bt_tasksim.robot.kinematics.models import full_model
+from bt_tasksim.robot.kinematics.models import arm_model, full_model
 from bt_tasksim.robot.urdf_links import load_links
 
 _POSTURES = 400
@@ -30,6 +33,31 @@ _AT_REST = 0.004
 """Metres from each other within which two bodies in the rest posture count as touching."""
 _MOST_CORNERS = 200
 """Corners of a hull; of a finer one a sample is taken, with what it leaves out added around it."""
+
+
+_KEPT = 1000
+"""Widths of the hand for which boxes are kept, some MB."""
+
+
+class _Scratch(threading.local):
+    """What each thread has of its own; a copy begins anew.
+
+    Attributes:
+        data: What Pinocchio writes into.
+        framed: Joints that were asked about last, and the frames' placements for them.
+        boxes: Boxes about the bodies, by the positions of the hand's joints.
+        hands: The hand's bodies, by the same.
+    """
+
+    data: pin.Data | None = None
+
+    def __init__(self) -> None:
+        self.framed: tuple[bytes, Array] = b"", np.empty(0)
+        self.boxes: dict[bytes, Array] = {}
+        self.hands: dict[bytes, list[tuple[str, Any, Any, Array]]] = {}
+
+    def __reduce__(self) -> tuple[type[_Scratch], tuple[()]]:
+        return _Scratch, ()
 
 
 class RobotBodies:
@@ -47,6 +75,13 @@ class RobotBodies:
         fingers: Booleans ``(n,)``: a joint of the hand moves it.
         moves: Booleans ``(n,)``: the arm moves it.
         apart: Pairs of bodies ``(k, 2)`` that are to be kept apart.
+        own_pairs: The same as plain numbers.
+        movers: Numbers of the bodies that the arm moves.
+        hands: Numbers of those that belong to the hand.
+        before_tool: Numbers of others that what bears the tool does not carry.
+        frames: The frames that the arm moves, see `ArmFrames`.
+        of_frames: Number of the frame of each body ``(n,)``.
+        carriers: With which frame joints move to which things are added: the base, and what bears the tool.
 
     Raises:
         InputError: The description does not fit its URDF.
@@ -66,6 +101,100 @@ class RobotBodies:
         self.tool_joint = self.model.frames[self.model.getFrameId("tool")].parentJoint
         self.tool_placement = self.model.frames[self.model.getFrameId("tool")].placement
         self.apart = self._kept_apart()
+        self.own_pairs = [(i, k) for i, k in self.apart.tolist()]
+        parents = [g.parentJoint for g in self.shapes.geometryObjects]
+        self.movers, self.hands = (np.flatnonzero(which).tolist() for which in (self.moves, self.hand))
+        self.before_tool = [i for i in np.flatnonzero(~self.hand).tolist() if parents[i] != self.tool_joint]
+        self._carriers = carriers(self.model, robot.arm_joints)
+        self.frames = ArmFrames(arm_model(robot, self.model))
+        self._scratch = _Scratch()  # a robot's bodies are made once for all threads
+        self._rests: Array = np.linalg.inv(self.frames(robot.rest[None])[0])
+        self._own_boxes: Array = np.array(
+            [box_of(g.geometry, np.eye(4)) for g in self.shapes.geometryObjects]
+        )
+        self.of_frames = [self._carriers[g.parentJoint] for g in self.shapes.geometryObjects]
+        self.carriers = {joint: self._carrier(joint) for joint in {0, self.tool_joint}}
+
+    @property
+    def data(self) -> pin.Data:
+        """What Pinocchio writes into, of this thread."""
+        found = self._scratch.data
+        if found is None:
+            found = self._scratch.data = self.model.createData()
+        return found
+
+    def framed(self, arm: Array) -> Array:
+        """The frames' placements ``(1, f, 4, 4)`` for joints of the arm ``(n_arm,)``, not to be written."""
+        asked, (last, found) = arm.tobytes(), self._scratch.framed
+        if asked != last:
+            found = self.frames(arm[None])
+            self._scratch.framed = asked, found
+        return found
+
+    def boxes(self, hand: Array) -> Array:
+        """Boxes about the bodies ``(n, 4, 4)`` in their frames, see `box_of`.
+
+        Args:
+            hand: Positions ``(n_hand,)`` of the hand's joints.
+        """
+        found: Array = self._kept(hand, self._scratch.boxes, self._boxes)
+        return found
+
+    def hand_bodies(self, hand: Array) -> Sequence[tuple[str, Any, Any, Array]]:
+        """Links of the hand, their placements in the tool frame, their shapes, and boxes about them there.
+
+        Args:
+            hand: Positions ``(n_hand,)`` of the hand's joints.
+        """
+        found: Sequence[tuple[str, Any, Any, Array]] = self._kept(
+            hand, self._scratch.hands, self._hand_bodies
+        )
+        return found
+
+    def _hand_bodies(self, hand: Array) -> list[tuple[str, Any, Any, Array]]:
+        data, placed = self.data, self.shapes.createData()
+        q = self.configuration(self.robot.rest, hand)
+        pin.updateGeometryPlacements(self.model, data, self.shapes, placed, q)
+        tool = data.oMi[self.tool_joint] * self.tool_placement
+        found = []
+        for i in self.hands:
+            at = tool.actInv(placed.oMg[i])
+            found.append(
+                (
+                    self.links[i],
+                    at,
+                    self.shapes.geometryObjects[i].geometry,
+                    at.homogeneous @ self._own_boxes[i],
+                )
+            )
+        return found
+
+    @staticmethod
+    def _kept(hand: Array, kept: dict[bytes, Any], make: Callable[[Array], Any]) -> Any:
+        """What is made of the hand's joints ``(n_hand,)``, if it is not there already."""
+        asked = hand.tobytes()
+        if asked not in kept:
+            if len(kept) >= _KEPT:
+                kept.clear()
+            kept[asked] = make(hand)
+        return kept[asked]
+
+    def _boxes(self, hand: Array) -> Array:
+        found: Array = self._rests[self.of_frames] @ self._placed(hand) @ self._own_boxes
+        return found
+
+    def _placed(self, hand: Array) -> Array:
+        """Where the bodies are ``(n, 4, 4)`` with the arm at rest."""
+        data, placed = self.data, self.shapes.createData()
+        q = self.configuration(self.robot.rest, hand)
+        pin.updateGeometryPlacements(self.model, data, self.shapes, placed, q)
+        return np.array([at.homogeneous for at in placed.oMg])
+
+    def _carrier(self, joint: int) -> Carrier:
+        """With which of the arm's frames a joint moves that the hand's joints do not move."""
+        data, frame = self.model.createData(), self._carriers[joint]
+        pin.forwardKinematics(self.model, data, self.configuration(self.robot.rest, self.robot.hand_open))
+        return Carrier(frame, self._rests[frame] @ data.oMi[joint].homogeneous)
 
     def configuration(self, arm: Array, hand: Array) -> Array:
         """Pinocchio's ``q`` for joints of the arm ``(n_arm,)`` and of the hand ``(n_hand,)``."""

@@ -8,14 +8,16 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.bodies import RobotBodies, bodies_of
-from bt_tasksim.planning.pairs import Pairs
+from bt_tasksim.planning.pairs import Carrier, Pairs
 from bt_tasksim.planning.things import Held, Leave, Thing, Touch
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.models import free_flyer
@@ -26,7 +28,7 @@ class HandCollisions:
 
     Args:
         bodies: The robot's.
-        hand: Positions ``(n_hand,)`` of the hand's joints.
+        hand: Positions ``(n_hand,)`` of the hand's joints; None: only what is held is looked at.
         things: What stands around.
         held: What is in the hand, if anything.
         leave: What may touch.
@@ -35,32 +37,53 @@ class HandCollisions:
     def __init__(
         self,
         bodies: RobotBodies,
-        hand: Array,
+        hand: Array | None,
         things: Sequence[Thing],
         held: Held | None = None,
         leave: Leave | None = None,
     ) -> None:
-        model = pin.Model()
-        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "tool")
-        self._pairs = Pairs(model, pin.GeometryModel(), (), leave)
-        shapes = hand_shapes(bodies, hand)
-        for name, placement, shape in shapes:
-            self._pairs.add(name, joint, placement, [shape])
-        own = range(len(shapes))
+        model, joint, still = _flying(), 1, np.eye(4)
+        carriers = {0: Carrier(0, still), joint: Carrier(1, still)}
+        self._pairs = Pairs(model, pin.GeometryModel(), (), leave, (), np.empty((0, 4, 4)), carriers)
+        own = range(0)
+        for name, placement, shape, box in () if hand is None else bodies.hand_bodies(hand):
+            own = range(self._pairs.add_body(name, joint, placement, shape, box) + 1)
         inside = self._pairs.add_held(held, joint, pin.SE3.Identity())
         self._pairs.stand(things, own, own, inside)
 
     def free(self, tool: Array) -> bool:
         """Nothing touches at a tool pose ``(7,)``."""
-        return self._pairs.free(free_flyer(tool))
+        return self._pairs.free(free_flyer(tool), lambda: _frames(tool[None]))
+
+    def which_free(self, tools: Array) -> Array:
+        """Whether ``(k,)`` nothing touches at tool poses ``(k, 7)``."""
+        free: Array = ~self._pairs.near(_frames(tools))
+        free[~free] = [self._pairs.clear(free_flyer(tool)) for tool in tools[~free]]
+        return free
 
     def first(self, tool: Array) -> Touch | None:
         """The first of what touches at a tool pose ``(7,)``; None where nothing does."""
-        return self._pairs.first(free_flyer(tool))
+        return None if self.free(tool) else next(iter(self.touches(tool)), None)
 
     def touches(self, tool: Array) -> list[Touch]:
         """What touches at a tool pose ``(7,)``."""
-        return self._pairs.touches(free_flyer(tool))
+        return self._pairs.touches(free_flyer(tool), _frames(tool[None]))
+
+
+@cache
+def _flying() -> pin.Model:
+    """A body that flies wherever it likes; nobody writes to it."""
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "tool")
+    return model
+
+
+def _frames(tools: Array) -> Array:
+    """Placements ``(k, 2, 4, 4)`` of the base and of a tool at poses ``(k, 7)``."""
+    found = np.zeros((len(tools), 2, 4, 4))
+    found[:] = np.eye(4)
+    found[:, 1, :3, :3], found[:, 1, :3, 3] = poses.to_matrix(tools[:, 3:]), tools[:, :3]
+    return found
 
 
 def beyond(robot: RobotDescription) -> float:
@@ -89,12 +112,4 @@ def _corners(shape: Any) -> Array:
 
 def hand_shapes(bodies: RobotBodies, hand: Array) -> list[tuple[str, Any, Any]]:
     """Links of the hand, their placements in the tool frame, and their shapes."""
-    data, placed = bodies.model.createData(), bodies.shapes.createData()
-    q = bodies.configuration(bodies.robot.rest, hand)
-    pin.updateGeometryPlacements(bodies.model, data, bodies.shapes, placed, q)
-    tool = data.oMi[bodies.tool_joint] * bodies.tool_placement
-    shapes = bodies.shapes.geometryObjects
-    return [
-        (bodies.links[i], tool.actInv(placed.oMg[i]), shapes[i].geometry)
-        for i in np.flatnonzero(bodies.hand).tolist()
-    ]
+    return [(name, placement, shape) for name, placement, shape, _ in bodies.hand_bodies(hand)]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
+
 import numpy as np
 
 from bt_tasksim.core.poses import Array
@@ -12,16 +15,29 @@ STEP = 0.06
 
 def line(a: Array, b: Array, step: float = STEP) -> Array:
     """Joints ``(n, n_arm)`` from ``a`` to ``b``, both ``(n_arm,)`` and both among them."""
-    n = max(2, int(np.ceil(float(np.abs(b - a).max()) / step)) + 1)
-    found: Array = a + np.linspace(0.0, 1.0, n)[:, None] * (b - a)
+    way = b - a
+    n = max(2, math.ceil(max(map(abs, way.tolist())) / step) + 1)
+    found: Array = a + _shares(n) * way
+    return found
+
+
+@lru_cache(maxsize=1024)
+def _shares(n: int) -> Array:
+    """Even shares ``(n, 1)`` from 0 to 1."""
+    found = np.linspace(0.0, 1.0, n)[:, None]
+    found.setflags(write=False)
     return found
 
 
 def halves(points: Array) -> Array:
     """Points ``(n, ...)``, the middle one first and then ever finer between: what is touched shows early."""
     n = len(points)
-    if n < 3:
-        return points
+    return points if n < 3 else points[_halving(n)]
+
+
+@lru_cache(maxsize=1024)
+def _halving(n: int) -> list[int]:
+    """In which order `halves` has ``n`` points."""
     order, queue = [], [(0, n)]
     while queue:
         low, high = queue.pop(0)
@@ -29,4 +45,4 @@ def halves(points: Array) -> Array:
             middle = (low + high) // 2
             order.append(middle)
             queue += [(low, middle), (middle + 1, high)]
-    return points[order]
+    return order

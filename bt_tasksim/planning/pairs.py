@@ -7,7 +7,7 @@ heir).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -16,7 +16,8 @@ import pinocchio as pin
 
 from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.poses import Array
-from bt_tasksim.planning.things import Held, Leave, Thing, Touch, shapes_of
+from bt_tasksim.planning.boxes import Boxes, box_of
+from bt_tasksim.planning.things import Held, Leave, Thing, Touch
 from bt_tasksim.robot.kinematics.models import se3
 
 _TOUCHING = 1e-6
@@ -24,39 +25,90 @@ _TOUCHING = 1e-6
 along a diagonal, coal may say that they are 2e-12 m apart when it is not asked for points of contact."""
 
 
+_OFTEN = 24
+"""Questions about one posture each from which on all pairs are compared: to look at boxes is for many."""
+_FEW = 12
+"""Pairs up to which a tree of boxes is not worth it."""
+
+
 class _Work(NamedTuple):
-    """What Pinocchio writes into, and the tree of boxes."""
+    """What Pinocchio writes into, and the tree of boxes, where there is one."""
 
     data: Any
+    shapes: Any
     found: Any
     tree: Any
+
+
+class Carrier(NamedTuple):
+    """With which frame a joint moves, and where ``(4, 4)`` it is in that."""
+
+    frame: int
+    placement: Array
 
 
 class Pairs:
     """Pairs of shapes that are asked about. All are added before the first question.
 
+    Only those are compared whose boxes have come near each other, see `bt_tasksim.planning.boxes`.
+
     Args:
         model: Pinocchio's model of the joints.
-        shapes: Its geometry to begin with, to which it adds.
+        shapes: Its geometry to begin with.
         names: Names of the shapes in it.
         leave: What may touch.
+        frames: Numbers of the frames with which these move.
+        boxes: Boxes about these ``(n, 4, 4)`` in their frames, see `box_of`.
+        carriers: With what joints move to which shapes are added, by their number.
+        data: What Pinocchio writes into, if it is there already.
     """
 
-    def __init__(self, model: pin.Model, shapes: Any, names: Iterable[str], leave: Leave | None) -> None:
+    def __init__(
+        self,
+        model: pin.Model,
+        shapes: Any,
+        names: Iterable[str],
+        leave: Leave | None,
+        frames: Sequence[int],
+        boxes: Array,
+        carriers: Mapping[int, Carrier],
+        data: Any = None,
+    ) -> None:
         self._model, self._shapes, self._names, self._leave = model, shapes, list(names), leave or Leave()
         self._keys = list(self._names)
+        self._first = len(self._names)
+        self._added: list[
+            tuple[int, Any, Any]
+        ] = []  # with which joint a shape moves, where it is, and itself
+        self._frames, self._boxes, self._carriers = list(frames), [boxes], carriers
+        self._data = data
         self._compared: list[tuple[int, int]] = []
-        self._margins: dict[tuple[int, int], float] = {}
+        self._within: list[float] = []
+        self._asked = 0
+        self._work: _Work | None = None
+        self._work_shapes: Any = None
 
     def add(self, name: str, joint: int, placement: Any, shapes: Iterable[Any], key: str = "") -> range:
         """Add shapes that move with a joint; their numbers."""
-        first = self._shapes.ngeoms
+        first, carrier = len(self._names), self._carriers[joint]
+        at = carrier.placement.dot(placement.homogeneous)
         for shape in shapes:
-            called = f"{name} {self._shapes.ngeoms}"
-            self._shapes.addGeometryObject(pin.GeometryObject(called, joint, placement, shape))
+            self._added.append((joint, placement, shape))
             self._names.append(name)
             self._keys.append(key or name)
-        return range(first, self._shapes.ngeoms)
+            self._frames.append(carrier.frame)
+            self._boxes.append(box_of(shape, at)[None])
+        return range(first, len(self._names))
+
+    def add_body(self, name: str, joint: int, placement: Any, shape: Any, box: Array) -> int:
+        """Add a shape with the box ``(4, 4)`` about it in its joint's frame; its number."""
+        carrier = self._carriers[joint]
+        self._added.append((joint, placement, shape))
+        self._names.append(name)
+        self._keys.append(name)
+        self._frames.append(carrier.frame)
+        self._boxes.append(carrier.placement.dot(box)[None])
+        return len(self._names) - 1
 
     def add_held(self, held: Held | None, joint: int, tool: Any) -> range:
         """Add what is in the hand, if anything, where ``tool`` is the tool's placement on its joint."""
@@ -77,14 +129,21 @@ class Pairs:
         """
         leave = self._leave
         for thing in things:
-            shapes = shapes_of(thing)
-            for shape in shapes:
-                shape.setSweptSphereRadius(thing.margin)
-            solids = self.add(thing.name, 0, se3(thing.pose), shapes, thing.key)
+            solids = self._add_thing(thing)
             movers = [i for i in robot if not (thing.name in leave.hand and i in hand)]
             if thing.name not in leave.held:
                 movers += held
-            self.compare((i, k) for i in movers for k in solids)
+            self.compare([(i, k) for i in movers for k in solids])
+
+    def _add_thing(self, thing: Thing) -> range:
+        first, (placement, shapes, boxes) = len(self._names), thing.solids
+        self._added += [(0, placement, shape) for shape in shapes]
+        self._boxes.append(boxes)
+        count = len(shapes)
+        self._names += [thing.name] * count
+        self._keys += [thing.known_as] * count
+        self._frames += [0] * count
+        return range(first, first + count)
 
     def compare(self, pairs: Iterable[tuple[int, int]], margin: float = _TOUCHING) -> None:
         """Compare pairs of shapes, by number, unless they may touch.
@@ -97,50 +156,108 @@ class Pairs:
         if left:
             names, keys = self._names, self._keys
             pairs = [(i, k) for i, k in pairs if not {(names[i], names[k]), (names[i], keys[k])} & left]
-        pairs = list(pairs)
+        before = len(self._compared)
         self._compared += pairs
-        if margin > _TOUCHING:
-            self._margins |= dict.fromkeys(pairs, margin)
+        self._within += [max(margin, _TOUCHING)] * (len(self._compared) - before)
+
+    def near(self, frames: Array) -> Array:
+        """Whether ``(m,)`` any pair is near where frames are at placements ``(m, f, 4, 4)``.
+
+        All pairs that are near in one of them are compared from now on.
+        """
+        if not self._compared:
+            return np.zeros(len(frames), bool)
+        found = self._looked_at.near(frames)
+        if not found.any():
+            return np.zeros(len(frames), bool)
+        self._compare_too(found.any(axis=0))
+        near: Array = found.any(axis=1)
+        return near
+
+    def _compare_too(self, pairs: Array) -> None:
+        """Compare pairs ``(k,)``, as booleans, from now on."""
+        if (pairs & ~self._active).any():
+            self._active |= pairs
+            self._work = None
 
     @cached_property
-    def _work(self) -> _Work:
+    def _active(self) -> Array:
+        """Which pairs ``(k,)`` are compared, in the order of `Boxes.pairs`."""
+        return np.zeros(len(self._compared), bool)
+
+    @cached_property
+    def _looked_at(self) -> Boxes:
+        """The boxes of the pairs."""
+        pairs = np.array(self._compared, int).reshape(-1, 2)
+        return Boxes(np.concatenate(self._boxes), np.array(self._frames), pairs, np.array(self._within))
+
+    @property
+    def _working(self) -> _Work:
+        """What Pinocchio needs for the pairs that are compared."""
+        if self._work is None:
+            self._work = self._made()
+        return self._work
+
+    def _made(self) -> _Work:
+        """What it needs, made anew."""
+        shapes = self._shapes if self._work_shapes is None else self._work_shapes
+        if self._work_shapes is None:
+            shapes = self._work_shapes = self._shapes.copy()
+            for k, added in enumerate(self._added):
+                called = f"{self._names[self._first + k]} {self._first + k}"
+                shapes.addGeometryObject(pin.GeometryObject(called, *added))
         # One at a time Pinocchio adds pairs a hundred times as slowly: it looks for each among all others.
-        compared = np.zeros((self._shapes.ngeoms,) * 2, bool)
-        compared[tuple(np.sort(self._compared, axis=1).T) if self._compared else ([], [])] = True
-        self._shapes.setCollisionPairs(compared)
-        found = self._shapes.createData()
+        pairs = np.sort(self._looked_at.pairs[self._active], axis=1)
+        first, second = pairs.T
+        compared = np.zeros((shapes.ngeoms,) * 2, bool)
+        compared[first, second] = True
+        shapes.setCollisionPairs(compared)
+        found = shapes.createData()
         margins = np.full(compared.shape, _TOUCHING)
-        for (i, k), margin in self._margins.items():
-            margins[i, k] = margins[k, i] = margin
-        found.setSecurityMargins(self._shapes, margins)
-        tree = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._model, self._shapes, found)
-        return _Work(self._model.createData(), found, tree)
+        margins[first, second] = margins[second, first] = self._looked_at.margins[self._active]
+        found.setSecurityMargins(shapes, margins)
+        tree = None
+        if len(pairs) > _FEW:
+            tree = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._model, shapes, found)
+        if self._data is None:
+            self._data = self._model.createData()
+        return _Work(self._data, shapes, found, tree)
 
-    def free(self, q: Array) -> bool:
-        """Nothing touches for Pinocchio's ``q``."""
-        work = self._work
-        touched: bool = pin.computeCollisions(self._model, work.data, work.tree, q, True)
-        return not touched
+    def free(self, q: Array, frames: Callable[[], Array]) -> bool:
+        """Nothing touches for Pinocchio's ``q``.
 
-    def touches(self, q: Array) -> list[Touch]:
+        Args:
+            q: The joints.
+            frames: Gives the placements ``(1, f, 4, 4)`` of the frames for them.
+        """
+        if self._asked <= _OFTEN:
+            self._asked += 1
+            if self._asked > _OFTEN:
+                self._compare_too(np.ones(len(self._compared), bool))
+            elif not self.near(frames())[0]:
+                return True
+        return self.clear(q)
+
+    def clear(self, q: Array) -> bool:
+        """Nothing touches for Pinocchio's ``q``, of what has come near."""
+        work = self._working
+        if work.tree is None:
+            return not pin.computeCollisions(self._model, work.data, work.shapes, work.found, q, True)
+        return not pin.computeCollisions(self._model, work.data, work.tree, q, True)
+
+    def touches(self, q: Array, frames: Array) -> list[Touch]:
         """What touches for Pinocchio's ``q``, by names for people, in the order in which it was added."""
-        return list(dict.fromkeys((self._names[i], self._names[k]) for i, k in self._touching(q)))
+        return list(dict.fromkeys((self._names[i], self._names[k]) for i, k in self._touching(q, frames)))
 
-    def keys(self, q: Array) -> list[Touch]:
+    def keys(self, q: Array, frames: Array) -> list[Touch]:
         """The same by keys, which tell things of one name apart."""
-        return list(dict.fromkeys((self._keys[i], self._keys[k]) for i, k in self._touching(q)))
+        return list(dict.fromkeys((self._keys[i], self._keys[k]) for i, k in self._touching(q, frames)))
 
-    def _touching(self, q: Array) -> list[tuple[int, int]]:
-        data, found, _ = self._work
-        pin.computeCollisions(self._model, data, self._shapes, found, q, False)
-        pairs = zip(self._shapes.collisionPairs, found.collisionResults, strict=True)
+    def _touching(self, q: Array, frames: Array) -> list[tuple[int, int]]:
+        if not self.near(frames)[0]:
+            return []
+        work = self._working
+        pin.computeCollisions(self._model, work.data, work.shapes, work.found, q, False)
+        pairs = zip(work.shapes.collisionPairs, work.found.collisionResults, strict=True)
         touching = {(p.first, p.second) for p, result in pairs if result.isCollision()}
         return [pair for pair in self._compared if tuple(sorted(pair)) in touching] if touching else []
-
-    def first(self, q: Array) -> Touch | None:
-        """The first of what touches for Pinocchio's ``q``; None where nothing does."""
-        return None if self.free(q) else next(iter(self.touches(q)), None)
-
-    def placement(self, joint: int) -> Any:
-        """Where a joint is for the ``q`` that was asked about last."""
-        return self._work.data.oMi[joint]

@@ -106,17 +106,29 @@ def plan(
 
 def sample(path: Path, time: Array) -> Array:
     """Poses ``(N, 7)`` of paths at ``time (N,)`` seconds since their begin; they stay at their ends."""
-    table = path.table
     index, share = _between(path, time)
-    return poses.interpolate(take_rows(table, index), take_rows(table, index + 1), share)
+    return poses.interpolate(take_rows(path.table, index), take_rows(path.table, index + 1), share)
 
 
-def posture(path: Path, time: Array) -> Array | None:
-    """Joints ``(N, n_arm)`` of the arm on paths at ``time (N,)``, NaN where they may be any; see `sample`."""
-    if path.joints is None:
-        return None
+def position(path: Path, time: Array) -> Array:
+    """Positions ``(N, 3)`` on paths, those of `sample`."""
     index, share = _between(path, time)
-    first, last = take_rows(path.joints, index), take_rows(path.joints, index + 1)
+    return _shared(path.table[..., :3], index, share)
+
+
+def at_times(path: Path, time: Array) -> tuple[Array, Array | None]:
+    """Poses of `sample`, and joints ``(N, n_arm)`` of the arm there, NaN where they may be any.
+
+    They are None where no world has any.
+    """
+    index, share = _between(path, time)
+    pose = poses.interpolate(take_rows(path.table, index), take_rows(path.table, index + 1), share)
+    return pose, None if path.joints is None else _shared(path.joints, index, share)
+
+
+def _shared(table: Array, index: Array, share: Array) -> Array:
+    """Between the rows ``(N,)`` of tables ``(N, n, k)`` and the next ones, by shares ``(N,)`` of the way."""
+    first, last = take_rows(table, index), take_rows(table, index + 1)
     return first + share[:, None] * (last - first)
 
 
@@ -200,19 +212,34 @@ def _rounded(waypoints: Sequence[Array], blend: float, pieces: int = 6) -> tuple
         reversal = xp.where(back, xp.minimum(reversal, first), reversal)
         share_in = xp.where(rounds, first / xp.where(rounds, into, xp.ones_like(into)), xp.zeros_like(into))
         share_out = xp.where(rounds, last / xp.where(rounds, out, xp.ones_like(out)), xp.zeros_like(out))
-        a = xp.where(rounds[:, None], poses.interpolate(tip, corner, 1.0 - share_in), corner)
-        b = xp.where(rounds[:, None], poses.interpolate(corner, after, share_out), corner)
+        ends = poses.interpolate(
+            xp.stack([tip, corner]), xp.stack([corner, after]), xp.stack([1.0 - share_in, share_out])
+        )
+        ends = xp.where(rounds[:, None], ends, corner)
+        a, b = ends[0, ...], ends[1, ...]
         go(a)
-        for j in range(1, pieces):  # quadratic Bezier curve (de Casteljau)
-            t = xp.full_like(into, j / (pieces - 1))
-            curve = poses.interpolate(poses.interpolate(a, corner, t), poses.interpolate(corner, b, t), t)
-            curve = xp.where(rounds[:, None], curve, corner)
-            way = poses.norm(curve[:, :3] - line[-1][:, :3])
-            # Even steps of a Bezier curve's parameter: even acceleration.
-            go(curve, xp.where(back, 2 * first / (pieces - 1), way))
+        curve = _curve(a, corner, b, pieces)
+        curve = xp.where(rounds[:, None], curve, corner)
+        far = poses.norm(curve[:, :, :3] - xp.concat([a[None, ...], curve[:-1, ...]])[:, :, :3])
+        # Even steps of a Bezier curve's parameter: even acceleration.
+        far = xp.where(back, 2 * first / (pieces - 1), far)
+        for j in range(pieces - 1):
+            go(curve[j, ...], far[j, ...])
         straight = straight & ~rounds
     if len(waypoints) > 1:
         go(waypoints[-1])
     if not ways:
         return waypoints[0][:, None, :], xp.zeros_like(reversal)[:, None], reversal
     return xp.stack(line, axis=1), xp.stack(ways, axis=1), reversal
+
+
+def _curve(a: Array, corner: Array, b: Array, pieces: int) -> Array:
+    """Poses ``(pieces - 1, N, 7)`` on a quadratic Bezier curve after its begin (de Casteljau)."""
+    xp = array_namespace(a)
+    like = {"dtype": a.dtype, "device": a.device}
+    shares = xp.asarray([j / (pieces - 1) for j in range(1, pieces)], **like)
+    t = shares[:, None] + xp.zeros_like(a[:, 0])
+    legs = poses.interpolate(
+        xp.stack([a, corner])[:, None, ...], xp.stack([corner, b])[:, None, ...], t[None, ...]
+    )
+    return poses.interpolate(legs[0, ...], legs[1, ...], t)

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.boxes import box_of
+from bt_tasksim.robot.kinematics.models import se3
 from bt_tasksim.scene.chords import faces
 
 Touch = tuple[str, str]
@@ -23,6 +25,20 @@ SKIN, LEAST = 0.006, 0.4
 wrong by some; and the share of a thin thing's width that may not."""
 _THINNEST = 1e-4
 """Metres of the radius of the largest ball within a piece from which on it has an inside."""
+
+
+class Solids(NamedTuple):
+    """A thing as coal's shapes.
+
+    Attributes:
+        placement: Where it is, in Pinocchio's form.
+        shapes: Its solids with its margin swept about them.
+        boxes: Boxes about these ``(k, 4, 4)``, robot base frame, see `box_of`.
+    """
+
+    placement: Any
+    shapes: Sequence[Any]
+    boxes: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +60,15 @@ class Thing:
     pieces: Sequence[Array] = ()
     margin: float = 0.0
     key: str = ""
+
+    @cached_property
+    def solids(self) -> Solids:
+        """It as coal's shapes; nobody writes to them."""
+        shapes, placement = shapes_of(self), se3(self.pose)
+        for shape in shapes:
+            shape.setSweptSphereRadius(self.margin)
+        at = placement.homogeneous
+        return Solids(placement, shapes, np.array([box_of(shape, at) for shape in shapes]).reshape(-1, 4, 4))
 
     @property
     def known_as(self) -> str:

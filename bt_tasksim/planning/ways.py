@@ -8,6 +8,7 @@ in the space of the arm's joints (`bt_tasksim.planning.search`).
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -316,7 +317,11 @@ class _Leaving:
 
     def all_free(self, postures: Array) -> bool:
         """Nothing touches at any of ``postures (n, n_arm)``."""
-        return all(self.free(q) for q in postures)
+        there = np.abs(postures - self._start).max(axis=-1) < LEAVING
+        if not self._usual.all_free(postures[~there]):
+            return False
+        begins = postures[there]
+        return self._less.all_free(begins) or all(self.free(q) for q in begins)
 
     def tool_rotation(self) -> Array:
         """See `Collisions.tool_rotation`."""
@@ -361,9 +366,15 @@ def _up(held: Held) -> Array:
 
 def _spaced(way: Sequence[Array], spacing: float) -> Array:
     """Poses ``(n, 7)`` along lines, without the first one."""
-    out = []
-    for a, b in itertools.pairwise(way):
-        length, turn = float(np.linalg.norm(b[:3] - a[:3])), float(poses.angle_between(a[3:], b[3:]))
-        n = max(1, int(np.ceil(max(length / spacing, turn / _TURNING))))
-        out.append(poses.interpolate(a[None], b[None], np.linspace(1.0 / n, 1.0, n)))
-    return np.concatenate(out)
+    points = np.array(way)
+    turns = poses.angle_between(points[:-1, 3:], points[1:, 3:]).tolist()
+    lengths = [float(np.linalg.norm(b[:3] - a[:3])) for a, b in itertools.pairwise(points)]
+    counts = [
+        max(1, math.ceil(max(length / spacing, turn / _TURNING)))
+        for length, turn in zip(lengths, turns, strict=True)
+    ]
+    shares = np.concatenate([np.linspace(1.0 / n, 1.0, n) for n in counts])
+    found: Array = poses.interpolate(
+        np.repeat(points[:-1], counts, axis=0), np.repeat(points[1:], counts, axis=0), shares
+    )
+    return found

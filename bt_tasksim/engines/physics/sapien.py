@@ -83,18 +83,22 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
     def _read(self, rows: Array, worlds: list[SapienWorld], layout: Layout) -> tuple[WorldState, Hidden]:
         """See `ThreadedBatch`."""
         read, robot = self._readings, worlds[0].robot
-        q, v = read.position[rows][:, robot.index], read.velocity[rows][:, robot.index]
-        frames = read.frames[rows]
-        time, tool = read.time[rows], poses.multiply(frames[:, 0], robot.tool_pose)
-        objects = read.objects[rows]
-        velocities = np.concatenate([read.linear[rows], read.angular[rows]], axis=-1)
+
+        def of(values: Array) -> Array:
+            return values.take(rows, axis=0)
+
+        q, v = of(read.position)[:, robot.index], of(read.velocity)[:, robot.index]
+        frames = of(read.frames)
+        time, tool = of(read.time), poses.multiply(frames[:, 0], robot.tool_pose)
+        objects = of(read.objects)
+        velocities = np.concatenate([of(read.linear), of(read.angular)], axis=-1)
         state = WorldState(
             time=time,
             joint_position=q,
             joint_velocity=v,
             joint_effort=self._effort(rows, q, v),
-            tip_force=read.tip_force[rows],
-            wrench=external_wrench(read.incoming[rows, robot.wrist], self._lever[rows], self._to_tool[rows]),
+            tip_force=of(read.tip_force),
+            wrench=external_wrench(read.incoming[rows, robot.wrist], of(self._lever), of(self._to_tool)),
             tool_pose=tool,
             tips=poses.transform(frames[:, 1:], self._tip_points),
             objects=objects,
@@ -104,10 +108,10 @@ class SapienBatch(ThreadedBatch[SapienWorld]):
             time=time,
             objects=objects,
             velocities=velocities,
-            hand_force=read.hand_force[rows],
-            hand_distance=read.hand_distance[rows],
-            support=read.support[rows],
-            penetration=read.penetration[rows],
+            hand_force=of(read.hand_force),
+            hand_distance=of(read.hand_distance),
+            support=of(read.support),
+            penetration=of(read.penetration),
             tool_pose=tool,
         )
         return state, hidden

@@ -55,11 +55,11 @@ def _is_box(shape: physx.PhysxCollisionShape) -> bool:
 
 
 class Before(NamedTuple):
-    """An object before a step: its number, where it was, and how it moved ``(3,)``, in m/s and rad/s."""
+    """An object before a step: its number, where it was, and how it moved, in m/s and ``(3,)`` in rad/s."""
 
     which: int
     pose: sapien.Pose
-    linear: Array
+    linear: list[float]
     angular: Array
 
 
@@ -83,38 +83,63 @@ class Phantoms:
         self._world, self._known = world, known
         self._articulation, self._arm = articulation, list(arm)
         self._position, self._velocity = np.zeros(0), list[float]()
+        self._after: dict[int, list[float]] = {}  # speeds after the last step, by object
+        self._moves: list[float] | None = None  # the robot's
+
+    def forget(self) -> None:
+        """Something else than a step has changed how things move."""
+        self._after.clear()
+        self._moves = None
 
     def look(self, near: Sequence[int]) -> list[Before]:
         """How these objects are before a step."""
-        objects, found = self._world.objects, []
+        if not near:
+            self.forget()
+            return []
+        objects, after, found = self._world.objects, self._after, []
         for k in near:
             body = objects[k]
-            found.append(Before(k, body.entity_pose, body.linear_velocity, body.angular_velocity))
-        if found and self._articulation is not None:
+            linear = after[k] if k in after else body.linear_velocity.tolist()
+            found.append(Before(k, body.entity_pose, linear, body.angular_velocity))
+        if self._articulation is not None:
             self._position = self._articulation.get_qpos()
-            self._velocity = self._articulation.get_qvel().tolist()
+            moves = self._moves
+            self._velocity = self._articulation.get_qvel().tolist() if moves is None else moves
         return found
 
     def undo(self, before: Sequence[Before], seconds: float) -> None:
         """Undo what contacts that are none have done in the step since, which was so long."""
-        least = KICK[0] + KICK[1] * seconds
+        if not before:
+            return
+        least, objects, after = KICK[0] + KICK[1] * seconds, self._world.objects, dict[int, list[float]]()
+        kicked = []
         for each in before:
+            after[each.which] = now = objects[each.which].linear_velocity.tolist()
+            if math.dist(now, each.linear) >= least:
+                kicked.append(each)
+        self._after, self._moves = after, None
+        if kicked:
+            self._undo_kicks(kicked)
+        if self._articulation is not None:
+            self._moves = velocity = self._articulation.get_qvel().tolist()
+            was = self._velocity
+            if any([abs(velocity[k] - was[k]) >= JOLT for k in self._arm]):
+                self._undo_robot(self._articulation, before, seconds)
+
+    def _undo_kicks(self, kicked: Sequence[Before]) -> None:
+        """Undo what contacts that are none have done to objects, if they have thrown them."""
+        for each in kicked:
             body = self._world.objects[each.which]
-            if math.dist(body.linear_velocity.tolist(), each.linear.tolist()) < least:
-                continue
             met = list(self._met(body, each.pose))
             if not any(made_up for made_up, _, _ in met):
                 continue
+            self.forget()
             body.entity.set_pose(each.pose)  # only now: PhysX forgets the friction of what is moved so
             body.set_linear_velocity(each.linear)
             body.set_angular_velocity(each.angular)
             for _, true, bodies in sorted(met, key=lambda found: -found[1].depth):
                 if true.depth > -TOUCHES:
                     without_nearing(self._world, bodies, true)
-        if before and self._articulation is not None:
-            velocity, was = self._articulation.get_qvel().tolist(), self._velocity
-            if max([abs(velocity[k] - was[k]) for k in self._arm], default=0.0) >= JOLT:
-                self._undo_robot(self._articulation, before, seconds)
 
     def _undo_robot(
         self, articulation: physx.PhysxArticulation, before: Sequence[Before], seconds: float
@@ -125,6 +150,7 @@ class Phantoms:
         if not threw:
             return
         position, velocity = articulation.get_qpos(), articulation.get_qvel()
+        self.forget()
         was = np.array(self._velocity, np.float32)
         articulation.set_qpos(self._position)  # to look where its links were
         made_up = [contact for contact in threw if self._is_made_up(contact, near)]

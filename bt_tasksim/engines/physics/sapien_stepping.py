@@ -91,7 +91,7 @@ class SapienWorld:
         self._written: Touch | None = None
         self._felt: list[Array] = []  # newtons and newton metres, times seconds
         disturbance, names = configuration.disturbance, [actor.name for actor in configuration.objects]
-        articulation = robot.articulation
+        articulation, self._twist = robot.articulation, robot.twist
         self._joints = (
             articulation.get_qpos,
             articulation.get_qvel,
@@ -133,20 +133,21 @@ class SapienWorld:
             last = k + 1 == self._substeps
             # What rocks to and fro is slow where it turns, and lands before the period ends.
             moving = self._moving(free) if loose else []
-            if self._disturbs():
+            if not self._disturbance.over and self._disturbs():
                 moving.append(self._pushed)
             if moving:
                 self._fine_steps(moving, last)
             else:
-                self._usual_steps(shorter, watched, last)
+                # What lies as it was read has been looked at then.
+                self._usual_steps(shorter, watched, watched and k > 0, last)
         self._time += self._dt * self._substeps
 
-    def _usual_steps(self, shorter: int, watched: bool, last: bool) -> None:
+    def _usual_steps(self, shorter: int, watched: bool, anew: bool, last: bool) -> None:
         """One of the scene's steps, in so many equal ones; in the last one of a period the wrist feels."""
         self._last_dt = self._dt / shorter
         if shorter > 1:
             self.world.scene.set_timestep(self._last_dt)
-        if watched or self._rolling:
+        if anew or self._rolling:
             self._look_down()
         for _ in range(shorter):
             self._step(self._last_dt, watched or last)
@@ -170,8 +171,8 @@ class SapienWorld:
 
     def _step(self, seconds: float, looked_at: bool = True) -> None:
         """One step of PhysX so long, with what it does not know; contacts are looked at after it, or not."""
-        if self.robot.twist.holds:
-            self.robot.twist.resist(seconds)
+        if self._twist.holds:
+            self._twist.resist(seconds)
         before = self._phantoms.look(self._near)
         self._reader.before = self._places(before) if looked_at and before else {}
         self.world.system.step()
@@ -198,6 +199,7 @@ class SapienWorld:
                 if self._disturbance.pushing:
                     self._push()
                 sinking.stop(2.0 * way / finer)
+                self._phantoms.forget()
                 self._step(self._last_dt)
                 if last:
                     self._feel_wrist()
@@ -265,7 +267,7 @@ class SapienWorld:
         self._touch = now
         if self._light > 1 and any(now.hand_force):
             self._closing, self._shorter = max(self._closing, 1), max(self._shorter, self._light)
-        self.robot.twist.look(now.tip_force, now.hand_force)
+        self._twist.look(now.tip_force, now.hand_force)
         self.robot.solving.look(now.hand_force)
 
     def note_motion(self, falling: bool, spin: float) -> None:
@@ -280,8 +282,6 @@ class SapienWorld:
 
     def _disturbs(self) -> bool:
         """An object is pushed now: from some time after it was first held clear."""
-        if self._disturbance.over:
-            return False
         k = self._pushed
         held = self._touch.hand_force[k] > 1.0 and not any(i == k for i, _ in self._touch.support)
         self._disturbance.watch(self._time, held)

@@ -75,15 +75,19 @@ class Twist:
         """
         if len(tip_force) != PADS:
             return
-        sides = [max((math.hypot(*tip_force[tip]) for tip in side), default=0.0) for side in self._opposition]
+        last, self._held = self._held, -1
         which = max(range(len(hand_force)), key=hand_force.__getitem__, default=-1)
-        if which < 0 or min(sides) < PRESSED or hand_force[which] < PRESSED:
-            self._held = -1
+        if which < 0 or hand_force[which] < PRESSED:
             return
-        hand, thing = _turn(self._hand), _turn(self._bodies[which])
-        if which != self._held:
-            self._held, self._turned, self._slipped = which, 0.0, 0.0
-            self._back = _back(_turned_in(self._hand, self._bodies[which]))
+        sides = [max([math.hypot(*tip_force[tip]) for tip in side], default=0.0) for side in self._opposition]
+        if min(sides) < PRESSED:
+            return
+        body = self._bodies[which]
+        hand, thing = _turn(self._hand), _turn(body)
+        self._held = which
+        if which != last:
+            self._turned, self._slipped = 0.0, 0.0
+            self._back = _back(poses.turned(_back(hand), thing))
         self._limit = self._most * sum(sides)
         self._axis = poses.rotated(hand, self._across)
         frame, moments = self._inertia[which]
@@ -97,9 +101,18 @@ class Twist:
         bodies that overlap, too.
         """
         body = self._bodies[self._held]
-        w, x, y, z = poses.turned(_turned_in(self._hand, body), self._back)
+        _, _, _, hw, hx, hy, hz = floats(self._hand.entity_pose)
+        _, _, _, tw, tx, ty, tz = floats(body.entity_pose)
+        # Written out, of quaternions: the thing's in the hand, and that times what it was when it was taken.
+        rw, rx = hw * tw + hx * tx + hy * ty + hz * tz, hw * tx - hx * tw - hy * tz + hz * ty
+        ry, rz = hw * ty + hx * tz - hy * tw - hz * tx, hw * tz - hx * ty + hy * tx - hz * tw
+        bw, bx, by, bz = self._back
+        w = rw * bw - rx * bx - ry * by - rz * bz
         a, b, c = self._across
-        turned = (2.0 if w >= 0.0 else -2.0) * (x * a + y * b + z * c)
+        turned = (rw * bx + rx * bw + ry * bz - rz * by) * a
+        turned += (rw * by - rx * bz + ry * bw + rz * bx) * b
+        turned += (rw * bz + rx * by - ry * bx + rz * bw) * c
+        turned *= 2.0 if w >= 0.0 else -2.0
         stiffness, damping = STIFF * self._moment / (step * step), DAMPED * self._moment / step
         torque = -stiffness * (turned - self._slipped) - damping * (turned - self._turned) / step
         if abs(torque) > self._limit:
@@ -114,18 +127,6 @@ class Twist:
 def _turn(body: physx.PhysxRigidBaseComponent) -> list[float]:
     """Quaternion of a body."""
     return list(floats(body.entity_pose)[3:])
-
-
-def _turned_in(hand: physx.PhysxRigidBaseComponent, thing: physx.PhysxRigidBaseComponent) -> list[float]:
-    """Quaternion of a body in the frame of another one."""
-    _, _, _, aw, ax, ay, az = floats(hand.entity_pose)
-    _, _, _, bw, bx, by, bz = floats(thing.entity_pose)
-    return [
-        aw * bw + ax * bx + ay * by + az * bz,
-        aw * bx - ax * bw - ay * bz + az * by,
-        aw * by + ax * bz - ay * bw - az * bx,
-        aw * bz - ax * by + ay * bx - az * bw,
-    ]
 
 
 def _back(turn: list[float]) -> list[float]:

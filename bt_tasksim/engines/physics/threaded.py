@@ -125,7 +125,7 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
 
     @abstractmethod
     def _read(self, rows: Array, worlds: list[W], layout: Layout) -> tuple[WorldState, Hidden]:
-        """States ``(k, ...)`` of these worlds, from the readings that they took last."""
+        """States ``(k, ...)`` of these worlds, in fresh arrays, from the readings that they took last."""
 
     def _effort(self, rows: Array, q: Array, v: Array) -> Array:
         """Efforts ``(k, n_joints)`` of the drives by their own law, which simulators do not report."""
@@ -169,8 +169,9 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
             self.errors[rows[k]] = self.errors[rows[k]] or MachineError(
                 f"the joint target is not finite: {position[k]}, {velocity[k]}"
             )
-        going = np.array([self.errors[row] is None for row in rows.tolist()], bool)
-        rows, position, velocity = rows[going], position[going], velocity[going]
+        if any(self.errors):
+            going = np.array([self.errors[row] is None for row in rows.tolist()], bool)
+            rows, position, velocity = rows[going], position[going], velocity[going]
         if self._state is not None:
             position = shutting(self.robot, position, self._state.joint_position[rows])
         self._position[rows], self._velocity[rows] = position, velocity
@@ -273,11 +274,11 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
 
     def _gather(self, rows: Array) -> None:
         """Take the readings of those worlds of these rows that have not failed into the arrays of all."""
-        found = [(row, self.simulated[row]) for row in rows.tolist() if self.errors[row] is None]
-        worlds = [world for _, world in found if world is not None]
+        fine = [row for row in rows.tolist() if self.errors[row] is None and self.simulated[row] is not None]
+        worlds = [world for row in fine if (world := self.simulated[row]) is not None]
         if not worlds:
             return
-        rows = np.array([row for row, world in found if world is not None], int)
+        rows = np.array(fine, int)
         layout = Layout(np.array([world.n_objects for world in worlds]), *self._most)
         with np.errstate(invalid="ignore", over="ignore"):  # of worlds that blew up
             state, hidden = self._read(rows, worlds, layout)
@@ -287,20 +288,24 @@ class ThreadedBatch(PhysicsBatch, Generic[W]):
                 when = f"after {state.time[k]:.2f} s: see the last target"
                 self.errors[rows[k]] = MachineError(f"{self.library}'s state is no longer finite {when}")
             rows, worlds = rows[finite], [world for world, fine in zip(worlds, finite, strict=True) if fine]
-            state, hidden = taken(state, finite), taken(hidden, finite)
-        if self._state is None or self._hidden is None:
-            self._state, self._hidden = rows_for(state, self.worlds), rows_for(hidden, self.worlds)
-        put(self._state, rows, state)
-        put(self._hidden, rows, hidden)
+            state, hidden = (taken(bundle, np.flatnonzero(finite)) for bundle in (state, hidden))
+        if len(rows) == self.worlds and (rows[:-1] < rows[1:]).all():
+            self._state, self._hidden = state, hidden
+        else:
+            if self._state is None or self._hidden is None:
+                self._state, self._hidden = rows_for(state, self.worlds), rows_for(hidden, self.worlds)
+            put(self._state, rows, state)
+            put(self._hidden, rows, hidden)
         self._note_motion(worlds, state, hidden)
 
     @staticmethod
     def _note_motion(worlds: list[W], state: WorldState, hidden: Hidden) -> None:
         assert state.velocities is not None
         free = hidden.hand_force == 0.0
-        u, v, w, x, y, z = (np.where(free, state.velocities[..., i], 0.0) for i in range(6))
-        speed, spin = np.sqrt(u * u + v * v + w * w), np.sqrt(x * x + y * y + z * z)
+        moving = np.where(free[..., None], state.velocities, 0.0)
+        u, v, w, x, y, z = np.moveaxis(moving * moving, -1, 0)
+        speed, spin = np.sqrt(u + v + w), np.sqrt(x + y + z)
         falling = ((speed > FALLING[0]) | (spin > FALLING[1])).any(axis=1)
         fastest = spin.max(axis=1, initial=0.0)
-        for k, world in enumerate(worlds):
-            world.note_motion(bool(falling[k]), float(fastest[k]))
+        for world, falls, turns in zip(worlds, falling.tolist(), fastest.tolist(), strict=True):
+            world.note_motion(falls, turns)

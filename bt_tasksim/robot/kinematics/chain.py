@@ -88,7 +88,8 @@ class Chain:
         c, s = xp.cos(angle)[:, None, :], xp.sin(angle)[:, None, :]
         x, y, z = self.before[:, :, 0, ...], self.before[:, :, 1, ...], self.before[:, :, 2, ...]
         offset = self.offset
-        first, second = c * x + s * y, c * y - s * x
+        axes = xp.empty((n, 3, 3, 1, rows), dtype=q.dtype, device=q.device)
+        axes[:, 0, :, 0, :], axes[:, 1, :, 0, :], axes[:, 2, :, 0, :] = c * x + s * y, c * y - s * x, z
         if self.slides:
             way = (q - angle)[:, None, None, :] * z[:, :, None, :]
             offset = xp.concat([xp.zeros_like(way)] * 3 + [way], axis=2) + offset
@@ -96,9 +97,9 @@ class Chain:
         out[n, ...] = self.tool
         here = out[n, ...]
         for i in range(n - 1, -1, -1):
-            moved = first[i, :, None, ...] * here[0, ...]
-            moved += second[i, :, None, ...] * here[1, ...]
-            moved += z[i, :, None, ...] * here[2, ...]
+            terms = axes[i, ...] * here[:, None, ...]
+            moved = terms[0, ...] + terms[1, ...]
+            moved += terms[2, ...]
             moved += offset[i, ...]
             out[i, ...] = here = moved
         return out

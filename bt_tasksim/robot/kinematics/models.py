@@ -26,14 +26,15 @@ def se3(pose: Array) -> pin.SE3:
         InputError: The quaternion is nowhere near a unit one.
     """
     p = np.asarray(pose, float)
-    square = float(p[3:] @ p[3:])
+    q = p[3:]
+    square = float(q.dot(q))
     if not 0.25 < square < 4.0:
         raise InputError(
             f"a tool pose needs a unit quaternion (w x y z) behind its position, found {p.tolist()}"
         )
     if abs(square - 1.0) > 1e-9:
         p = np.concatenate([p[:3], p[3:] / np.sqrt(square)])
-    return pin.XYZQUATToSE3(free_flyer(p))
+    return pin.XYZQUATToSE3(p[_XYZQUAT])
 
 
 def free_flyer(pose: Array) -> Array:

@@ -132,3 +132,11 @@ def test_rows_are_taken_when_they_are_first_looked_at_and_then_kept():
 def test_a_memory_is_of_one_kind_however_many_worlds_come_at_once(rows, before, now, named):
     with pytest.raises(InputError, match=named):
         merged(before, np.array(rows), taken(now, np.array(rows)), 2)
+
+
+def test_arrays_that_are_still_what_was_taken_are_not_put_back():
+    whole, rows = Pair(np.arange(4.0), np.arange(4.0)), np.array([1, 3])
+    was = taken(whole, rows)
+    found = merged(whole, rows, was._replace(second=np.array([7.0, 8.0])), 4, was)
+    assert found.first is whole.first and found.second.tolist() == [0.0, 7.0, 2.0, 8.0]
+    assert whole.second.tolist() == [0.0, 1.0, 2.0, 3.0], "nothing given is changed"

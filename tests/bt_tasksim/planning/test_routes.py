@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bt_tasksim.planning.reference_motion import plan, posture, sample
+from bt_tasksim.planning.reference_motion import at_times, plan, sample
 from bt_tasksim.planning.route import Pace, Route, timed
 from bt_tasksim.planning.routes import SAMPLES, in_postures, joints_along, with_routes
 
@@ -25,8 +25,8 @@ def test_without_routes_all_is_as_before_and_no_posture_is_asked_for(batch):
     found = with_routes(path, {}, N_ARM)
     assert np.array_equal(found.table, path.table) and np.isnan(found.joints).all() and not found.even.any()
     now = np.full(3, 0.4)
-    assert np.array_equal(sample(found, now), sample(path, now)) and np.isnan(posture(found, now)).all()
-    assert posture(path, now) is None
+    assert np.array_equal(sample(found, now), sample(path, now)) and np.isnan(at_times(found, now)[1]).all()
+    assert at_times(path, now)[1] is None
 
 
 def test_a_world_with_a_route_leaves_the_others_alone(batch):
@@ -35,7 +35,7 @@ def test_a_world_with_a_route_leaves_the_others_alone(batch):
     now = np.full(3, 0.4)
     others = np.array([0, 2])
     assert np.array_equal(sample(found, now)[others], sample(path, now)[others])
-    assert np.isnan(posture(found, now)[others]).all() and np.isfinite(posture(found, now)[1]).all()
+    assert np.isnan(at_times(found, now)[1][others]).all() and np.isfinite(at_times(found, now)[1][1]).all()
     assert found.duration[1] == pytest.approx(sum(r.duration for r in routes))
     alone = with_routes(path._replace(table=path.table[1:2], duration=path.duration[1:2]), {0: routes}, N_ARM)
     assert np.array_equal(alone.table[0], found.table[1]) and np.array_equal(alone.joints[0], found.joints[1])
@@ -45,11 +45,11 @@ def test_routes_follow_one_another_each_from_rest_to_rest(batch, panda):
     path, routes = batch
     found = with_routes(path, {0: routes}, N_ARM)
     middle = np.full(3, routes[0].duration)
-    assert np.allclose(posture(found, middle)[0], routes[0].joints[-1], atol=5e-3)
-    assert np.allclose(posture(found, np.zeros(3))[0], routes[0].joints[0])
-    assert np.allclose(posture(found, np.full(3, 99.0))[0], routes[1].joints[-1])
+    assert np.allclose(at_times(found, middle)[1][0], routes[0].joints[-1], atol=5e-3)
+    assert np.allclose(at_times(found, np.zeros(3))[1][0], routes[0].joints[0])
+    assert np.allclose(at_times(found, np.full(3, 99.0))[1][0], routes[1].joints[-1])
     for time in np.linspace(0.0, float(found.duration[0]), 30):
-        joints = posture(found, np.full(3, time))[0]
+        joints = at_times(found, np.full(3, time))[1][0]
         assert np.allclose(panda.arm.tool(joints)[:3], sample(found, np.full(3, time))[0, :3], atol=5e-3)
 
 
@@ -57,8 +57,8 @@ def test_a_route_in_whatever_posture_has_none(batch):
     path, (first, second) = batch
     free = Route(second.tools, np.zeros((len(second.tools), 0)), second.duration)
     found = with_routes(path, {0: [first, free]}, N_ARM)
-    assert np.isfinite(posture(found, np.zeros(3))[0]).all()
-    assert np.isnan(posture(found, found.duration)[0]).all()
+    assert np.isfinite(at_times(found, np.zeros(3))[1][0]).all()
+    assert np.isnan(at_times(found, found.duration)[1][0]).all()
 
 
 @pytest.mark.parametrize("kind", ["float32", "float64"])
