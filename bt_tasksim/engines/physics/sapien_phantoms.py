@@ -123,7 +123,7 @@ class Phantoms:
         if self._articulation is not None:
             self._moves = velocity = self._articulation.get_qvel().tolist()
             was = self._velocity
-            if any([abs(velocity[k] - was[k]) >= JOLT for k in self._arm]):
+            if max([abs(velocity[k] - was[k]) for k in self._arm], default=0.0) >= JOLT:
                 self._undo_robot(self._articulation, before, seconds)
 
     def _undo_kicks(self, kicked: Sequence[Before]) -> None:
