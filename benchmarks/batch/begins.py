@@ -3,7 +3,7 @@
 The same episodes run twice: once as they are, in which what each concept begins with (its grasp, its way) is
 written down, and once in which that is given back instead of being looked for. Everything else is as it was,
 so they have the same control steps. With ``--beside FOLDER`` the batch of another checkout, such as one of an
-older commit, runs the same seeds in turns with both, in a process of its own; and it is said how fast that one
+older commit, runs the same seeds in turns with both, in a process of its own; and it says how fast that one
 would be if it had this PhysX: all else that has been added since would then be free.
 """
 
