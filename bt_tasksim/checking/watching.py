@@ -61,7 +61,7 @@ class WatchedSeen(Seen):
         self._elapsed = elapsed
         self.observation = self.watched  # type: ignore[assignment]  # quacks like one
         self.world, self.robot = world, robot
-        self._derived = self._believed = self._made = None
+        self._derived = self._believed = self._made = self._whole = None
 
     def observable(self, name: str) -> Array:
         """See `Seen.observable`."""
