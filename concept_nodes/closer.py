@@ -48,6 +48,9 @@ def with_room(rooms: Iterable[_Room], find: Callable[[_Room], _Found]) -> _Found
         try:
             return find(room)
         except NoWayError as error:
-            reason = error
+            reason = error.with_traceback(None)  # which would keep all that was made for it
     assert reason is not None, "there is a room to try"
-    raise reason
+    try:
+        raise reason
+    finally:
+        del reason

@@ -18,13 +18,13 @@ class Index:
     """Numbers of rows, which go to a device when something there is first picked by them.
 
     Args:
-        rows: Which ``(k,)``, in NumPy.
+        rows: Which ``(k,)``, in NumPy; or booleans ``(N,)``.
     """
 
     __slots__ = ("_there", "rows")
 
     def __init__(self, rows: np.ndarray) -> None:
-        self.rows = rows
+        self.rows = np.flatnonzero(rows) if rows.dtype == bool else rows
         self._there: Array = None
 
     def __len__(self) -> int:

@@ -107,11 +107,12 @@ def clear_draw(
 def _of_fixture(robot: RobotDescription, links: LinksThere, fixture: Fixture) -> Inside:
     """How deep a fixture is in the robot, which is remembered: most are in every draw."""
     known: dict[Fixture, Inside] = robot.derived("fixtures that were looked at", lambda robot: {})
-    if fixture not in known:
+    found = known.get(fixture)
+    if found is None:
         if len(known) >= REMEMBERED:
             known.clear()
-        known[fixture] = fixture_in_robot(links, fixture)
-    return known[fixture]
+        found = known[fixture] = fixture_in_robot(links, fixture)
+    return found
 
 
 def _sentence(seed: int, what: str, found: Inside, robot: RobotDescription, remedy: str) -> str:

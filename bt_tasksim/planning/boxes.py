@@ -48,26 +48,33 @@ class Boxes:
         margins: Metres ``(k,)`` within which their shapes count as touching.
 
     Attributes:
-        pairs: The pairs, those first of which both move.
+        pairs: The pairs: those of which both move, then those of which one does, then those of which none
+            does, which always count as near.
         margins: Their margins.
     """
 
     def __init__(self, boxes: Array, frames: Array, pairs: Array, margins: Array) -> None:
         moves = frames > 0
         first, second = moves[pairs].T
-        both = first & second
-        order = np.concatenate([both.nonzero()[0], (~both).nonzero()[0]])
-        self.pairs, self.margins, self._both = pairs[order], margins[order], int(both.sum())
+        movers = first.astype(int) + second
+        order = np.argsort(-movers, kind="stable")
+        self.pairs, self.margins = pairs[order], margins[order]
+        self._both, moved = int((movers == 2).sum()), int((movers > 0).sum())
+        self._still, order = len(pairs) - moved, order[:moved]
         self._moving, self._frames = boxes[moves], frames[moves]
         places = np.cumsum(moves) - 1
-        moved, other = np.where(first[order], self.pairs.T, self.pairs.T[::-1])
-        room = (self.margins + _SLACK)[:, None]
-        self._first, self._second = places[moved], places[other[: self._both]]
+        ends = pairs[order].T
+        mover, other = np.where(first[order], ends, ends[::-1])
+        room = (margins[order] + _SLACK)[:, None]
+        self._first, self._second = places[mover], places[other[: self._both]]
         half, self._middle = _upright(boxes[other[self._both :]])
         self._room_both, self._room = room[: self._both], room[self._both :] + half
 
     def near(self, frames: Array) -> Array:
-        """Whether ``(m, k)`` boxes of pairs come near each other where frames are at ``(m, f, 4, 4)``."""
+        """Whether ``(m, k)`` boxes of pairs come near each other where frames are at ``(m, f, 4, 4)``.
+
+        Where a frame is nowhere, all of its pairs do.
+        """
         half, middle = _upright(frames.take(self._frames, axis=1) @ self._moving)
         room, apart = half.take(self._first, axis=1), middle.take(self._first, axis=1)
         both = self._both
@@ -77,9 +84,9 @@ class Boxes:
             apart[:, :both] -= middle.take(self._second, axis=1)
         room[:, both:] += self._room
         apart[:, both:] -= self._middle
-        near = np.abs(apart, out=apart) <= room
-        found: Array = near[..., 0] & near[..., 1] & near[..., 2]
-        return found
+        far = np.abs(apart, out=apart) > room
+        near: Array = ~(far[..., 0] | far[..., 1] | far[..., 2])
+        return near if not self._still else np.pad(near, ((0, 0), (0, self._still)), constant_values=True)
 
 
 def _upright(boxes: Array) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -20,9 +21,6 @@ near its base with its jaw a millimetre from its own arm pressed on that with 18
 INSIDE = 0.02
 """Metres by which a tool stays within the sides and the top of the workspace: a robot is stopped that could
 not stop before them."""
-
-_ROUNDING = 1e-9
-"""Metres from the border of a workspace within which Pinocchio says on which side of it a tool is."""
 
 
 class Collisions:
@@ -48,7 +46,7 @@ class Collisions:
         own: float = OWN,
         workspace: Array | None = None,
     ) -> None:
-        self._workspace = None if workspace is None else workspace.tolist()
+        self._workspace = workspace
         self._bodies, self._q = bodies, bodies.configuration(bodies.robot.rest, hand)
         self._arm = bodies.order[: len(bodies.robot.arm_joints)]
         self._pairs = Pairs(
@@ -59,8 +57,10 @@ class Collisions:
             bodies.of_frames,
             bodies.boxes(hand),
             bodies.carriers,
-            bodies.data,
+            lambda: bodies.data,
         )
+        frame, placement = bodies.carriers[bodies.tool_joint]
+        self._tool_frame, self._tool = frame, placement @ bodies.tool_placement.homogeneous
         inside = self._pairs.add_held(held, bodies.tool_joint, bodies.tool_placement)
         self._pairs.compare(bodies.own_pairs, own)
         self._pairs.compare((i, k) for i in bodies.before_tool for k in inside)
@@ -68,67 +68,46 @@ class Collisions:
 
     def free(self, arm: Array) -> bool:
         """Nothing touches with the arm's joints at ``arm (n_arm,)``, and the tool is in the workspace."""
-        return self._pairs.free(self._at(arm), lambda: self._frames(arm)) and self._inside(arm)
+        framed = partial(self._bodies.framed, arm)
+        return self._pairs.free(self._at(arm), framed) and self._inside(self._tool_pose(arm).translation)
 
     def all_free(self, arms: Array) -> bool:
         """Nothing touches at any of ``arms (n, n_arm)``; the middle ones are asked first."""
         if not len(arms):
             return True
         frames = self._bodies.frames(arms)
-        if not self._all_inside(arms, frames):
+        if not self._inside((frames[:, self._tool_frame] @ self._tool[:, 3])[:, :3]):
             return False
         near = self._pairs.near(frames)
         return all(self._pairs.clear(self._at(q)) for q in halves(arms[near]))
 
     def touches(self, arm: Array) -> list[Touch]:
         """What touches with the arm's joints at ``arm (n_arm,)``."""
-        found = self._pairs.touches(self._at(arm), self._frames(arm))
-        return found if self._inside(arm) else [*found, ("the tool", "the border of its workspace")]
+        found = self._pairs.touches(self._at(arm), self._bodies.framed(arm))
+        inside = self._inside(self._tool_pose(arm).translation)
+        return found if inside else [*found, ("the tool", "the border of its workspace")]
 
     def keys(self, arm: Array) -> list[Touch]:
         """The same by keys of things, see `Thing.key`."""
-        return self._pairs.keys(self._at(arm), self._frames(arm))
+        return self._pairs.keys(self._at(arm), self._bodies.framed(arm))
 
-    def _frames(self, arm: Array) -> Array:
-        """Where the frames are that the arm moves ``(1, f, 4, 4)``."""
-        return self._bodies.framed(arm)
-
-    def _inside(self, arm: Array) -> bool:
-        """The tool is in the workspace with the arm's joints at ``arm (n_arm,)``."""
+    def _inside(self, tools: Array) -> bool:
+        """Positions ``(..., 3)`` of the tool are all in the workspace."""
         if self._workspace is None:
             return True
         low, high = self._workspace
-        at = self._tool_joint(arm).act(self._bodies.tool_placement.translation).tolist()
-        return all(a <= x <= b for a, x, b in zip(low, at, high, strict=True))
+        return bool(((low <= tools) & (tools <= high)).all())
 
-    def _all_inside(self, arms: Array, frames: Array) -> bool:
-        """The tool is in the workspace at each of ``arms (n, n_arm)``.
-
-        Args:
-            arms: The arm's joints.
-            frames: Where the frames are then ``(n, f, 4, 4)``.
-        """
-        if self._workspace is None:
-            return True
-        low, high = self._workspace
-        frame, placement = self._bodies.carriers[self._bodies.tool_joint]
-        at = placement @ np.append(self._bodies.tool_placement.translation, 1.0)
-        tools = (frames[:, frame] @ at)[:, :3]
-        gap = np.minimum(tools - low, high - tools).min(axis=-1)
-        unsure = np.abs(gap) <= _ROUNDING
-        return bool((unsure | (gap > 0.0)).all()) and all(self._inside(q) for q in arms[unsure])
-
-    def tool_rotation(self) -> Array:
-        """The tool's rotation ``(3, 3)`` for the joints that were asked about last."""
-        joint = self._tool_joint(self._q[self._arm])
-        found: Array = joint.rotation @ self._bodies.tool_placement.rotation
+    def tool_rotation(self, arm: Array) -> Array:
+        """The tool's rotation ``(3, 3)`` with the arm's joints at ``arm (n_arm,)``."""
+        found: Array = self._tool_pose(arm).rotation
         return found
 
-    def _tool_joint(self, arm: Array) -> pin.SE3:
-        """Where the joint is that bears the tool."""
-        data = self._bodies.data
-        pin.forwardKinematics(self._bodies.model, data, self._at(arm))
-        return data.oMi[self._bodies.tool_joint]
+    def _tool_pose(self, arm: Array) -> pin.SE3:
+        """Where the tool is; for one posture Pinocchio is quicker than `ArmFrames`."""
+        bodies, data = self._bodies, self._bodies.data
+        pin.forwardKinematics(bodies.model, data, self._at(arm))
+        return data.oMi[bodies.tool_joint] * bodies.tool_placement
 
     def _at(self, arm: Array) -> Array:
         """Pinocchio's ``q``."""

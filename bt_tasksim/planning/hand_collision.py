@@ -45,9 +45,9 @@ class HandCollisions:
         model, joint, still = _flying(), 1, np.eye(4)
         carriers = {0: Carrier(0, still), joint: Carrier(1, still)}
         self._pairs = Pairs(model, pin.GeometryModel(), (), leave, (), np.empty((0, 4, 4)), carriers)
-        own = range(0)
+        own: list[int] = []
         for name, placement, shape, box in () if hand is None else bodies.hand_bodies(hand):
-            own = range(self._pairs.add_body(name, joint, placement, shape, box) + 1)
+            own += self._pairs.add(name, joint, placement, [shape], box[None])
         inside = self._pairs.add_held(held, joint, pin.SE3.Identity())
         self._pairs.stand(things, own, own, inside)
 

@@ -16,7 +16,7 @@ STEP = 0.06
 def line(a: Array, b: Array, step: float = STEP) -> Array:
     """Joints ``(n, n_arm)`` from ``a`` to ``b``, both ``(n_arm,)`` and both among them."""
     way = b - a
-    n = max(2, math.ceil(max(map(abs, way.tolist())) / step) + 1)
+    n = max(2, math.ceil(float(np.abs(way).max()) / step) + 1)
     found: Array = a + _shares(n) * way
     return found
 

@@ -32,9 +32,8 @@ _FEW = 12
 
 
 class _Work(NamedTuple):
-    """What Pinocchio writes into, and the tree of boxes, where there is one."""
+    """The shapes with what is found of them, and the tree of boxes, where there is one."""
 
-    data: Any
     shapes: Any
     found: Any
     tree: Any
@@ -50,7 +49,8 @@ class Carrier(NamedTuple):
 class Pairs:
     """Pairs of shapes that are asked about. All are added before the first question.
 
-    Only those are compared whose boxes have come near each other, see `bt_tasksim.planning.boxes`.
+    Only those are compared whose boxes have come near each other, see `bt_tasksim.planning.boxes`; after many
+    questions about one posture each, all of them are.
 
     Args:
         model: Pinocchio's model of the joints.
@@ -60,7 +60,7 @@ class Pairs:
         frames: Numbers of the frames with which these move.
         boxes: Boxes about these ``(n, 4, 4)`` in their frames, see `box_of`.
         carriers: With what joints move to which shapes are added, by their number.
-        data: What Pinocchio writes into, if it is there already.
+        data: Gives what Pinocchio writes into, for the thread that asks; by default these pairs' own.
     """
 
     def __init__(
@@ -72,49 +72,39 @@ class Pairs:
         frames: Sequence[int],
         boxes: Array,
         carriers: Mapping[int, Carrier],
-        data: Any = None,
+        data: Callable[[], Any] | None = None,
     ) -> None:
         self._model, self._shapes, self._names, self._leave = model, shapes, list(names), leave or Leave()
         self._keys = list(self._names)
         self._first = len(self._names)
-        self._added: list[
-            tuple[int, Any, Any]
-        ] = []  # with which joint a shape moves, where it is, and itself
+        self._added: list[tuple[int, Any, Any]] = []  # a shape's joint, where it is on that, and itself
         self._frames, self._boxes, self._carriers = list(frames), [boxes], carriers
-        self._data = data
+        self._data = _own(model) if data is None else data
         self._compared: list[tuple[int, int]] = []
         self._within: list[float] = []
         self._asked = 0
         self._work: _Work | None = None
         self._work_shapes: Any = None
 
-    def add(self, name: str, joint: int, placement: Any, shapes: Iterable[Any], key: str = "") -> range:
-        """Add shapes that move with a joint; their numbers."""
-        first, carrier = len(self._names), self._carriers[joint]
-        at = carrier.placement.dot(placement.homogeneous)
-        for shape in shapes:
-            self._added.append((joint, placement, shape))
-            self._names.append(name)
-            self._keys.append(key or name)
-            self._frames.append(carrier.frame)
-            self._boxes.append(box_of(shape, at)[None])
-        return range(first, len(self._names))
-
-    def add_body(self, name: str, joint: int, placement: Any, shape: Any, box: Array) -> int:
-        """Add a shape with the box ``(4, 4)`` about it in its joint's frame; its number."""
-        carrier = self._carriers[joint]
-        self._added.append((joint, placement, shape))
-        self._names.append(name)
-        self._keys.append(name)
-        self._frames.append(carrier.frame)
-        self._boxes.append(carrier.placement.dot(box)[None])
-        return len(self._names) - 1
+    def add(
+        self, name: str, joint: int, placement: Any, shapes: Sequence[Any], boxes: Array, key: str = ""
+    ) -> range:
+        """Add shapes that move with a joint, with ``boxes (n, 4, 4)`` about them there; their numbers."""
+        first, carrier, count = len(self._names), self._carriers[joint], len(shapes)
+        self._added += [(joint, placement, shape) for shape in shapes]
+        self._boxes.append(carrier.placement @ boxes)
+        self._names += [name] * count
+        self._keys += [key or name] * count
+        self._frames += [carrier.frame] * count
+        return range(first, first + count)
 
     def add_held(self, held: Held | None, joint: int, tool: Any) -> range:
         """Add what is in the hand, if anything, where ``tool`` is the tool's placement on its joint."""
         if held is None:
             return range(0)
-        return self.add(held.name, joint, tool * se3(held.grip), map(convex, held.pieces))
+        placement, shapes = tool * se3(held.grip), [convex(piece) for piece in held.pieces]
+        boxes = np.array([box_of(shape, placement.homogeneous) for shape in shapes]).reshape(-1, 4, 4)
+        return self.add(held.name, joint, placement, shapes, boxes)
 
     def stand(
         self, things: Iterable[Thing], robot: Sequence[int], hand: Collection[int], held: Sequence[int]
@@ -129,21 +119,11 @@ class Pairs:
         """
         leave = self._leave
         for thing in things:
-            solids = self._add_thing(thing)
+            solids = self.add(thing.name, 0, *thing.solids, thing.known_as)
             movers = [i for i in robot if not (thing.name in leave.hand and i in hand)]
             if thing.name not in leave.held:
                 movers += held
             self.compare([(i, k) for i in movers for k in solids])
-
-    def _add_thing(self, thing: Thing) -> range:
-        first, (placement, shapes, boxes) = len(self._names), thing.solids
-        self._added += [(0, placement, shape) for shape in shapes]
-        self._boxes.append(boxes)
-        count = len(shapes)
-        self._names += [thing.name] * count
-        self._keys += [thing.known_as] * count
-        self._frames += [0] * count
-        return range(first, first + count)
 
     def compare(self, pairs: Iterable[tuple[int, int]], margin: float = _TOUCHING) -> None:
         """Compare pairs of shapes, by number, unless they may touch.
@@ -200,8 +180,8 @@ class Pairs:
 
     def _made(self) -> _Work:
         """What it needs, made anew."""
-        shapes = self._shapes if self._work_shapes is None else self._work_shapes
-        if self._work_shapes is None:
+        shapes = self._work_shapes
+        if shapes is None:
             shapes = self._work_shapes = self._shapes.copy()
             for k, added in enumerate(self._added):
                 called = f"{self._names[self._first + k]} {self._first + k}"
@@ -219,9 +199,7 @@ class Pairs:
         tree = None
         if len(pairs) > _FEW:
             tree = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._model, shapes, found)
-        if self._data is None:
-            self._data = self._model.createData()
-        return _Work(self._data, shapes, found, tree)
+        return _Work(shapes, found, tree)
 
     def free(self, q: Array, frames: Callable[[], Array]) -> bool:
         """Nothing touches for Pinocchio's ``q``.
@@ -242,8 +220,8 @@ class Pairs:
         """Nothing touches for Pinocchio's ``q``, of what has come near."""
         work = self._working
         if work.tree is None:
-            return not pin.computeCollisions(self._model, work.data, work.shapes, work.found, q, True)
-        return not pin.computeCollisions(self._model, work.data, work.tree, q, True)
+            return not pin.computeCollisions(self._model, self._data(), work.shapes, work.found, q, True)
+        return not pin.computeCollisions(self._model, self._data(), work.tree, q, True)
 
     def touches(self, q: Array, frames: Array) -> list[Touch]:
         """What touches for Pinocchio's ``q``, by names for people, in the order in which it was added."""
@@ -257,7 +235,12 @@ class Pairs:
         if not self.near(frames)[0]:
             return []
         work = self._working
-        pin.computeCollisions(self._model, work.data, work.shapes, work.found, q, False)
+        pin.computeCollisions(self._model, self._data(), work.shapes, work.found, q, False)
         pairs = zip(work.shapes.collisionPairs, work.found.collisionResults, strict=True)
         touching = {(p.first, p.second) for p, result in pairs if result.isCollision()}
         return [pair for pair in self._compared if tuple(sorted(pair)) in touching] if touching else []
+
+
+def _own(model: pin.Model) -> Callable[[], Any]:
+    data = model.createData()
+    return lambda: data

@@ -126,6 +126,11 @@ def at_times(path: Path, time: Array) -> tuple[Array, Array | None]:
     return pose, None if path.joints is None else _shared(path.joints, index, share)
 
 
+def posture(path: Path, time: Array) -> Array | None:
+    """The joints of `at_times` alone."""
+    return None if path.joints is None else at_times(path, time)[1]
+
+
 def _shared(table: Array, index: Array, share: Array) -> Array:
     """Between the rows ``(N,)`` of tables ``(N, n, k)`` and the next ones, by shares ``(N,)`` of the way."""
     first, last = take_rows(table, index), take_rows(table, index + 1)

@@ -323,9 +323,9 @@ class _Leaving:
         begins = postures[there]
         return self._less.all_free(begins) or all(self.free(q) for q in begins)
 
-    def tool_rotation(self) -> Array:
+    def tool_rotation(self, q: Array) -> Array:
         """See `Collisions.tool_rotation`."""
-        return self._usual.tool_rotation()
+        return self._usual.tool_rotation(q)
 
 
 class _Allowed:
@@ -335,17 +335,14 @@ class _Allowed:
         self._collisions, self._up = collisions, None if held is None else _up(held)
         self._most = -1.0
         if self._up is not None:
-            leans = []
-            for q in ends:
-                collisions.free(q)
-                leans.append(np.arccos(np.clip(self._height(), -1.0, 1.0)))
+            leans = [np.arccos(np.clip(self._height(q), -1.0, 1.0)) for q in ends]
             self._most = float(np.cos(min(max(leans) + _LEANING, np.pi)))
 
     def __call__(self, q: Array) -> bool:
-        return self._collisions.free(q) and (self._up is None or self._height() >= self._most)
+        return self._collisions.free(q) and (self._up is None or self._height(q) >= self._most)
 
-    def _height(self) -> float:
-        return float((self._collisions.tool_rotation() @ self._up)[2])
+    def _height(self, q: Array) -> float:
+        return float((self._collisions.tool_rotation(q) @ self._up)[2])
 
 
 def _finely(joints: Array) -> Array:

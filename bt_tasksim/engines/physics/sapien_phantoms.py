@@ -111,7 +111,7 @@ class Phantoms:
         """Undo what contacts that are none have done in the step since, which was so long."""
         if not before:
             return
-        least, objects, after = KICK[0] + KICK[1] * seconds, self._world.objects, dict[int, list[float]]()
+        least, objects, after = _least(seconds), self._world.objects, dict[int, list[float]]()
         kicked = []
         for each in before:
             after[each.which] = now = objects[each.which].linear_velocity.tolist()
@@ -119,17 +119,19 @@ class Phantoms:
                 kicked.append(each)
         self._after, self._moves = after, None
         if kicked:
-            self._undo_kicks(kicked)
+            self._undo_kicks(kicked, seconds)
         if self._articulation is not None:
             self._moves = velocity = self._articulation.get_qvel().tolist()
             was = self._velocity
             if max([abs(velocity[k] - was[k]) for k in self._arm], default=0.0) >= JOLT:
                 self._undo_robot(self._articulation, before, seconds)
 
-    def _undo_kicks(self, kicked: Sequence[Before]) -> None:
+    def _undo_kicks(self, kicked: Sequence[Before], seconds: float) -> None:
         """Undo what contacts that are none have done to objects, if they have thrown them."""
         for each in kicked:
             body = self._world.objects[each.which]
+            if math.dist(body.linear_velocity.tolist(), each.linear) < _least(seconds):
+                continue  # since another one that it touches goes on as it went
             met = list(self._met(body, each.pose))
             if not any(made_up for made_up, _, _ in met):
                 continue
@@ -203,3 +205,8 @@ class Phantoms:
             if true is not None:
                 said = -min(point.separation for point in contact.points)
                 yield said - max(true.depth, 0.0) > TOO_DEEP, true, contact.bodies
+
+
+def _least(seconds: float) -> float:
+    """Metres a second by which something is thrown at least in a step so long, see `KICK`."""
+    return KICK[0] + KICK[1] * seconds

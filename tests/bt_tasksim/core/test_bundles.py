@@ -140,3 +140,10 @@ def test_arrays_that_are_still_what_was_taken_are_not_put_back():
     found = merged(whole, rows, was._replace(second=np.array([7.0, 8.0])), 4, was)
     assert found.first is whole.first and found.second.tolist() == [0.0, 7.0, 2.0, 8.0]
     assert whole.second.tolist() == [0.0, 1.0, 2.0, 3.0], "nothing given is changed"
+
+
+def test_worlds_may_be_told_by_booleans():
+    which = np.array([True, False, True, True])
+    found, same = taken(bundle(), which), taken(bundle(), np.flatnonzero(which))
+    np.testing.assert_array_equal(found.path.first, same.path.first)
+    np.testing.assert_array_equal(found.path.second, same.path.second)

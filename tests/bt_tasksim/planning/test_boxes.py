@@ -13,6 +13,7 @@ from bt_tasksim.planning.arm import arm_of
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.boxes import ArmFrames, Boxes, box_of
 from bt_tasksim.planning.collision import Collisions
+from bt_tasksim.planning.pairs import _OFTEN
 from bt_tasksim.planning.things import Thing
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.robot.kinematics.models import se3
@@ -76,13 +77,30 @@ def test_what_is_within_its_margin_is_near(seed, kinds, margin, swept):
         assert not near or apart < 0.5
 
 
+def test_pairs_of_which_none_moves_count_as_near():
+    boxes = np.array([np.eye(4)] * 4) * [[0.01, 0.01, 0.01, 1.0]]
+    boxes[:, 0, 3] = 5.0, 0.0, 3.0, 8.0
+    pairs = np.array([[1, 2], [0, 1], [2, 3], [0, 2], [0, 3]])
+    found = Boxes(boxes, np.array([1, 0, 0, 1]), pairs, np.full(5, 0.01))
+    near = found.near(np.array([[np.eye(4), np.eye(4)]]))[0]
+    told = {tuple(pair): bool(value) for pair, value in zip(found.pairs.tolist(), near, strict=True)}
+    assert told == {(0, 3): False, (0, 1): False, (0, 2): False, (2, 3): False, (1, 2): True}
+
+
+def test_what_is_nowhere_is_near_everything():
+    frames = np.array([[np.eye(4), np.eye(4)]])
+    frames[0, 1, 0, 3] = np.nan
+    boxes = np.array([np.eye(4)] * 2)
+    assert Boxes(boxes, np.array([0, 1]), np.array([[0, 1]]), np.zeros(1)).near(frames).all()
+
+
 def touches_by_all_pairs(collisions, q):
     """What Pinocchio and coal say when all pairs are compared, whatever is said of boxes."""
     pairs = collisions._pairs
     pairs._compare_too(np.ones(len(pairs._compared), bool))
     work = pairs._working
     return pin.computeCollisions(
-        collisions._bodies.model, work.data, work.shapes, work.found, collisions._at(q), False
+        collisions._bodies.model, collisions._bodies.data, work.shapes, work.found, collisions._at(q), False
     )
 
 
@@ -101,6 +119,7 @@ def test_a_way_is_free_where_every_posture_is_by_all_pairs(name):
     among = [Collisions(bodies, robot.hand_open, things) for _ in range(5)]
     touching = np.array([touches_by_all_pairs(among[0], q) for q in postures])
     assert 5 < touching.sum() < len(postures) - 5
+    assert len(postures) > 2 * _OFTEN
     for k, q in enumerate(postures):
         assert among[1].free(q) != touching[k]
         assert among[2].all_free(postures[k : k + 1]) != touching[k]

@@ -172,3 +172,25 @@ def test_a_box_is_watched_only_where_a_fingertip_is_a_mesh():
     assert among_meshes(world) == [0], "a plate, and a box"
     world.bodies[mesh] = ("hand", 1)
     assert among_meshes(world) == [0, 1]
+
+
+def test_speeds_kept_from_the_step_before_are_those_that_things_have():
+    """Step by step, with what throws, what moves things from outside, and times at which nothing is near."""
+    looked = 0
+    for seed in range(8):
+        world, articulation = with_arm(seed)
+        (plate,) = world.objects
+        phantoms, rng = Phantoms(world, {}, articulation, range(3)), np.random.default_rng(seed)
+        for k in range(12):
+            if k % 4 == 3:
+                plate.set_linear_velocity(rng.normal(size=3))
+                articulation.set_qvel(rng.normal(size=3).astype(np.float32))
+                phantoms.forget()
+            before = phantoms.look([0] if k % 5 != 2 else [])
+            for each in before:
+                looked += 1
+                assert each.linear == plate.linear_velocity.tolist()
+                assert phantoms._velocity == articulation.get_qvel().tolist()
+            world.system.step()
+            phantoms.undo(before, 0.01)
+    assert looked > 50
