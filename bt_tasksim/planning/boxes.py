@@ -38,7 +38,7 @@ def box_of(shape: Any, placement: Array) -> Array:
     return found
 
 
-class Boxes:
+class BoxPairs:
     """Pairs of boxes in frames.
 
     Args:

@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.poses import Array
-from bt_tasksim.planning.boxes import Boxes, box_of
+from bt_tasksim.planning.boxes import BoxPairs, box_of
 from bt_tasksim.planning.things import Held, Leave, Thing, Touch
 from bt_tasksim.robot.kinematics.models import se3
 
@@ -162,14 +162,14 @@ class Pairs:
 
     @cached_property
     def _active(self) -> Array:
-        """Which pairs ``(k,)`` are compared, in the order of `Boxes.pairs`."""
+        """Which pairs ``(k,)`` are compared, in the order of `BoxPairs.pairs`."""
         return np.zeros(len(self._compared), bool)
 
     @cached_property
-    def _looked_at(self) -> Boxes:
+    def _looked_at(self) -> BoxPairs:
         """The boxes of the pairs."""
         pairs = np.array(self._compared, int).reshape(-1, 2)
-        return Boxes(np.concatenate(self._boxes), np.array(self._frames), pairs, np.array(self._within))
+        return BoxPairs(np.concatenate(self._boxes), np.array(self._frames), pairs, np.array(self._within))
 
     @property
     def _working(self) -> _Work:

@@ -11,7 +11,7 @@ from bt_tasksim.core.convex_hulls import convex
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.planning.arm import arm_of
 from bt_tasksim.planning.bodies import bodies_of
-from bt_tasksim.planning.boxes import ArmFrames, Boxes, box_of
+from bt_tasksim.planning.boxes import ArmFrames, BoxPairs, box_of
 from bt_tasksim.planning.collision import Collisions
 from bt_tasksim.planning.pairs import _OFTEN
 from bt_tasksim.planning.things import Thing
@@ -72,7 +72,7 @@ def test_what_is_within_its_margin_is_near(seed, kinds, margin, swept):
     standing = np.array([moving[0], box_of(shapes[1], placed[1].homogeneous)])
     pair, within = np.array([[0, 1]]), np.array([margin])
     for boxes, numbers in ((moving, [1, 2]), (standing, [1, 0])):
-        near = bool(Boxes(boxes, np.array(numbers), pair, within).near(frames)[0, 0])
+        near = bool(BoxPairs(boxes, np.array(numbers), pair, within).near(frames)[0, 0])
         assert near or apart > margin
         assert not near or apart < 0.5
 
@@ -81,7 +81,7 @@ def test_pairs_of_which_none_moves_count_as_near():
     boxes = np.array([np.eye(4)] * 4) * [[0.01, 0.01, 0.01, 1.0]]
     boxes[:, 0, 3] = 5.0, 0.0, 3.0, 8.0
     pairs = np.array([[1, 2], [0, 1], [2, 3], [0, 2], [0, 3]])
-    found = Boxes(boxes, np.array([1, 0, 0, 1]), pairs, np.full(5, 0.01))
+    found = BoxPairs(boxes, np.array([1, 0, 0, 1]), pairs, np.full(5, 0.01))
     near = found.near(np.array([[np.eye(4), np.eye(4)]]))[0]
     told = {tuple(pair): bool(value) for pair, value in zip(found.pairs.tolist(), near, strict=True)}
     assert told == {(0, 3): False, (0, 1): False, (0, 2): False, (2, 3): False, (1, 2): True}
@@ -91,7 +91,7 @@ def test_what_is_nowhere_is_near_everything():
     frames = np.array([[np.eye(4), np.eye(4)]])
     frames[0, 1, 0, 3] = np.nan
     boxes = np.array([np.eye(4)] * 2)
-    assert Boxes(boxes, np.array([0, 1]), np.array([[0, 1]]), np.zeros(1)).near(frames).all()
+    assert BoxPairs(boxes, np.array([0, 1]), np.array([[0, 1]]), np.zeros(1)).near(frames).all()
 
 
 def touches_by_all_pairs(collisions, q):
