@@ -19,36 +19,16 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
+from benchmarks.batch.begins_worker import measured
 from benchmarks.batch.episodes import Episodes
 from bt_tasksim.concept.leaf import ConceptNode
-from bt_tasksim.core.errors import InputError, NoWayError
+from bt_tasksim.core.errors import InputError, MachineError, NoWayError
 from bt_tasksim.engines.vulkan import use_software_driver
 
 WORLDS = 64
 ROUNDS = 5
-_OTHER = """
-import sys, time
-from benchmarks.batch.episodes import Episodes
-from sapien import physx
-step, spent = physx.PhysxCpuSystem.step, 0.0
-def timed(system):
-    global spent
-    started = time.perf_counter()
-    step(system)
-    spent += time.perf_counter() - started
-episodes = Episodes(int(sys.argv[1]), 1)
-for line in sys.stdin:
-    seeds = range(*map(int, line.split()))
-    started = time.perf_counter()
-    steps = episodes.whole(seeds)
-    rate, spent = steps / (time.perf_counter() - started), 0.0
-    physx.PhysxCpuSystem.step = timed
-    episodes.whole(seeds)
-    physx.PhysxCpuSystem.step = step
-    print("measured", rate, 1e6 * spent / steps, flush=True)
-"""
+WORKER = Path(__file__).with_name("begins_worker.py")
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -61,6 +41,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     worlds, rounds = options.worlds or (8 if options.quick else WORLDS), 1 if options.quick else ROUNDS
     print(f"\npick_and_place in batches of {worlds}, medians of {rounds} round(s), one thread")
     rows: list[dict[str, float]] = []
+    use_software_driver()
     with ExitStack() as stack:
         other = None if options.beside is None else stack.enter_context(_Other(options.beside, worlds))
         episodes = Episodes(worlds, 1)
@@ -99,20 +80,14 @@ def _round(episodes: Episodes, seeds: range) -> dict[str, float]:
     """The same seeds with what begins written down, as they are, with free begins, and with PhysX timed."""
     tape: list[Any] = []
     steps = _with_begins(episodes, seeds, lambda begin, seen: _written(tape, begin, seen))
-    started = time.perf_counter()
-    again = episodes.whole(seeds)
-    usual = time.perf_counter() - started
+    again, rate, physics = measured(episodes, seeds)
     played = iter(tape)
     started = time.perf_counter()
     free = _with_begins(episodes, seeds, lambda begin, seen: _given(played))
     without = time.perf_counter() - started
     if not steps == again == free:
-        raise InputError(f"not the same episodes: {steps}, {again} and {free} control steps")
-    return {
-        "steps_per_s": steps / usual,
-        "free_begins_per_s": steps / without,
-        "physics_us": 1e6 * _physics(episodes, seeds) / steps,
-    }
+        raise MachineError(f"not the same episodes: {steps}, {again} and {free} control steps")
+    return {"steps_per_s": rate, "free_begins_per_s": steps / without, "physics_us": physics}
 
 
 def _with_begins(episodes: Episodes, seeds: range, instead: Callable[[Any, Any], Any]) -> int:
@@ -142,24 +117,6 @@ def _given(tape: Iterator[Any]) -> Any:
     return found
 
 
-def _physics(episodes: Episodes, seeds: range) -> float:
-    """Seconds of PhysX's own steps."""
-    use_software_driver()
-    from sapien import physx
-
-    step, spent = physx.PhysxCpuSystem.step, 0.0
-
-    def timed(system: Any) -> None:
-        nonlocal spent
-        started = time.perf_counter()
-        step(system)
-        spent += time.perf_counter() - started
-
-    with mock.patch.object(physx.PhysxCpuSystem, "step", timed):
-        episodes.whole(seeds)
-    return spent
-
-
 class _Other:
     """Another checkout's batch, in a process of its own."""
 
@@ -167,7 +124,7 @@ class _Other:
         if not (folder / "benchmarks" / "batch" / "episodes.py").is_file():
             raise InputError(f"'{folder}' is no checkout with benchmarks/batch/episodes.py")
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _OTHER, str(worlds)],
+            [sys.executable, "-P", str(WORKER), str(worlds)],
             cwd=folder,
             env={**os.environ, "PYTHONPATH": str(folder.resolve())},
             stdin=subprocess.PIPE,
@@ -181,9 +138,9 @@ class _Other:
         print(seeds.start, seeds.stop, file=self._process.stdin, flush=True)
         for line in self._process.stdout:
             if line.startswith("measured "):
-                rate, physics = map(float, line.split()[1:])
+                _, rate, physics = map(float, line.split()[1:])
                 return rate, physics
-        raise InputError("the other checkout's batch has ended before it was measured")
+        raise MachineError("the other checkout's batch has ended before it was measured")
 
     def __enter__(self) -> _Other:
         return self

@@ -12,7 +12,6 @@ T. Yoshikawa, "Task-priority based redundancy control of robot manipulators", In
 from __future__ import annotations
 
 import math
-import threading
 from operator import gt, lt
 
 import numpy as np
@@ -21,6 +20,7 @@ from scipy.linalg.lapack import dgesv
 
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.scratch import Scratch
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.chain import Chain, poses_of
 from bt_tasksim.robot.kinematics.models import arm_model, pose_of, se3
@@ -67,22 +67,16 @@ _MANY = 8
 """Postures from which on their tool poses are computed together."""
 
 
-class _Scratch(threading.local):
-    """What each thread has of its own; a copy begins anew.
+class _Scratch(Scratch):
+    """What each thread has of its own.
 
     Attributes:
-        data: What Pinocchio writes into.
         solved: Joints that were found, or None, by what was asked: where nothing serves, the same tool poses
             are asked about with more room and with less.
     """
 
-    data: pin.Data | None = None
-
     def __init__(self) -> None:
         self.solved: dict[tuple[bytes, bytes, bool, float], Array | None] = {}
-
-    def __reduce__(self) -> tuple[type[_Scratch], tuple[()]]:
-        return _Scratch, ()
 
 
 class Arm:
@@ -117,10 +111,7 @@ class Arm:
     @property
     def _data(self) -> pin.Data:
         """What Pinocchio writes into, of this thread."""
-        found = self._scratch.data
-        if found is None:
-            found = self._scratch.data = self._model.createData()
-        return found
+        return self._scratch.data(self._model)
 
     def tool(self, joints: Array) -> Array:
         """The tool pose ``(7,)`` of joints ``(n_arm,)``."""

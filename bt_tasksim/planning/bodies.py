@@ -7,7 +7,6 @@ pairs that touch in the rest posture are not asked about.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -21,6 +20,7 @@ from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.boxes import ArmFrames, box_of, carriers
 from bt_tasksim.planning.pairs import Carrier
+from bt_tasksim.planning.scratch import Scratch
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.models import arm_model, full_model
 from bt_tasksim.robot.urdf_links import load_links
@@ -39,25 +39,19 @@ _KEPT = 1000
 """Widths of the hand for which boxes are kept, some MB."""
 
 
-class _Scratch(threading.local):
-    """What each thread has of its own; a copy begins anew.
+class _Scratch(Scratch):
+    """What each thread has of its own.
 
     Attributes:
-        data: What Pinocchio writes into.
         framed: Joints that were asked about last, and the frames' placements for them.
         boxes: Boxes about the bodies, by the positions of the hand's joints.
         hands: The hand's bodies, by the same.
     """
 
-    data: pin.Data | None = None
-
     def __init__(self) -> None:
         self.framed: tuple[bytes, Array] = b"", np.empty(0)
         self.boxes: dict[bytes, Array] = {}
         self.hands: dict[bytes, list[tuple[str, Any, Any, Array]]] = {}
-
-    def __reduce__(self) -> tuple[type[_Scratch], tuple[()]]:
-        return _Scratch, ()
 
 
 class RobotBodies:
@@ -118,10 +112,7 @@ class RobotBodies:
     @property
     def data(self) -> pin.Data:
         """What Pinocchio writes into, of this thread."""
-        found = self._scratch.data
-        if found is None:
-            found = self._scratch.data = self.model.createData()
-        return found
+        return self._scratch.data(self.model)
 
     def framed(self, arm: Array) -> Array:
         """The frames' placements ``(1, f, 4, 4)`` for joints of the arm ``(n_arm,)``, not to be written."""
@@ -152,21 +143,11 @@ class RobotBodies:
         return found
 
     def _hand_bodies(self, hand: Array) -> list[tuple[str, Any, Any, Array]]:
-        data, placed = self.data, self.shapes.createData()
-        q = self.configuration(self.robot.rest, hand)
-        pin.updateGeometryPlacements(self.model, data, self.shapes, placed, q)
-        tool = data.oMi[self.tool_joint] * self.tool_placement
-        found = []
+        placed, found = self._placed(hand), []
+        tool = self.data.oMi[self.tool_joint] * self.tool_placement
         for i in self.hands:
-            at = tool.actInv(placed.oMg[i])
-            found.append(
-                (
-                    self.links[i],
-                    at,
-                    self.shapes.geometryObjects[i].geometry,
-                    at.homogeneous @ self._own_boxes[i],
-                )
-            )
+            at, shape = tool.actInv(placed[i]), self.shapes.geometryObjects[i].geometry
+            found.append((self.links[i], at, shape, at.homogeneous @ self._own_boxes[i]))
         return found
 
     @staticmethod
@@ -180,15 +161,17 @@ class RobotBodies:
         return kept[asked]
 
     def _boxes(self, hand: Array) -> Array:
-        found: Array = self._rests[self.of_frames] @ self._placed(hand) @ self._own_boxes
+        placed = np.array([at.homogeneous for at in self._placed(hand)])
+        found: Array = self._rests[self.of_frames] @ placed @ self._own_boxes
         return found
 
-    def _placed(self, hand: Array) -> Array:
-        """Where the bodies are ``(n, 4, 4)`` with the arm at rest."""
+    def _placed(self, hand: Array) -> Sequence[pin.SE3]:
+        """Where each of the bodies is with the arm at rest; so is this thread's data."""
         data, placed = self.data, self.shapes.createData()
         q = self.configuration(self.robot.rest, hand)
         pin.updateGeometryPlacements(self.model, data, self.shapes, placed, q)
-        return np.array([at.homogeneous for at in placed.oMg])
+        found: Sequence[pin.SE3] = placed.oMg
+        return found
 
     def _carrier(self, joint: int) -> Carrier:
         """With which of the arm's frames a joint moves that the hand's joints do not move."""

@@ -69,7 +69,7 @@ class Collisions:
     def free(self, arm: Array) -> bool:
         """Nothing touches with the arm's joints at ``arm (n_arm,)``, and the tool is in the workspace."""
         framed = partial(self._bodies.framed, arm)
-        return self._pairs.free(self._at(arm), framed) and self._inside(self._tool_pose(arm).translation)
+        return self._pairs.free(self._at(arm), framed) and self._stays(arm)
 
     def all_free(self, arms: Array) -> bool:
         """Nothing touches at any of ``arms (n, n_arm)``; the middle ones are asked first."""
@@ -84,12 +84,15 @@ class Collisions:
     def touches(self, arm: Array) -> list[Touch]:
         """What touches with the arm's joints at ``arm (n_arm,)``."""
         found = self._pairs.touches(self._at(arm), self._bodies.framed(arm))
-        inside = self._inside(self._tool_pose(arm).translation)
-        return found if inside else [*found, ("the tool", "the border of its workspace")]
+        return found if self._stays(arm) else [*found, ("the tool", "the border of its workspace")]
 
     def keys(self, arm: Array) -> list[Touch]:
         """The same by keys of things, see `Thing.key`."""
         return self._pairs.keys(self._at(arm), self._bodies.framed(arm))
+
+    def _stays(self, arm: Array) -> bool:
+        """The tool is in the workspace, if there is one, with the arm's joints at ``arm (n_arm,)``."""
+        return self._workspace is None or self._inside(self._tool_pose(arm).translation)
 
     def _inside(self, tools: Array) -> bool:
         """Positions ``(..., 3)`` of the tool are all in the workspace."""

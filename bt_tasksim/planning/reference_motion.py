@@ -106,8 +106,7 @@ def plan(
 
 def sample(path: Path, time: Array) -> Array:
     """Poses ``(N, 7)`` of paths at ``time (N,)`` seconds since their begin; they stay at their ends."""
-    index, share = _between(path, time)
-    return poses.interpolate(take_rows(path.table, index), take_rows(path.table, index + 1), share)
+    return _posed(path, *_between(path, time))
 
 
 def position(path: Path, time: Array) -> Array:
@@ -122,13 +121,20 @@ def at_times(path: Path, time: Array) -> tuple[Array, Array | None]:
     They are None where no world has any.
     """
     index, share = _between(path, time)
-    pose = poses.interpolate(take_rows(path.table, index), take_rows(path.table, index + 1), share)
-    return pose, None if path.joints is None else _shared(path.joints, index, share)
+    return _posed(path, index, share), _jointed(path, index, share)
 
 
 def posture(path: Path, time: Array) -> Array | None:
     """The joints of `at_times` alone."""
-    return None if path.joints is None else at_times(path, time)[1]
+    return _jointed(path, *_between(path, time))
+
+
+def _posed(path: Path, index: Array, share: Array) -> Array:
+    return poses.interpolate(take_rows(path.table, index), take_rows(path.table, index + 1), share)
+
+
+def _jointed(path: Path, index: Array, share: Array) -> Array | None:
+    return None if path.joints is None else _shared(path.joints, index, share)
 
 
 def _shared(table: Array, index: Array, share: Array) -> Array:
