@@ -18,12 +18,14 @@ class Index:
     """Numbers of rows, which go to a device when something there is first picked by them.
 
     Args:
-        rows: Which ``(k,)``, in NumPy; or booleans ``(N,)``.
+        rows: Which ``(k,)``, in NumPy or as a sequence; or booleans ``(N,)``.
     """
 
     __slots__ = ("_there", "rows")
 
-    def __init__(self, rows: np.ndarray) -> None:
+    def __init__(self, rows: np.ndarray | Sequence[int]) -> None:
+        if not isinstance(rows, np.ndarray):
+            rows = np.array(rows, dtype=None if len(rows) else int)
         self.rows = np.flatnonzero(rows) if rows.dtype == bool else rows
         self._there: Array = None
 

@@ -54,6 +54,14 @@ def test_worlds_are_taken_in_any_order_from_every_array():
     assert found.count["ticks"].tolist() == [3, 0] and found.count["more"][0].tolist() == [True, False]
 
 
+@pytest.mark.parametrize(
+    ("rows", "expected"), [([3, 0], [3, 0]), ((1,), [1]), ([], []), ([False, True, False, True], [1, 3])]
+)
+def test_worlds_are_named_by_a_sequence_or_by_booleans_as_well(rows, expected):
+    found = taken(bundle(), rows)
+    assert found.path.first.tolist() == expected and found.count["ticks"].tolist() == expected
+
+
 def test_what_replaces_some_worlds_leaves_the_others_and_what_was_given():
     whole, rows = bundle(), np.array([1, 3])
     new = mapped(lambda values: ~values if values.dtype == bool else values - 10, taken(whole, rows))
