@@ -84,10 +84,10 @@ def merged(whole: Any, rows: Array | Index, new: Any, worlds: int, was: Any = No
     """
     if whole is not None:
         _check_alike(whole, new)
-    _check_rows(new, len(rows))
-    if len(rows) == worlds:
-        return new
     index = _index(rows)
+    _check_rows(new, len(index))
+    if len(index) == worlds:
+        return new
     if whole is None:
         return mapped(lambda values: _spread(values, index, worlds), new)
     if was is None:

@@ -23,10 +23,10 @@ class Index:
 
     __slots__ = ("_there", "rows")
 
-    def __init__(self, rows: np.ndarray | Sequence[int]) -> None:
-        if not isinstance(rows, np.ndarray):
-            rows = np.array(rows, dtype=None if len(rows) else int)
-        self.rows = np.flatnonzero(rows) if rows.dtype == bool else rows
+    def __init__(self, rows: Array | Sequence[int]) -> None:
+        # What is an array stays where it is, also on another device.
+        found: Array = rows if hasattr(rows, "dtype") else np.array(rows, dtype=None if len(rows) else int)
+        self.rows: np.ndarray = np.flatnonzero(found) if found.dtype == bool else found
         self._there: Array = None
 
     def __len__(self) -> int:

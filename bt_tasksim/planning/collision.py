@@ -76,8 +76,10 @@ class Collisions:
         if not len(arms):
             return True
         frames = self._bodies.frames(arms)
-        if not self._inside((frames[:, self._tool_frame] @ self._tool[:, 3])[:, :3]):
-            return False
+        if self._workspace is not None:
+            tools = (frames[:, self._tool_frame] @ self._tool[:, 3])[:, :3]
+            if not _within(self._workspace, tools):
+                return False
         near = self._pairs.near(frames)
         return all(self._pairs.clear(self._at(q)) for q in halves(arms[near]))
 
@@ -92,14 +94,7 @@ class Collisions:
 
     def _stays(self, arm: Array) -> bool:
         """The tool is in the workspace, if there is one, with the arm's joints at ``arm (n_arm,)``."""
-        return self._workspace is None or self._inside(self._tool_pose(arm).translation)
-
-    def _inside(self, tools: Array) -> bool:
-        """Positions ``(..., 3)`` of the tool are all in the workspace."""
-        if self._workspace is None:
-            return True
-        low, high = self._workspace
-        return bool(((low <= tools) & (tools <= high)).all())
+        return self._workspace is None or _within(self._workspace, self._tool_pose(arm).translation)
 
     def tool_rotation(self, arm: Array) -> Array:
         """The tool's rotation ``(3, 3)`` with the arm's joints at ``arm (n_arm,)``."""
@@ -116,6 +111,12 @@ class Collisions:
         """Pinocchio's ``q``."""
         self._q[self._arm] = arm
         return self._q
+
+
+def _within(corners: Array, points: Array) -> bool:
+    """Points ``(..., 3)`` are all in a box of `bounds`: `beyond` is 0, asked for each posture of a search."""
+    low, high = corners
+    return bool(((low <= points) & (points <= high)).all())
 
 
 def bounds(robot: RobotDescription, start: Array) -> Array | None:

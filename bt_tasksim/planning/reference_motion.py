@@ -121,20 +121,11 @@ def at_times(path: Path, time: Array) -> tuple[Array, Array | None]:
     They are None where no world has any.
     """
     index, share = _between(path, time)
-    return _posed(path, index, share), _jointed(path, index, share)
-
-
-def posture(path: Path, time: Array) -> Array | None:
-    """The joints of `at_times` alone."""
-    return _jointed(path, *_between(path, time))
+    return _posed(path, index, share), None if path.joints is None else _shared(path.joints, index, share)
 
 
 def _posed(path: Path, index: Array, share: Array) -> Array:
     return poses.interpolate(take_rows(path.table, index), take_rows(path.table, index + 1), share)
-
-
-def _jointed(path: Path, index: Array, share: Array) -> Array | None:
-    return None if path.joints is None else _shared(path.joints, index, share)
 
 
 def _shared(table: Array, index: Array, share: Array) -> Array:

@@ -8,6 +8,7 @@ import pytest
 
 from bt_tasksim.core.bundles import Rows, mapped, merged, parts, taken
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.transfer import Index
 
 
 class Pair(NamedTuple):
@@ -60,6 +61,8 @@ def test_worlds_are_taken_in_any_order_from_every_array():
 def test_worlds_are_named_by_a_sequence_or_by_booleans_as_well(rows, expected):
     found = taken(bundle(), rows)
     assert found.path.first.tolist() == expected and found.count["ticks"].tolist() == expected
+    back = merged(bundle(), rows, mapped(lambda values: values, found), 4)
+    assert back.path.first.tolist() == [0, 1, 2, 3] and back.count["ticks"].tolist() == [0, 1, 2, 3]
 
 
 def test_what_replaces_some_worlds_leaves_the_others_and_what_was_given():
@@ -108,6 +111,12 @@ def test_in_torch_too():
     assert found.first.tolist() == [0, 1, 9, 3] and whole.first.tolist() == [0, 1, 2, 3]
     assert merged(None, np.array([2]), torch.tensor([9.0]), 4).tolist() == [0, 0, 9, 0]
     assert taken(whole, torch.tensor([3])).first.tolist() == [3.0]
+
+
+def test_numbers_of_rows_on_another_device_are_not_fetched():
+    torch = pytest.importorskip("torch")
+    rows = torch.tensor([3], device="meta")  # which has no values to fetch
+    assert Index(rows).rows is rows
 
 
 def test_rows_are_taken_when_they_are_first_looked_at_and_then_kept():
