@@ -1,8 +1,8 @@
 """Measured numbers into the documentation: ``python -m benchmarks.tables``.
 
 Reads ``benchmarks/results/*.json`` and writes the tables between the marker comments of README.md,
-docs/evaluation.md, docs/training.md, docs/experiments.md, docs/remote_engines.md and docs/twin.md, so that no
-number is typed by hand. Results are what the measurements write:
+docs/evaluation.md, docs/training.md, docs/experiments.md, docs/remote_engines.md, docs/twin.md and
+docs/taxonomy.md, so that no number is typed by hand. Results are what the measurements write:
 
 - ``<scenario>-<robot>[-camera][-fromlogs].json`` by ``python -m benchmarks.success``, in the format of
   ``bt-tasksim evaluate --json``;
@@ -17,6 +17,8 @@ number is typed by hand. Results are what the measurements write:
   ``python -m benchmarks.faults``, ``loop.json`` by ``python -m benchmarks.loop``;
 - ``any_tree-<robot>[-...].json`` by ``python -m benchmarks.any_tree``, ``five-<tree>-<robot>.json`` by
   ``python -m benchmarks.any_tree.five``;
+- ``taxonomy.json``: of each scenario of `docs/taxonomy.md` what a sealed evaluation found, see
+  `benchmarks.taxonomy_table`;
 - ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
 
 ``--check`` changes nothing and fails when a table is not up to date.
@@ -31,7 +33,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from benchmarks import any_tree_tables, learned_tables, robot_tables
+from benchmarks import any_tree_tables, learned_tables, robot_tables, taxonomy_table
 from benchmarks.experiments import pages as experiment_tables
 from benchmarks.speed import CASES, described
 from benchmarks.success import RESULTS, SCENARIOS
@@ -46,11 +48,12 @@ PAGES = (
     "docs/experiments.md",
     "docs/remote_engines.md",
     "docs/twin.md",
+    "docs/taxonomy.md",
 )
 ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
 KINDS = ("camera", "fromlogs")
-OTHER = ("speed", "decomposition", "learning", "remote", "faults", "loop", "planning")
+OTHER = ("speed", "decomposition", "learning", "remote", "faults", "loop", "planning", "taxonomy")
 APART = (
     *("oracle-", "grasp-", "experiment-", "training-", "gap-", "logs-", "decomposition-"),
     *("any_tree-", "five-"),
@@ -237,6 +240,7 @@ TABLES = {
     **robot_tables.TABLES,
     **any_tree_tables.TABLES,
     **experiment_tables.TABLES,
+    **taxonomy_table.TABLES,
 }
 MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 

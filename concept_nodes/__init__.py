@@ -10,6 +10,7 @@ from bt_tasksim.concept_nodes.bring import Bring
 from bt_tasksim.concept_nodes.conditions import AtPose, Holding, TimePassed, Upright
 from bt_tasksim.concept_nodes.grasp import Grasp
 from bt_tasksim.concept_nodes.hand_conditions import HandEmpty, Lifted, Over, OverBeside
+from bt_tasksim.concept_nodes.in_contact import InContact
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
 from bt_tasksim.concept_nodes.release import Release
@@ -28,6 +29,7 @@ __all__ = [
     "Grasp",
     "HandEmpty",
     "Holding",
+    "InContact",
     "Inside",
     "Lifted",
     "Over",

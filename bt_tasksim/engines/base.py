@@ -23,6 +23,7 @@ from bt_tasksim.core.errors import InputError, MachineError, nearest
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import part
 from bt_tasksim.core.world import Command, Hidden, JointTarget, Observation, WorldModel, WorldState
+from bt_tasksim.engines.body_contacts import BodyContacts
 from bt_tasksim.engines.images import Image
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -289,6 +290,10 @@ class PhysicsEngine(Engine):
         """What only a simulator knows; None, the default, where nobody knows the truth."""
         return None
 
+    def contact_points(self) -> BodyContacts | None:
+        """Where bodies touch at this instant; None, the default, where the engine does not say it."""
+        return None
+
     @property
     def deepest_pair(self) -> tuple[str, str, float, float] | None:
         """Names of the bodies that overlapped most, metres, and seconds since the episode began.
@@ -405,6 +410,10 @@ class PhysicsWrapper(PhysicsEngine):
     def hidden(self) -> Hidden | None:
         """See `PhysicsEngine.hidden`."""
         return self.inner.hidden()
+
+    def contact_points(self) -> BodyContacts | None:
+        """See `PhysicsEngine.contact_points`."""
+        return self.inner.contact_points()
 
     @property
     def deepest_pair(self) -> tuple[str, str, float, float] | None:

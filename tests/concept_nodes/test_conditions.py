@@ -13,6 +13,7 @@ from bt_tasksim.concept_nodes import (
     Clear,
     HandEmpty,
     Holding,
+    InContact,
     Inside,
     Lifted,
     Over,
@@ -261,6 +262,19 @@ def test_beside(toy, gap, yes):
     assert found.outcome.detail.numbers["gap"] == pytest.approx(gap, abs=1e-6)
     higher = standing(toy, Beside("cup", "box"), "goal", other=(goal[0] + apart, goal[1]), up=0.03)
     assert higher.status == Status.FAILURE
+
+
+@pytest.mark.parametrize(("gap", "yes"), [(0.0, True), (0.005, True), (0.007, False), (0.1, False)])
+def test_in_contact(toy, gap, yes):
+    world = toy(TimePassed(0.0)).world.model
+    apart = gap + world.object("cup").extent[0] / 2 + world.object("box").extent[0] / 2
+    goal = world.place("goal").pose
+    for one, other in (("cup", "box"), ("box", "cup")):
+        found = standing(toy, InContact(one, other), "goal", other=(goal[0] + apart, goal[1]))
+        assert found.status == (Status.SUCCESS if yes else Status.FAILURE)
+        assert found.outcome.detail.numbers["gap"] == pytest.approx(gap, abs=1e-6)
+    lifted = standing(toy, InContact("cup", "table"), "goal", up=gap)
+    assert lifted.status == (Status.SUCCESS if yes else Status.FAILURE)
 
 
 @pytest.mark.parametrize(("gap", "yes"), [(-0.005, False), (0.005, True)])

@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from benchmarks.taxonomy import BORDER, brute_force, measured, random_faces
+from bt_tasksim.concept.contact import ContactChange
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept_nodes.contact_cones import MEASURED, cone_dimensions, padded
+from bt_tasksim.concept_nodes.contact_tasks import PAPER, Change, task, tasks, tasks_between, time_reverses
 from bt_tasksim.concept_nodes.taxonomy import (
-    TASKS,
-    Change,
+    STATES,
     ContactState,
     contact_state,
+    contact_states,
     dimensions,
     rotation_normals,
     rotation_state,
-    task,
-    tasks_between,
-    time_reverse,
+    rotation_states,
     translation_state,
 )
 from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.registry import parts, register, scratch
 
 X, Y, Z = np.eye(3)
 
@@ -102,20 +106,116 @@ def test_rotation_about_a_point_moves_with_the_world(normals, rotation, seed):
     assert moved is rotation_state(normals, points, [0, 0, 0])
 
 
-@pytest.mark.parametrize("forward", TASKS, ids=lambda t: t.name)
+@given(st.lists(grid_normals, min_size=1, max_size=8))
+def test_a_set_gets_the_same_in_any_batch(sets):
+    normals, there = padded(sets)
+    alone = [STATES.index(translation_state(each)) for each in sets]
+    assert contact_states(normals, there, 1e-6).tolist() == alone
+    assert contact_states(normals[::-1], there[::-1], 1e-6).tolist() == alone[::-1]
+
+
+@settings(max_examples=50)
+@given(st.integers(0, 2**32 - 1))
+def test_measured_contacts_get_the_class_that_brute_force_finds_for_exact_ones(seed):
+    rng = np.random.default_rng(seed)
+    exact = [random_faces(rng) for _ in range(3)]
+    judged = [(each, found) for each in exact if (found := brute_force(each)).border >= BORDER]
+    for each, found in judged:
+        given_normals = measured(each, rng, MEASURED / 2)
+        assert contact_states(*padded([given_normals]))[0] == STATES.index(contact_state(found.dimensions))
+        assert dimensions(each) == found.dimensions
+
+
+@given(st.integers(0, 2**32 - 1), rotations)
+def test_measured_contacts_may_be_turned_shuffled_and_repeated(seed, rotation):
+    rng = np.random.default_rng(seed)
+    exact = random_faces(rng)
+    if not len(exact) or brute_force(exact).border < BORDER:
+        return
+    normals = measured(exact, rng, MEASURED / 2)
+    same = [
+        normals,
+        rotation.apply(normals),
+        rng.permutation(normals),
+        np.concatenate([normals, measured(exact, rng, MEASURED / 2)]),
+    ]
+    assert len({tuple(row) for row in cone_dimensions(*padded(same), MEASURED).tolist()}) == 1
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_no_sampled_motion_contradicts_the_class(seed):
+    """Dense sampling: it finds motions where there should be some, and none where there are none."""
+    rng = np.random.default_rng(seed)
+    exact = random_faces(rng)
+    found = brute_force(exact)
+    if not len(exact) or found.border < BORDER:
+        return
+    directions = rng.normal(size=(4000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    least = (directions @ exact.T).min(axis=1)
+    c = dimensions(exact).c
+    assert (least.max() > 0.0) == (c == 0)
+    if c == 3:
+        assert least.max() < -BORDER / 2
+
+
+@given(grid_normals.filter(len), st.integers(0, 2**32 - 1), st.booleans())
+def test_rotations_of_many_sets_are_those_of_each(normals, seed, about_axis):
+    rng = np.random.default_rng(seed)
+    points = rng.integers(-2, 3, normals.shape).astype(float)
+    there = np.ones((1, len(normals)), dtype=bool)
+    centre, axis = np.zeros((1, 3)), np.array([[0.0, 0.0, 2.0]])
+    given_axis = axis if about_axis else None
+    found = rotation_states(normals[None], there, points[None], centre, given_axis, 1e-6, 1e-9)[0]
+    if not about_axis:
+        assert STATES[found] is rotation_state(normals, points, centre[0])
+        return
+    # Bearings are contacts, too: two that keep each other axis from turning, from both sides.
+    bearings = np.array([Z, -Z, Z, -Z]), np.array([X, X, Y, Y])
+    every = np.concatenate([normals, bearings[0]]), np.concatenate([points, bearings[1]])
+    assert STATES[found] is rotation_state(*every, centre[0])
+
+
+@pytest.mark.parametrize("forward", PAPER, ids=lambda t: t.name)
 def test_time_reversal_is_an_involution_and_swaps_breaking_and_making(forward):
-    backward = time_reverse(forward)
-    assert time_reverse(backward) is forward
     swapped = {Change.BREAKS: Change.MAKES, Change.MAKES: Change.BREAKS, Change.KEEPS: Change.KEEPS}
-    assert backward.change is swapped[forward.change]
+    (backward,) = (each for each in PAPER if each.what == (forward.motion, forward.after, forward.before))
+    assert backward.change is swapped[forward.change] and backward.state is forward.state
+    assert time_reverses(forward)
+    for each in time_reverses(forward):
+        assert each.change is swapped[forward.change]
+        assert forward.what in {other.what for other in time_reverses(each)}
 
 
-def test_the_five_concepts_of_the_first_issue():
-    assert task("pick").change is Change.BREAKS
+def test_tasks_are_those_of_the_registered_concepts_and_of_the_paper():
+    assert (task("pick").change, task("pick").node) == (Change.BREAKS, "Pick")
     assert task("bring").change is Change.KEEPS
-    assert time_reverse(task("pick")) is task("place")
-    assert [t.name for t in tasks_between(ContactState.OP, ContactState.PR, "rotation")] == ["open_door"]
+    assert task("place") in time_reverses(task("pick"))
     assert tasks_between(ContactState.FT, ContactState.NC) == ()
+    declared = {
+        (c.contact.motion, c.contact.before, c.contact.after)
+        for c in parts("concept").values()
+        if issubclass(c, ConceptModel) and c.contact is not None and c.contact.to == "environment"
+    }
+    assert {each.what for each in tasks() if each.node} == declared
+    assert {each.what for each in PAPER} <= {each.what for each in tasks()}
+    assert not {each.what for each in tasks() if not each.node} & declared
+    for motion in ("translation", "rotation"):
+        assert {each.state for each in tasks() if each.motion == motion} == set(ContactState)
+
+
+def test_a_new_concept_takes_the_place_of_the_papers_task():
+    with scratch():
+
+        @register("concept")
+        class Shove(ConceptModel):
+            """Slide something over its support."""
+
+            contact = ContactChange(ContactState.TR, ContactState.TR)
+
+        assert task("shove").node == "Shove"
+        assert "slide" not in {each.name for each in tasks()}
+    assert "slide" in {each.name for each in tasks() if not each.node} or task("slide").node
 
 
 def test_bad_input_is_refused_in_one_sentence():
@@ -127,5 +227,11 @@ def test_bad_input_is_refused_in_one_sentence():
         dimensions([[1.0, 0.0]])
     with pytest.raises(InputError, match="contact normal 1 is zero"):
         dimensions([[1.0, 0, 0], [0, 0, 0]])
+    with pytest.raises(InputError, match="contact normal 1 of set 0 is zero"):
+        contact_states(np.array([[X, 0 * X], [X, Y]]), np.ones((2, 2), dtype=bool))
+    with pytest.raises(InputError, match="a centre for each set"):
+        rotation_states(np.ones((1, 1, 3)), np.ones((1, 1), bool), np.ones((1, 2, 3)), np.zeros((1, 3)))
+    with pytest.raises(InputError, match="tolerance of contact normals"):
+        dimensions([X], tolerance=1.0)
     with pytest.raises(InputError, match="one point each"):
         rotation_normals([X, Y], [[0, 0, 0]], [0, 0, 0])

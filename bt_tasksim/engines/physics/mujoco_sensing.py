@@ -12,6 +12,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.body_contacts import BodyContacts, Row
 from bt_tasksim.engines.physics.mujoco_contacts import Body
 
 if TYPE_CHECKING:
@@ -105,6 +106,20 @@ class ContactReader:
                 else:
                     support.add((me.index, other.index))
         return Near(distances, support)
+
+    def points(self, data: mj.MjData) -> BodyContacts:
+        """Where bodies touch, from the contacts that were last looked for.
+
+        MuJoCo's normals, the first rows of its frames, point from the first body to the second.
+        """
+        rows = list[Row]()
+        for (a, b), place, frame in zip(
+            data.contact.geom.tolist(), data.contact.pos, data.contact.frame, strict=True
+        ):
+            one, two = self._bodies[a], self._bodies[b]
+            robot = not {"link", "base"}.isdisjoint((one.role, two.role))
+            rows.append((one.name, two.name, robot, np.array(place), -np.array(frame[:3])))
+        return BodyContacts.of(rows)
 
     def forces(self, data: mj.MjData) -> Forces:
         """The forces of the contacts that forces were last computed for.

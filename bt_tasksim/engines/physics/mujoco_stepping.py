@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.body_contacts import BodyContacts
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.mujoco_model import BodyNumbers, World, build_world
 from bt_tasksim.engines.physics.mujoco_sensing import ContactReader, Forces, Near, object_velocities
@@ -161,6 +162,10 @@ class MujocoWorld:
             self._samples.append(self._feel())
 
     # ---- reading ----------------------------------------------------------------------------------------
+
+    def contact_points(self) -> BodyContacts:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        return self._reader.points(self.data)
 
     def _feel(self) -> tuple[Forces, list[float]]:
         """The forces of the last step, and what its wrench at the wrist is computed from."""

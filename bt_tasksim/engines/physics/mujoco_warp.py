@@ -17,6 +17,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Hidden, WorldState
 from bt_tasksim.engines.base import EngineSetup
+from bt_tasksim.engines.body_contacts import BodyContacts
 from bt_tasksim.engines.physics.layout import Layout, put, rows_for, wider_support
 from bt_tasksim.engines.physics.mujoco_model import BodyNumbers, build_world
 from bt_tasksim.engines.physics.mujoco_sensing import mean_wrenches
@@ -87,6 +88,10 @@ class WarpWorld:
 
     def read(self) -> None:
         """Nothing: they are read together, too."""
+
+    def contact_points(self) -> BodyContacts | None:
+        """None: contacts stay on the device."""
+        return None
 
     def note_motion(self, falling: bool, spin: float) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""

@@ -6,8 +6,11 @@ import math
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import MachineError
+from bt_tasksim.engines.body_contacts import BodyContacts, Row
 from bt_tasksim.engines.physics.rolling import rolling_damping
 from bt_tasksim.engines.physics.sapien_overlap import TOO_DEEP, least_overlap
 from bt_tasksim.engines.physics.sapien_robot import SKIN
@@ -26,7 +29,7 @@ DEEP = 1e-3
 _UNKNOWN = ("none", 0)
 _Pairs = list[tuple[tuple[str, int], tuple[str, int], list[Any]]]
 """What two bodies are and where they meet, of objects on each other and on fixtures."""
-_LYING = ("object", "fixture")
+_LYING, _ROBOT = ("object", "fixture"), ("base", "arm", "hand")
 
 
 class Touch(NamedTuple):
@@ -178,6 +181,25 @@ class ContactReader:
         touched = [force > 0.0 for force in hand_force]
         self._last = Touch(tip_force, hand_force, distance, support, touched)
         return self._last
+
+    def points(self) -> BodyContacts:
+        """Where bodies touch; PhysX's normals point from the second body to the first."""
+        known, rows = self._world.bodies, list[Row]()
+        for contact in self._world.system.get_contacts():
+            one, other = contact.bodies
+            robot = any(known.get(body, _UNKNOWN)[0] in _ROBOT for body in (one, other))
+            rows += [
+                (
+                    one.entity.name,
+                    other.entity.name,
+                    robot,
+                    np.array(point.position, float),
+                    np.array(point.normal, float),
+                )
+                for point in contact.points
+                if point.separation < SUPPORT_DISTANCE
+            ]
+        return BodyContacts.of(rows)
 
     def _overlap(self, contact: physx.PhysxContact, said: float) -> float:
         return least_overlap(contact, said, self._world.scene.timestep, self.before)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.body_contacts import BodyContacts
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
 from bt_tasksim.engines.physics.layout import body_column
 from bt_tasksim.engines.physics.sapien_contacts import ContactReader, Touch, resist_rolling
@@ -245,6 +246,10 @@ class SapienWorld:
                 out.linear[row, k], out.angular[row, k] = body.linear_velocity, body.angular_velocity
         tool, places = out.frames[row, 0, :3], out.objects[row]
         self._near = [k for k, way in self._watched if math.dist(places[k, :3], tool) < way]
+
+    def contact_points(self) -> BodyContacts:
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        return self._reader.points()
 
     def _write_touch(self) -> None:
         out, row, n, now, before = self._readings, self._row, self.n_objects, self._touch, self._written

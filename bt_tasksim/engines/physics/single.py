@@ -9,6 +9,7 @@ import numpy as np
 from bt_tasksim.core.bundles import mapped
 from bt_tasksim.core.world import Hidden, JointTarget, WorldState
 from bt_tasksim.engines.base import PhysicsEngine
+from bt_tasksim.engines.body_contacts import BodyContacts
 from bt_tasksim.engines.physics.threaded import SimulatedWorld, ThreadedBatch
 from bt_tasksim.scene.configuration import ActorConfiguration
 
@@ -34,6 +35,10 @@ class SimulatedPhysics(PhysicsEngine, Generic[W]):
         (world,) = self._batch.simulated
         assert world is not None, "it was not reset"
         return world
+
+    def contact_points(self) -> BodyContacts | None:
+        """See `PhysicsEngine.contact_points`."""
+        return self.simulated.contact_points()
 
     @property
     def deepest_pair(self) -> tuple[str, str, float, float] | None:

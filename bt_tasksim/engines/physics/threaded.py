@@ -22,6 +22,7 @@ from bt_tasksim.core.errors import BtTasksimError, MachineError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, JointTarget, WorldState
 from bt_tasksim.engines.batch import PhysicsBatch
+from bt_tasksim.engines.body_contacts import BodyContacts
 from bt_tasksim.engines.physics.layout import Layout, put, rows_for, wider_support
 from bt_tasksim.engines.physics.shutting import shutting
 from bt_tasksim.robot.description import RobotDescription
@@ -63,6 +64,9 @@ class SimulatedWorld(Protocol):
         Raises:
             MachineError: They are no numbers.
         """
+
+    def contact_points(self) -> BodyContacts | None:
+        """Where bodies touch at this instant; None where nobody says it."""
 
     def note_motion(self, falling: bool, spin: float) -> None:
         """How objects that the hand does not touch move, as it was read last.

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from physics_cases import PHYSICS, G, Still, holding, lifted, scene
 
+from bt_tasksim.concept.contact import ContactState
+from bt_tasksim.concept_nodes.taxonomy import state_of
 from bt_tasksim.core import poses
 from bt_tasksim.core.world import Command, JointTarget
 from bt_tasksim.engines.base import PhysicsEngine
@@ -33,6 +35,30 @@ def test_what_stands_stays_put(engine, kind):
     assert hidden.support[0, 1], "it touches the table"
     assert hidden.hand_force[0] == 0.0 and hidden.hand_distance[0] == np.inf
     assert state.time == pytest.approx(2.0) and hidden.time == state.time
+
+
+def test_contact_points_give_the_class_of_a_named_object(engine):
+    still = Still(scene("box").sample(2), engine)
+    still.step(2)
+    contacts = still.physics.contact_points()
+    normals, points = contacts.on("thing")
+    half = np.array(still.state.objects[0, :3]) - points.mean(axis=0)
+    assert normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(normals), 1)), abs=1e-3)
+    assert np.abs(half[:2]).max() < 0.02 and half[2] > 0.02, "below the box, all around its middle"
+    assert contacts.with_each_other("table", "thing") and not contacts.with_each_other("thing", "panda_hand")
+    near = points[np.argsort(np.linalg.norm(points - points[0], axis=1))]  # a corner, and the next one
+    middle, edge, along = still.state.objects[0, :3], near[:2].mean(axis=0), near[1] - near[0]
+    assert state_of("thing", contacts) is ContactState.PC
+    assert state_of("thing", contacts, "rotation", centre=middle) is ContactState.PR, "about the vertical"
+    free = {state_of("thing", contacts, "rotation", centre=edge, axis=s * along) for s in (1.0, -1.0)}
+    assert free == {ContactState.OP}, "about an edge it is stopped one way"
+    assert state_of("table", contacts) is ContactState.PC, "what presses on it from above"
+
+
+def test_contact_points_of_what_hangs_in_the_hand(engine):
+    contacts = holding(engine=engine).pipeline.physics.contact_points()
+    assert state_of("thing", contacts) is ContactState.NC
+    assert state_of("thing", contacts, hand=True) is ContactState.TR
 
 
 def test_the_arm_stays_put_too(engine):
