@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from bt_tasksim.core.joints import Joints
 from bt_tasksim.core.poses import Array, array_namespace
 
 _T = TypeVar("_T", bound="FactArrays")
@@ -47,6 +48,14 @@ class ObjectFacts(FactArrays):
         rotation_counts: Boolean ``(..., most)``: there is such a rotation.
         grasp_axes: Directions ``(..., most, 3)`` along which two fingers may close on it, best first.
         grasp_widths: Widths ``(..., most)`` along these, metres; infinite where there is no further axis.
+        jointed: Boolean ``(...)``: it is a part of a fixture, and moves on a joint; else the following are of
+            no meaning.
+        joint_turns: Boolean ``(...)``: the joint turns, and does not slide.
+        joint_origin: A point ``(..., 3)`` on its axis, in the part's frame, metres.
+        joint_axis: Unit vectors ``(..., 3)`` in the part's frame.
+        joint_zero: Poses ``(..., 7)`` of the part where it is shut.
+        joint_limits: Lowest and highest value ``(..., 2)``, metres or radians.
+        joint_sensed: Boolean ``(...)``: the robot sees how far it is open.
     """
 
     present: Array
@@ -57,6 +66,20 @@ class ObjectFacts(FactArrays):
     rotation_counts: Array
     grasp_axes: Array
     grasp_widths: Array
+    jointed: Array
+    joint_turns: Array
+    joint_origin: Array
+    joint_axis: Array
+    joint_zero: Array
+    joint_limits: Array
+    joint_sensed: Array
+
+    @property
+    def joints(self) -> Joints:
+        """Their joints."""
+        return Joints(
+            self.joint_turns, self.joint_origin, self.joint_axis, self.joint_zero, self.joint_limits
+        )
 
     @property
     def standing_height(self) -> Array:
@@ -122,6 +145,9 @@ FILLING: Mapping[str, Any] = {
     "grasp_axes": (0.0, 1.0, 0.0),
     "grasp_widths": math.inf,
     "pose": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+    "joint_axis": (1.0, 0.0, 0.0),
+    "joint_zero": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+    "joint_limits": (0.0, 1.0),
 }
 """What stands in the arrays of facts where a world has fewer entries than others; else zeros."""
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.fact_arrays import FILLING, ObjectFacts, ObstacleFacts, PlaceFacts
+from bt_tasksim.core.joints import JointModel, Joints
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import ObjectModel, PlaceModel, WorldModel
 
@@ -33,7 +34,23 @@ def object_facts(worlds: Sequence[WorldModel], names: Sequence[str]) -> ObjectFa
         rotation_counts=counts,
         grasp_axes=_padded(axes, shape, "grasp_axes")[0],
         grasp_widths=_padded(widths, shape, "grasp_widths")[0],
+        **_joint_facts([None if model is None else model.joint for model in models], shape),
     )
+
+
+def _joint_facts(joints: Sequence[JointModel | None], shape: tuple[int, int]) -> dict[str, Array]:
+    """The fields of `ObjectFacts` that speak of joints."""
+    some = [_NO_JOINT if joint is None else joint for joint in joints]
+    made = Joints.of(some)
+    return {
+        "jointed": np.array([joint is not None for joint in joints], bool).reshape(shape),
+        "joint_turns": made.turns.reshape(shape),
+        "joint_origin": made.origin.reshape(*shape, 3),
+        "joint_axis": made.axis.reshape(*shape, 3),
+        "joint_zero": made.zero.reshape(*shape, 7),
+        "joint_limits": made.limits.reshape(*shape, 2),
+        "joint_sensed": np.array([joint.sensed for joint in some], bool).reshape(shape),
+    }
 
 
 def place_facts(worlds: Sequence[WorldModel], names: Sequence[str]) -> PlaceFacts:
@@ -105,5 +122,6 @@ def _cube_rotations() -> Array:
     return poses.quat_multiply(quarter[None], tips[:, None]).reshape(-1, 4)
 
 
+_NO_JOINT = JointModel("slide", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), FILLING["pose"], (0.0, 1.0))
 _IDENTITY = np.array([[1.0, 0.0, 0.0, 0.0]])
 _CUBE = _cube_rotations()

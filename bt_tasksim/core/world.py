@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from bt_tasksim.core.errors import InputError, nearest
+from bt_tasksim.core.joints import JointModel
 from bt_tasksim.core.poses import Array
 
 
@@ -68,6 +69,7 @@ class ObjectModel:
         grasp_widths: Widths ``(k,)`` in metres between the surfaces along these directions.
         cubic: The object looks the same on each of its faces (a cube), so any face may be down.
         solid: Its geometry as it is known; None where nothing but the box is.
+        joint: How it moves, where it is a part of a fixture; None for what is free.
     """
 
     name: str
@@ -78,6 +80,7 @@ class ObjectModel:
     grasp_widths: tuple[float, ...]
     cubic: bool = False
     solid: KnownGeometry | None = None
+    joint: JointModel | None = None
 
 
 def is_container(kind: str) -> bool:

@@ -34,8 +34,9 @@ from bt_tasksim.execution.runner import LONGEST
 from bt_tasksim.policy.library import PROGRAMMED, is_bundled
 from bt_tasksim.policy.policy import concept_name
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.box import Box
 from bt_tasksim.scene.configuration import ActorConfiguration, Disturbance, ObjectActor, goals_in
-from bt_tasksim.scene.fixtures import Box, Fixture, FixturePlace
+from bt_tasksim.scene.fixtures import Fixture, FixturePlace
 from bt_tasksim.scene.goal_functions import GoalFunction
 from bt_tasksim.scene.specs import Goal
 from bt_tasksim.trees.load import Leaves

@@ -18,9 +18,11 @@ from bt_tasksim.core.json_text import parse_json
 from bt_tasksim.core.names import check_name
 from bt_tasksim.core.renamed import former_names, renamed_fields, with_present_names
 from bt_tasksim.core.world import ObjectModel, Obstacle, PlaceModel, WorldModel
+from bt_tasksim.scene.box import Box
 from bt_tasksim.scene.fixtures import Fixture
 from bt_tasksim.scene.goal_functions import GoalFunction
 from bt_tasksim.scene.grips import GivenGrip
+from bt_tasksim.scene.joints import Joint
 from bt_tasksim.scene.shapes import Shape, ShapeSize, object_model, shape
 from bt_tasksim.scene.specs import Goal
 
@@ -77,19 +79,32 @@ class ObjectActor:
     """Order of its symmetry about z; None for that of its kind."""
     category: str = ""
     """What people call things like it; empty for its kind."""
+    boxes: tuple[Box, ...] = ()
+    """Of a part of a fixture: what it is made of, in its own frame."""
+    joint: Joint | None = None
+    """Of a part of a fixture: how it moves; None for what is free."""
 
     @classmethod
     def from_data(cls, data: Any) -> ObjectActor:
         """From what JSON holds of it, lists as tuples."""
-        return cls(**{**data, "grasps": tuple(GivenGrip(**grip) for grip in data.get("grasps", ()))})
+        joint = data.get("joint")
+        return cls(
+            **{
+                **data,
+                "grasps": tuple(GivenGrip(**grip) for grip in data.get("grasps", ())),
+                "boxes": tuple(Box(**box) for box in data.get("boxes", ())),
+                "joint": None if joint is None else Joint.from_data(joint),
+            }
+        )
 
     def shape(self) -> Shape:
         """Its geometry."""
-        return shape(self.kind, ShapeSize(self.size, self.exponents, self.mesh))
+        return shape(self.kind, ShapeSize(self.size, self.exponents, self.mesh, self.boxes))
 
     def known_shape(self) -> Shape:
         """The geometry it is taken to have."""
-        return shape(self.kind, ShapeSize(self.known_size or self.size, self.exponents, self.mesh))
+        size = self.known_size or self.size
+        return shape(self.kind, ShapeSize(size, self.exponents, self.mesh, self.boxes))
 
     def model(self) -> ObjectModel:
         """What is known about it beforehand."""
@@ -100,8 +115,9 @@ class ObjectActor:
         return self._model(self.size)
 
     def _model(self, size: tuple[float, float, float]) -> ObjectModel:
-        of_size = ShapeSize(size, self.exponents, self.mesh)
-        return object_model(self.name, self.kind, of_size, self.grasps, self.symmetry)
+        of_size = ShapeSize(size, self.exponents, self.mesh, self.boxes)
+        joint = None if self.joint is None else self.joint.model()
+        return object_model(self.name, self.kind, of_size, self.grasps, self.symmetry, joint)
 
 
 @renamed_fields(lesson="stage", goal="goals")

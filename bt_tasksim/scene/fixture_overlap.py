@@ -11,7 +11,8 @@ import numpy as np
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import FieldError
 from bt_tasksim.core.poses import Array
-from bt_tasksim.scene.fixtures import Box, Fixture
+from bt_tasksim.scene.box import Box
+from bt_tasksim.scene.fixtures import Fixture
 from bt_tasksim.scene.outlines import TOUCHING
 
 

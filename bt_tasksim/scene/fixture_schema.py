@@ -18,6 +18,7 @@ from bt_tasksim.core.typed_file import (
     Pose7,
     Share,
     Size3,
+    Switch,
     Vector2,
     Vector3,
     sized,
@@ -74,8 +75,70 @@ class PlaceEntry(Model):
     """Distance along `access` that a hand keeps before it comes close, m."""
 
 
+class HoldEntry(Model):
+    """Where two fingers may hold a part."""
+
+    point: Vector3
+    """Middle between the fingers, fixture's frame where the part is shut, m."""
+    closing: Direction
+    """Direction in which the fingers close, likewise."""
+    width: Length
+    """Between the fingers, m."""
+    approach: Direction | None = None
+    """Direction in which the hand comes, likewise; by default any across the closing one."""
+
+
+class PartEntry(Model):
+    """A part that slides or turns: a drawer, a door, a lid, a knob, a lever, a button."""
+
+    name: Name
+    """Its name, by which trees and goals speak of it as of an object."""
+    joint: Literal["slide", "hinge"]
+    """Whether it slides along its axis or turns about it."""
+    axis: Direction
+    """The way in which it opens, or the axis about which it does, by the right hand; fixture's frame."""
+    origin: Vector3 = (0.0, 0.0, 0.0)
+    """A point on the axis, fixture's frame, m."""
+    limits: Vector2
+    """Lowest and highest value, m or rad; 0 is where the boxes are given."""
+    boxes: Annotated[tuple[BoxEntry, ...], Field(strict=False, min_length=1, max_length=100)]
+    """What it is made of, in the fixture's frame where it is shut."""
+    mass: Annotated[Number, Field(gt=0.0, le=200.0)] = 1.0
+    """kg."""
+    friction: Annotated[NotNegative, Field(le=500.0)] = 0.0
+    """What it takes to move it, N or Nm."""
+    damping: Annotated[NotNegative, Field(le=1000.0)] = 0.0
+    """N or Nm for each m or rad a second."""
+    stiffness: Annotated[NotNegative, Field(le=1e4)] = 0.0
+    """Of its spring, N/m or Nm/rad."""
+    rest: Number = 0.0
+    """Value at which the spring is at rest, m or rad."""
+    latch: Annotated[NotNegative, Field(le=500.0)] = 0.0
+    """What a latch holds it shut with, N or Nm."""
+    value: Number | Vector2 = 0.0
+    """How far it is open at the start, m or rad; two numbers: drawn between them."""
+    grasps: Annotated[tuple[HoldEntry, ...], Field(strict=False, max_length=64)] = ()
+    """Where two fingers may hold it."""
+    sensed: Switch = False
+    """The robot sees how far it is open; else it knows only what its own hand has done with it."""
+
+    @model_validator(mode="after")
+    def _within_limits(self) -> PartEntry:
+        low, high = self.limits
+        if not low < high:
+            raise ValueError(f"'limits' should be the lower one first, found {low:g} and {high:g}")
+        most = 2.0 if self.joint == "slide" else 6.3
+        if high - low > most:
+            unit = "m" if self.joint == "slide" else "rad"
+            raise ValueError(f"'limits' should be at most {most:g} {unit} apart, found {high - low:g}")
+        values = (self.value,) if isinstance(self.value, float) else self.value
+        if not all(low <= v <= high for v in values) or values[0] > values[-1]:
+            raise ValueError(f"'value' should be between {low:g} and {high:g}, the lower one first")
+        return self
+
+
 class FixtureFile(Model):
-    """Furniture that does not move: solid boxes, and places on or in them."""
+    """Furniture: solid boxes, places on or in them, and parts that slide or turn."""
 
     name: Name
     """Its name."""
@@ -85,10 +148,15 @@ class FixtureFile(Model):
     """The solid parts."""
     places: Annotated[tuple[PlaceEntry, ...], Field(strict=False, max_length=100)]
     """Where things can stand."""
+    parts: Annotated[tuple[PartEntry, ...], Field(strict=False, max_length=20)] = ()
+    """What slides or turns."""
 
     @model_validator(mode="after")
-    def _places_differ(self) -> FixtureFile:
+    def _names_differ(self) -> FixtureFile:
         names = [place.name for place in self.places]
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"two places are called '{twice[0]}'")
+        names += [part.name for part in self.parts]
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise ValueError(f"two parts, or a part and a place, are called '{twice[0]}'")
         return self

@@ -18,31 +18,17 @@ from bt_tasksim.core.named_data import named_data
 from bt_tasksim.core.names import check_name
 from bt_tasksim.core.plain import Plain
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.renamed import renamed_fields
 from bt_tasksim.core.world import PlaceModel, is_container
+from bt_tasksim.scene.box import Box
+from bt_tasksim.scene.grips import GivenGrip
 from bt_tasksim.scene.specs import FixtureSpec
 
 if TYPE_CHECKING:
-    from bt_tasksim.scene.fixture_schema import FixtureFile
+    from bt_tasksim.scene.fixture_schema import BoxEntry, FixtureFile, PartEntry
 
 
 ROUNDED = 1e-3
 """By how much the length of a unit vector in a file may differ from one."""
-
-
-@renamed_fields(look="material")
-@dataclass(frozen=True)
-class Box:
-    """A solid box of a fixture: pose ``(7,)`` in its frame, full size (m), sRGB colour, friction.
-
-    ``material`` says what it is drawn like: ``matte``, ``wood`` or ``metal``.
-    """
-
-    pose: tuple[float, ...]
-    size: tuple[float, float, float]
-    colour: tuple[float, float, float] = (0.6, 0.5, 0.4)
-    friction: float = 0.6
-    material: str = "matte"
 
 
 @dataclass(frozen=True)
@@ -66,20 +52,64 @@ class FixturePlace:
 
 
 @dataclass(frozen=True)
+class FixturePart:
+    """A part of a fixture that slides or turns, in the fixture's frame where it is shut.
+
+    Attributes:
+        name: Its name, by which trees speak of it as of an object.
+        boxes: What it is made of.
+        kind: ``slide`` or ``hinge``.
+        axis: The way in which it opens, or the axis about which it does, by the right hand; of length one.
+        origin: A point on the axis, metres.
+        limits: Lowest and highest value, metres or radians.
+        mass: Kilograms.
+        friction: What it takes to move it, N or Nm.
+        damping: N or Nm for each metre or radian a second.
+        stiffness: Of its spring, N/m or Nm/rad.
+        rest: Value at which the spring is at rest.
+        latch: Force or torque with which a latch holds it shut, N or Nm.
+        value: How far it is open at the start; two values: drawn between them.
+        grasps: Where two fingers may hold it.
+        sensed: The robot sees how far it is open.
+    """
+
+    name: str
+    boxes: tuple[Box, ...]
+    kind: str
+    axis: tuple[float, float, float]
+    limits: tuple[float, float]
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass: float = 1.0
+    friction: float = 0.0
+    damping: float = 0.0
+    stiffness: float = 0.0
+    rest: float = 0.0
+    latch: float = 0.0
+    value: tuple[float, float] = (0.0, 0.0)
+    grasps: tuple[GivenGrip, ...] = ()
+    sensed: bool = False
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "the name of a part of a fixture")
+
+
+@dataclass(frozen=True)
 class Fixture:
-    """Furniture that does not move.
+    """Furniture that stands still, but for its parts.
 
     Attributes:
         name: Its name.
         pose: Pose ``(7,)`` in the robot base frame.
-        boxes: The solid parts.
+        boxes: What stands still.
         places: Where things can stand.
+        parts: What slides or turns.
     """
 
     name: str
     pose: tuple[float, ...]
     boxes: tuple[Box, ...]
     places: tuple[FixturePlace, ...]
+    parts: tuple[FixturePart, ...] = ()
 
     def __post_init__(self) -> None:
         check_name(self.name, "the name of a fixture")
@@ -129,16 +159,7 @@ class Fixture:
     @classmethod
     def from_file(cls, file: FixtureFile) -> Fixture:
         """A fixture from what stands in its file."""
-        boxes = tuple(
-            Box(
-                box.pose or (*(box.position or ()), 1.0, 0.0, 0.0, 0.0),
-                box.size,
-                box.colour,
-                box.friction,
-                box.material,
-            )
-            for box in file.boxes
-        )
+        boxes = tuple(map(_box, file.boxes))
         places = tuple(
             FixturePlace(
                 p.name,
@@ -153,7 +174,33 @@ class Fixture:
             )
             for p in file.places
         )
-        return cls(file.name, file.pose, boxes, places)
+        parts = tuple(_part(entry) for entry in file.parts)
+        return cls(file.name, file.pose, boxes, places, parts)
+
+
+def _box(entry: BoxEntry) -> Box:
+    pose = entry.pose or (*(entry.position or ()), 1.0, 0.0, 0.0, 0.0)
+    return Box(pose, entry.size, entry.colour, entry.friction, entry.material)
+
+
+def _part(entry: PartEntry) -> FixturePart:
+    return FixturePart(
+        name=entry.name,
+        boxes=tuple(map(_box, entry.boxes)),
+        kind=entry.joint,
+        axis=_scaled(entry.axis),
+        origin=entry.origin,
+        limits=entry.limits,
+        mass=entry.mass,
+        friction=entry.friction,
+        damping=entry.damping,
+        stiffness=entry.stiffness,
+        rest=entry.rest,
+        latch=entry.latch,
+        value=(entry.value, entry.value) if isinstance(entry.value, float) else entry.value,
+        grasps=tuple(GivenGrip(g.point, g.closing, g.width, g.approach) for g in entry.grasps),
+        sensed=entry.sensed,
+    )
 
 
 def _distance(box: Box, point: Array) -> float:
@@ -190,13 +237,18 @@ def _put(fixture: Fixture, spec: FixtureSpec) -> Fixture:
         position = (*spec.at, *position[len(spec.at) :])
     if spec.yaw is not None:
         turn = tuple(float(v) for v in poses.yaw(spec.yaw))
-    name, places = fixture.name, fixture.places
+    name, places, parts = fixture.name, fixture.places, fixture.parts
     if spec.name:
+        parts = tuple(
+            replace(p, name=spec.name if p.name == fixture.name else f"{spec.name}_{p.name}") for p in parts
+        )
         places = tuple(
             replace(p, name=spec.name if p.name == fixture.name else f"{spec.name}_{p.name}") for p in places
         )
         name = spec.name
-    return Fixture(name, (*position, *turn), fixture.boxes, places)
+    if spec.sensed is not None:
+        parts = tuple(replace(p, sensed=spec.sensed) for p in parts)
+    return Fixture(name, (*position, *turn), fixture.boxes, places, parts)
 
 
 @lru_cache(maxsize=64)

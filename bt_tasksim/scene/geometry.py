@@ -15,6 +15,7 @@ import numpy as np
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.scene import meshes
+from bt_tasksim.scene.box import Box
 from bt_tasksim.scene.hollows import hollow, outer_corners
 from bt_tasksim.scene.meshes import MassProperties, TriangleMesh
 from bt_tasksim.scene.surfaces import Ellipse, OuterSurface, Polygon, PrismSurface
@@ -25,11 +26,15 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class ShapeSize:
-    """What a kind needs to become a shape: full size (m), exponents of a superellipsoid, file of a mesh."""
+    """What a kind needs to become a shape.
+
+    Full size (m), exponents of a superellipsoid, file of a mesh, boxes of a part of a fixture.
+    """
 
     size: Size
     exponents: tuple[float, float] = (1.0, 1.0)
     mesh: str | None = None
+    boxes: tuple[Box, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor, chec
 from bt_tasksim.scene.fixture_overlap import check_fixtures
 from bt_tasksim.scene.fixtures import load_fixture
 from bt_tasksim.scene.goal_functions import GoalFunction, Judge
+from bt_tasksim.scene.parts import draw_parts
 from bt_tasksim.scene.specs import FixtureSpec, Goal, HandStart, ObjectSpec, SpotSpec, object_spec
 from bt_tasksim.scene.starts import check_hollows, draw_order
 
@@ -180,9 +181,16 @@ class Scene:
         """Every name that is used is one of the scene, and means one thing."""
         furniture = [p for f in self.fixtures for p in load_fixture(f).places]
         places, containers = {p.name for p in furniture}, [p.name for p in furniture if p.container]
+        moving = self._part_names()
+        if twice := {name for name in moving if name in places or moving.count(name) > 1}:
+            raise FieldError(
+                f"two things of the fixtures are called '{min(twice)}': give one of the fixtures a 'name' of "
+                f"its own",
+                "fixtures",
+            )
         for i, spot in enumerate(self.spots):
             _require_place(f"spot '{spot.name}'", "on", spot.on, places, ("spots", i, "on"))
-            if spot.name in places:
+            if spot.name in places or spot.name in moving:
                 raise FieldError(f"two places are called '{spot.name}': rename the spot", "spots", i, "name")
             places.add(spot.name)
         for name in specs:
@@ -190,6 +198,13 @@ class Scene:
                 raise FieldError(
                     f"an object is called '{TOOL}', which is the robot's own: give the object another name, "
                     f"such as 'my_{TOOL}'",
+                    "objects",
+                    name,
+                )
+            if name in moving:
+                raise FieldError(
+                    f"an object and a part of a fixture are both called '{name}': give the object another "
+                    f"name, such as 'my_{name}'",
                     "objects",
                     name,
                 )
@@ -202,15 +217,15 @@ class Scene:
                 )
         for name, spec in specs.items():
             word, reference = spec.start
-            known = set(specs) if word == "beside" else {*places, *specs}
+            known = set(specs) if word == "beside" else {*places, *specs, *moving}
             _require_place(f"object '{name}'", word, reference, known, ("objects", name, word))
         draw_order(specs)
         for i, goal in enumerate(self.goals):
             if isinstance(goal, Goal):
                 where = ("goal",) if len(self.goals) == 1 else ("goals", i)
-                _require("goal", goal.object, specs, (*where, "object"))
+                _require("goal", goal.object, {*specs, *moving}, (*where, "object"))
                 if goal.place:
-                    _require("goal", goal.place, {*places, *specs}, (*where, "place"))
+                    _require("goal", goal.place, {*places, *specs, *moving}, (*where, "place"))
                 if goal.relation == "inside" and goal.place in places and goal.place not in containers:
                     said = f"such as {', '.join(containers)}" if containers else "such as a trash_bin or tray"
                     raise FieldError(
@@ -227,10 +242,13 @@ class Scene:
         """The first goal that is no function, or None."""
         return next((goal for goal in self.goals if isinstance(goal, Goal)), None)
 
+    def _part_names(self) -> list[str]:
+        return [part.name for name in self.fixtures for part in load_fixture(name).parts]
+
     @property
     def object_names(self) -> Collection[str]:
-        """Names of its objects."""
-        return self.objects.keys()
+        """Names of its objects, parts of fixtures among them."""
+        return [*self.objects, *self._part_names()]
 
     @property
     def place_names(self) -> Collection[str]:
@@ -279,11 +297,13 @@ class Scene:
             spec = usual if taught is None else taught.objects.get(name, usual)
             assert isinstance(spec, ObjectSpec)
             specs[name] = spec
-        drawn_objects: dict[str, ObjectActor] = {}
+        parts = draw_parts(fixtures, generator(seed, stream, "parts"))
+        drawn_objects: dict[str, ObjectActor] = {part.name: part for part in parts}
+        moving = list(drawn_objects.values())
         for name in draw_order(specs):
             others = list(drawn_objects.values())
             drawn_objects[name] = sampling.draw_object(name, specs[name], places, others, rng, fixtures)
-        objects = [drawn_objects[name] for name in specs]
+        objects = [*(drawn_objects[name] for name in specs), *moving]
         check_hollows(self.goals, drawn_objects)
         if taught is not None and taught.tilt is not None:
             sampling.tilt_access(taught.tilt, objects, places, generator(seed, stream, "approach"))
@@ -291,7 +311,7 @@ class Scene:
         drawn = ActorConfiguration(
             robot=self.robot,
             objects=tuple(objects),
-            fixtures=fixtures,
+            fixtures=tuple(dataclasses.replace(fixture, parts=()) for fixture in fixtures),
             places=tuple(places.values()),
             seed=int(seed),
             stream=stream,

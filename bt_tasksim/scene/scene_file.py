@@ -91,7 +91,9 @@ def _fixture(entry: str | FixturePlacement, file: Path) -> str | FixtureSpec:
     if isinstance(entry, str):
         return _named(entry, file, "a fixture file")
     at = None if entry.at is None else (entry.at[0], entry.at[1], *entry.at[2:3])
-    return FixtureSpec(_named(entry.fixture, file, "a fixture file"), at, entry.yaw, entry.name or "")
+    return FixtureSpec(
+        _named(entry.fixture, file, "a fixture file"), at, entry.yaw, entry.name or "", entry.sensed
+    )
 
 
 def _short(text: str, file: Path) -> str | ObjectSpec:
@@ -148,6 +150,7 @@ def _goal(entry: GoalEntry) -> Goal:
         entry.height,
         entry.when,
         entry.distance,
+        entry.value,
         on=entry.on or "",
         inside=entry.inside or "",
         beside=entry.beside or "",

@@ -89,7 +89,9 @@ class FixturePlacement(Model):
     yaw: Heading | None = None
     """Its heading in the robot base frame, rad; by default that of its file."""
     name: Name | None = None
-    """Its own name; its places are called by it, too: `<name>`, or `<name>_<place>`."""
+    """Its own name; its places and parts are called by it, too: `<name>`, or `<name>_<place>`."""
+    sensed: Switch | None = None
+    """The robot sees how far its parts are open; by default as its file says."""
 
 
 def _fixture_form(value: object) -> str:
@@ -126,6 +128,8 @@ class GoalEntry(Model):
     """True at the `end` of the run, or `once` in it."""
     distance: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.10
     """Of `beside`: between the two outlines from above, at most, m."""
+    value: Annotated[Number, Field(ge=-100.0, le=100.0)] | None = None
+    """Of `open`, at least, and `set`: how far a part of a fixture should be open, m or rad."""
 
 
 class SceneFile(Model):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 
 from bt_tasksim.core.files import file_version
+from bt_tasksim.core.joints import JointModel
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import part, parts
 from bt_tasksim.core.world import ObjectModel
@@ -94,6 +95,7 @@ def object_model(
     size: ShapeSize,
     grasps: tuple[GivenGrip, ...] = (),
     symmetry: int | None = None,
+    joint: JointModel | None = None,
 ) -> ObjectModel:
     """What is known beforehand about an object of this kind and size, see `ObjectModel`.
 
@@ -103,6 +105,7 @@ def object_model(
         size: Its size.
         grasps: Where it may be held, instead of what its kind says.
         symmetry: Order of its symmetry about z, instead of its kind's.
+        joint: How it moves, where it is a part of a fixture.
 
     Raises:
         InputError: Unknown kind, or a size that it cannot have.
@@ -119,6 +122,7 @@ def object_model(
         tuple(width for _, width in axes),
         cubic=found.cubic,
         solid=KnownSolid(kind, size, grasps),
+        joint=joint,
     )
 
 

@@ -126,6 +126,7 @@ class FixtureFields(Model):
     at: Position | None
     yaw: Heading | None
     name: str
+    sensed: Switch | None
 
 
 class HandFields(Model):
@@ -148,6 +149,7 @@ class GoalFields(Model):
     height: AboveZero
     when: str
     distance: AboveZero
+    value: Number | None
     on: Reference
     inside: Reference
     beside: Reference

@@ -191,7 +191,8 @@ class FixtureSpec:
             says.
         yaw: Its heading in the robot base frame, radians; None for the file's.
         name: Its own name, where the same fixture is there several times. The place that has the fixture's
-            name gets this one, and other places ``<name>_<place>``.
+            name gets this one, and other places ``<name>_<place>``; its parts likewise.
+        sensed: The robot sees how far its parts are open; None for what the file says.
 
     Raises:
         FieldError: A number is no good, or the name cannot be one.
@@ -201,6 +202,7 @@ class FixtureSpec:
     at: tuple[float, ...] | None = None
     yaw: float | None = None
     name: str = ""
+    sensed: bool | None = None
 
     def __post_init__(self) -> None:
         _keep(self, FixtureFields, "a fixture")
@@ -288,6 +290,8 @@ class Goal:
         height: Metres, for ``lifted``.
         when: ``end``: true at the end of the run. ``once``: true at some moment of it.
         distance: Metres between the two outlines at most, for ``beside``.
+        value: How far a part of a fixture should be open, for ``open`` (at least) and ``set``: metres or
+            radians; None for the relation's own.
 
     Raises:
         FieldError: A field is no good, or the reference is missing or named twice.
@@ -301,6 +305,7 @@ class Goal:
     height: float = 0.3
     when: str = "end"
     distance: float = 0.10
+    value: float | None = None
 
     def __init__(
         self,
@@ -312,6 +317,7 @@ class Goal:
         height: float = 0.3,
         when: str = "end",
         distance: float = 0.10,
+        value: float | None = None,
         *,
         on: str = "",
         inside: str = "",
@@ -322,6 +328,7 @@ class Goal:
             "angle_tolerance": angle_tolerance,
             "height": height,
             "distance": distance,
+            "value": value,
         }
         words = {"place": place, "on": on, "inside": inside, "beside": beside}
         words = {name: "" if word is None else word for name, word in words.items()}

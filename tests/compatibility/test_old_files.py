@@ -25,8 +25,9 @@ from bt_tasksim.hardware.twin.gap import load_gap
 from bt_tasksim.policy import library
 from bt_tasksim.policy.files import load_policy
 from bt_tasksim.robot import load_robot
+from bt_tasksim.scene.box import Box
 from bt_tasksim.scene.configuration import ActorConfiguration
-from bt_tasksim.scene.fixtures import Box, load_fixture
+from bt_tasksim.scene.fixtures import load_fixture
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.scene_file import load_scene
 from bt_tasksim.scene.specs import ObjectSpec

@@ -13,7 +13,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.sapien_world import array
-from bt_tasksim.scene.fixtures import Box
+from bt_tasksim.scene.box import Box
 from bt_tasksim.scene.shapes import shape_kind
 
 EQUAL = 1e-6

@@ -15,6 +15,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant, host
 from bt_tasksim.core.transfer import Index, spliced
 from bt_tasksim.core.world import Observation, WorldState
+from bt_tasksim.engines.perception.parts import Parts
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.surfaces import ManySurfaces, OuterSurface
@@ -134,6 +135,7 @@ class BatchObservations:
         self._limit = robot.hand_drive.force_limit * robot.hand_drive_scale
         self._surfaces = Surfaces([()] * n)
         self._all = np.arange(n)
+        self._parts = Parts(n)
         self._last: Instant | None = None
 
     def reset(self, rows: Sequence[int] | np.ndarray, configurations: Sequence[ActorConfiguration]) -> None:
@@ -141,6 +143,7 @@ class BatchObservations:
         worlds = list(self._surfaces.worlds)
         for row, configuration in zip(rows, configurations, strict=True):
             worlds[row] = tuple(actor.known_shape().surface for actor in configuration.objects)
+        self._parts.reset(rows, configurations)
         self._surfaces = Surfaces(worlds)  # a new one: older observations go on with theirs
         if self._last is not None:
             none = np.full(len(configurations), np.nan)
@@ -158,16 +161,18 @@ class BatchObservations:
         n, force = self._n_arm, state.tip_force
         x, y, z = force[..., 0], force[..., 1], force[..., 2]
         hand = state.joint_position[:, n:]
+        touching, closure = x * x + y * y + z * z > TOUCH * TOUCH, self._robot.closure(hand)
+        estimate = self._parts.placed(state, touching, closure, estimate, self._all if rows is None else rows)
         known = (
             state.time,
             state.joint_position[:, :n],
             state.joint_velocity[:, :n],
             hand,
             state.joint_effort[:, n:] / constant(self._limit, state.joint_effort),
-            self._robot.closure(hand),
+            closure,
             state.tool_pose,
             state.tips,
-            x * x + y * y + z * z > TOUCH * TOUCH,
+            touching,
             force,
             state.wrench,
             estimate,

@@ -69,7 +69,7 @@ class Body:
         index: Number of the object, or of the fixture behind the objects; -1 for links.
         name: Name of the link, the object or the fixture.
         tip: Number of the fingertip, or -1.
-        neighbours: Names of the links that a joint joins to it.
+        neighbours: Names of what a joint joins to it: links, or a fixture and its other parts.
     """
 
     role: str
@@ -110,6 +110,8 @@ def touching_pairs(solids: Sequence[Solid]) -> Iterator[tuple[Solid, Solid]]:
 def _can_touch(a: Body, b: Body) -> bool:
     roles = {a.role, b.role}
     if "object" in roles:
+        if "link" not in roles and (a.name in b.neighbours or b.name in a.neighbours):
+            return False
         return a.role != b.role or a.index != b.index
     if "link" not in roles:
         return False

@@ -106,6 +106,8 @@ class MujocoWorld:
         self._near = Near([math.inf] * self.n_objects, set())
         self._hand_force = [0.0] * self.n_objects
         self.data.qpos[self.world.joint_qpos] = start
+        for address, value in self.world.opened:
+            self.data.qpos[address] = value
         self.data.xfrc_applied[self.world.object_body, 2] = -self.world.weight
         self._hand_target: list[float] = start[self._n_arm :].tolist()
         self.drive_to(start.tolist(), [0.0] * len(start))
@@ -126,7 +128,7 @@ class MujocoWorld:
         plan = self._plan
         self.world.model.opt.timestep = plan.step
         self._samples = []
-        quiet = self._disturbance.over and not self._falling and self._watch == 0
+        quiet = self._disturbance.over and not self._falling and self._watch == 0 and not self.world.latched
         if quiet:
             self._mujoco.mj_step(self.world.model, self.data, plan.steps - plan.sensed)
         for k in range(plan.steps - plan.sensed if quiet else 0, plan.steps):
@@ -152,14 +154,22 @@ class MujocoWorld:
             for _ in range(self._plan.finer):
                 if self._disturbance.pushing:
                     self._push()
+                self._pull()
                 mj_step(model, data)
                 self._read_depth()
             model.opt.timestep = ordinary
         else:
+            self._pull()
             mj_step(model, data)
             self._read_depth()
         if sensed:
             self._samples.append(self._feel())
+
+    def _pull(self) -> None:
+        """Set what latches pull with in the next step."""
+        for k, joint in self.world.latched:
+            value = float(self.data.qpos[self.world.object_qpos[k, 0]])
+            self.data.qfrc_applied[self.world.object_dof[k, 0]] = joint.hold(value)
 
     # ---- reading ----------------------------------------------------------------------------------------
 
@@ -207,7 +217,7 @@ class MujocoWorld:
             data.xquat[self._frames],
             data.xpos[bodies],
             data.xquat[bodies],
-            data.qvel[world.object_dof],
+            world.object_motion(data.qvel, data.xquat[bodies]),
             self._object_com,
             [wrist for _, wrist in self._samples],
             felt.tips,

@@ -157,10 +157,18 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
             )
         mujoco = self._mujoco
         world = build_world(mujoco, self.robot, configuration)
+        if world.latched:
+            name = configuration.objects[world.latched[0][0]].name
+            raise InputError(
+                f"MuJoCo Warp does not simulate latches, and '{name}' has one: take --engines mujoco, or a "
+                f"fixture without"
+            )
         model = world.model
         model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # which Warp never does
         data = mujoco.MjData(model)
         data.qpos[world.joint_qpos] = start
+        for address, value in world.opened:
+            data.qpos[address] = value
         data.xfrc_applied[world.object_body, 2] = -world.weight
         mujoco.mj_kinematics(model, data)
         control = self._gains[0] * start
@@ -260,7 +268,7 @@ class MujocoWarpBatch(ThreadedBatch[WarpWorld]):
             effort=self._effort(rows, joints, speeds),
             frames=np.ascontiguousarray(positions[:, : 1 + tips]),
             objects=positions[:, 1 + tips :].reshape(-1, 7),
-            motion=v[:, world.object_dof].reshape(-1, 6),
+            motion=world.object_motion(v, positions[:, 1 + tips :, 3:]).reshape(-1, 6),
             com=np.concatenate(com),
             wrench=mean_wrenches(each[np.arange(each.shape[1]) < felt], felt[:, 0], self.robot.tool_pose),
             tip_force=columns.floats(report, "tips").reshape(k, -1, 3)[:, :tips] / felt[..., None],

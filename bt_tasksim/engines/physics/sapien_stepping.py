@@ -102,7 +102,9 @@ class SapienWorld:
         self._hand = [body for body, (kind, _) in world.bodies.items() if kind == "hand"]
         self._solids: Solids = {}
         self._phantoms, self._near = Phantoms(world, self._solids, articulation, robot.arm), list[int]()
-        self._watched = [(k, world.radius[k] + NEAR) for k in among_meshes(world)]
+        self._jointed = {k for k, actor in enumerate(configuration.objects) if actor.joint is not None}
+        meshes = [k for k in among_meshes(world) if k not in self._jointed]
+        self._watched = [(k, world.radius[k] + NEAR) for k in meshes]
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
 
@@ -174,6 +176,8 @@ class SapienWorld:
         """One step of PhysX so long, with what it does not know; contacts are looked at after it, or not."""
         if self._twist.holds:
             self._twist.resist(seconds)
+        for part in self.world.jointed:
+            part.act(seconds)
         before = self._phantoms.look(self._near)
         self._reader.before = self._places(before) if looked_at and before else {}
         self.world.system.step()
@@ -218,7 +222,7 @@ class SapienWorld:
         """Those objects of free ones that move so fast that steps have to be finer."""
         found = []
         for k, body in enumerate(self.world.objects):
-            if free[k]:
+            if free[k] and k not in self._jointed:
                 linear, angular = body.linear_velocity.tolist(), body.angular_velocity.tolist()
                 if math.hypot(*linear) > FALLING[0] or math.hypot(*angular) > FALLING[1]:
                     found.append(k)

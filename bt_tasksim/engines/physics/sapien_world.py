@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bt_tasksim.core.poses import Array
+from bt_tasksim.engines.physics.sapien_joints import JointedBody, add_part
 from bt_tasksim.engines.physx import start_physx
-from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 from bt_tasksim.scene.shapes import BoxPiece
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ PARTING = 1.0
 """Metres a second at most at which PhysX parts bodies that overlap."""
 DAMPING = 0.05
 """Share a second of its spin that air takes from an object."""
+_PARTS_BIT = 1 << 10  # of group 2; from here on one bit a fixture that has parts
 
 
 @dataclass(eq=False)
@@ -45,7 +47,8 @@ class World:
         system: Its physics.
         bodies: What each body is (``fixture``, ``object``, ``base``, ``arm`` or ``hand``) and its index: that
             of `bt_tasksim.core.world.Hidden`, of its fingertip, or -1.
-        objects: The objects' bodies.
+        objects: The objects' bodies; a `JointedBody` for a part of a fixture.
+        jointed: The parts among them.
         inertia: Frame of the principal axes (a pose, seven numbers) and principal moments (kg m^2) by object.
         radius: Metres from the middle of an object to its farthest point, at most, by object.
     """
@@ -54,6 +57,7 @@ class World:
     system: physx.PhysxCpuSystem
     bodies: dict[physx.PhysxRigidBaseComponent, tuple[str, int]] = field(default_factory=dict)
     objects: list[physx.PhysxRigidDynamicComponent] = field(default_factory=list)
+    jointed: list[JointedBody] = field(default_factory=list)
     inertia: list[tuple[list[float], list[float]]] = field(default_factory=list)
     radius: list[float] = field(default_factory=list)
     _materials: dict[float, physx.PhysxMaterial] = field(default_factory=dict)
@@ -119,33 +123,68 @@ def _add_fixtures(world: World, configuration: ActorConfiguration) -> None:
 
 
 def _add_objects(world: World, configuration: ActorConfiguration, iterations: int) -> None:
+    for k, actor in enumerate(configuration.objects):
+        body: Any = _free_body(world, actor, iterations) if actor.joint is None else _part(world, actor)
+        world.bodies[body.link if isinstance(body, JointedBody) else body] = ("object", k)
+        world.objects.append(body)
+        geometry = actor.shape()
+        axes = [0.0, 0.0, 0.0, *np.asarray(geometry.mass.pose, float)[3:].tolist()]
+        world.inertia.append((axes, [float(v) * actor.mass for v in geometry.mass.inertia]))
+        world.radius.append(math.hypot(*geometry.extent) / 2.0)
+    _let_parts_pass(world, configuration)
+
+
+def _free_body(world: World, actor: ObjectActor, iterations: int) -> physx.PhysxRigidDynamicComponent:
     from sapien import physx
 
-    for k, actor in enumerate(configuration.objects):
-        geometry = actor.shape()
-        body = physx.PhysxRigidDynamicComponent()
-        material = world.material(actor.friction)
-        for piece in geometry.collision:
-            if isinstance(piece, BoxPiece):
-                shape = physx.PhysxCollisionShapeBox(list(piece.half_size), material)
-                shape.set_local_pose(sapien_pose(piece.pose))
-            else:
-                vertices = np.asarray(piece.vertices, np.float32)
-                shape = physx.PhysxCollisionShapeConvexMesh(vertices, [1.0, 1.0, 1.0], material)
-            body.attach(shape)
-        body.set_mass(actor.mass)
-        body.set_solver_position_iterations(max(iterations, min(math.ceil(LIGHT / actor.mass), MOST)))
-        body.set_cmass_local_pose(sapien_pose(geometry.mass.pose))
-        inertia = [float(v) * actor.mass for v in geometry.mass.inertia]
-        body.set_inertia(inertia)
-        body.set_angular_damping(DAMPING)
-        body.set_max_depenetration_velocity(PARTING)
-        world.add(body, actor.name, actor.pose)
-        world.bodies[body] = ("object", k)
-        world.objects.append(body)
-        axes = [0.0, 0.0, 0.0, *np.asarray(geometry.mass.pose, float)[3:].tolist()]
-        world.inertia.append((axes, inertia))
-        world.radius.append(math.hypot(*geometry.extent) / 2.0)
+    geometry = actor.shape()
+    body = physx.PhysxRigidDynamicComponent()
+    for shape in _shapes(world, actor):
+        body.attach(shape)
+    body.set_mass(actor.mass)
+    body.set_solver_position_iterations(max(iterations, min(math.ceil(LIGHT / actor.mass), MOST)))
+    body.set_cmass_local_pose(sapien_pose(geometry.mass.pose))
+    body.set_inertia([float(v) * actor.mass for v in geometry.mass.inertia])
+    body.set_angular_damping(DAMPING)
+    body.set_max_depenetration_velocity(PARTING)
+    world.add(body, actor.name, actor.pose)
+    return body
+
+
+def _part(world: World, actor: ObjectActor) -> JointedBody:
+    assert actor.joint is not None
+    body = add_part(world.scene, actor, actor.joint, _shapes(world, actor), MOST)
+    world.jointed.append(body)
+    return body
+
+
+def _shapes(world: World, actor: ObjectActor) -> list[physx.PhysxCollisionShape]:
+    from sapien import physx
+
+    shapes: list[physx.PhysxCollisionShape] = []
+    material = world.material(actor.friction)
+    for piece in actor.shape().collision:
+        if isinstance(piece, BoxPiece):
+            shape: Any = physx.PhysxCollisionShapeBox(list(piece.half_size), material)
+            shape.set_local_pose(sapien_pose(piece.pose))
+        else:
+            vertices = np.asarray(piece.vertices, np.float32)
+            shape = physx.PhysxCollisionShapeConvexMesh(vertices, [1.0, 1.0, 1.0], material)
+        shapes.append(shape)
+    return shapes
+
+
+def _let_parts_pass(world: World, configuration: ActorConfiguration) -> None:
+    """A fixture and its parts do not touch each other: their joints alone bear and stop them."""
+    moving = dict.fromkeys(body.joint.fixture for body in world.jointed)
+    for bit, name in enumerate(moving):
+        own = [body.link for body in world.jointed if body.joint.fixture == name]
+        names = [fixture.name for fixture in configuration.fixtures]
+        still = len(configuration.objects) + names.index(name) if name in names else -1
+        own += [body for body, (kind, k) in world.bodies.items() if kind == "fixture" and k == still]
+        for body in own:
+            for shape in body.get_collision_shapes():
+                shape.set_collision_groups([1, 1, _PARTS_BIT << bit, 0])
 
 
 def sapien_pose(pose: Iterable[float]) -> sapien.Pose:

@@ -7,7 +7,7 @@ stand before it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -27,6 +27,7 @@ from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.robot.urdf_visuals import LinkVisual, load_visuals
 from bt_tasksim.scene import meshes
+from bt_tasksim.scene.box import Box
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 
 ALIASES = {"perception": "scene"}
@@ -99,12 +100,8 @@ class SapienRendering(RenderingEngine):
         if configuration.fixtures != self._drawn:
             self._remove(self._fixtures)
             for fixture in configuration.fixtures:
-                shapes = []
-                for box in fixture.boxes:
-                    shape = materials.plank_shape(box.size, materials.material(box.colour, box.material))
-                    shape.local_pose = self._pose(np.array(box.pose))
-                    shapes.append(shape)
-                self._fixtures.append(self._add(fixture.name, shapes, fixture.pose_array()))
+                planks = self._planks(fixture.boxes)
+                self._fixtures.append(self._add(fixture.name, planks, fixture.pose_array()))
             self._drawn = configuration.fixtures
         self._remove(self._objects)
         self._objects = [self._add_object(actor) for actor in configuration.objects]
@@ -206,8 +203,18 @@ class SapienRendering(RenderingEngine):
         return shape
 
     def _add_object(self, actor: ObjectActor) -> Any:
+        if actor.boxes:
+            return self._add(actor.name, self._planks(actor.boxes), np.array(actor.pose))
         shape = materials.mesh_shape(actor.shape().visual, materials.material(actor.colour))
         return self._add(actor.name, [shape], np.array(actor.pose))
+
+    def _planks(self, boxes: Iterable[Box]) -> list[Any]:
+        shapes = []
+        for box in boxes:
+            shape = materials.plank_shape(box.size, materials.material(box.colour, box.material))
+            shape.local_pose = self._pose(np.array(box.pose))
+            shapes.append(shape)
+        return shapes
 
     def _add_spot(self, place: PlaceModel) -> Any:
         """A thin mat that marks where something is to stand."""

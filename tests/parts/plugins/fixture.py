@@ -1,7 +1,8 @@
 """A fixture from outside: a pedestal of the table's height and half."""
 
 from bt_tasksim.core.registry import register
-from bt_tasksim.scene.fixtures import Box, Fixture, FixturePlace
+from bt_tasksim.scene.box import Box
+from bt_tasksim.scene.fixtures import Fixture, FixturePlace
 
 HEIGHT = 0.12
 

@@ -51,7 +51,8 @@ def idle(first: Prepared) -> Prepared:
     """A world of the same structure in which nothing goes on: its objects lie far apart, without weight."""
     qpos = first.state["qpos"].view(np.float32).copy()
     for k, (x, y, z) in enumerate(first.world.object_qpos[:, :3].tolist()):
-        qpos[[x, y, z]] = APART * (k + 1), 0.0, APART
+        if x < y:  # and no part of a fixture, which stays on its joint
+            qpos[[x, y, z]] = APART * (k + 1), 0.0, APART
     state = first.state | {"qpos": qpos.view(np.int32)}
     return replace(first, state=state | {"xfrc_applied": np.zeros_like(state["xfrc_applied"])})
 

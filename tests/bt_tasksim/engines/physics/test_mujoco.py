@@ -19,8 +19,9 @@ from bt_tasksim.engines.physics.mujoco import MujocoPhysics
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.box import Box
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
-from bt_tasksim.scene.fixtures import Box, Fixture
+from bt_tasksim.scene.fixtures import Fixture
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.trees.load import load_source
 

@@ -26,8 +26,9 @@ from bt_tasksim.engines.remote.schema import (
     MessageSpec,
     layout_digest,
 )
+from bt_tasksim.scene.box import Box
 from bt_tasksim.scene.configuration import ActorConfiguration, Disturbance, ObjectActor
-from bt_tasksim.scene.fixtures import Box, Fixture, FixturePlace
+from bt_tasksim.scene.fixtures import Fixture, FixturePlace
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import Goal
 

@@ -1,0 +1,125 @@
+"""Parts of furniture that slide or turn: how far they are open, and where they are then.
+
+A joint's value is 0 where it is shut, in metres for one that slides and radians for one that turns. All laws
+are for ``N`` joints at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array, array_namespace
+
+SLIDES, TURNS = "slide", "hinge"
+KINDS = (SLIDES, TURNS)
+
+
+@dataclass(frozen=True)
+class JointModel:
+    """What is known beforehand of the joint by which a part of a fixture moves.
+
+    Attributes:
+        kind: ``slide`` or ``hinge``.
+        origin: A point ``(3,)`` on its axis, in the part's frame, metres.
+        axis: Unit vector ``(3,)`` in the part's frame: the way in which the value grows, or the axis about
+            which it does, by the right hand.
+        zero: Pose ``(7,)`` of the part in the robot base frame where the value is 0.
+        limits: Lowest and highest value, metres or radians.
+        sensed: The robot sees how far it is open; else it knows only what its hand has done with it.
+    """
+
+    kind: str
+    origin: tuple[float, float, float]
+    axis: tuple[float, float, float]
+    zero: tuple[float, ...]
+    limits: tuple[float, float]
+    sensed: bool = False
+
+    @property
+    def turns(self) -> bool:
+        """It turns, and does not slide."""
+        return self.kind == TURNS
+
+
+class Joints(NamedTuple):
+    """Joints as arrays; leading dimensions ``(...)``, see `JointModel`.
+
+    Attributes:
+        turns: Boolean ``(...)``.
+        origin: ``(..., 3)``, metres.
+        axis: Unit vectors ``(..., 3)``.
+        zero: Poses ``(..., 7)``.
+        limits: ``(..., 2)``, metres or radians.
+    """
+
+    turns: Array
+    origin: Array
+    axis: Array
+    zero: Array
+    limits: Array
+
+    @classmethod
+    def of(cls, models: Sequence[JointModel]) -> Joints:
+        """Joints ``(n,)`` of models, in NumPy."""
+        return cls(
+            turns=np.array([model.turns for model in models], bool),
+            origin=np.array([model.origin for model in models], float).reshape(-1, 3),
+            axis=np.array([model.axis for model in models], float).reshape(-1, 3),
+            zero=np.array([model.zero for model in models], float).reshape(-1, 7),
+            limits=np.array([model.limits for model in models], float).reshape(-1, 2),
+        )
+
+    def way(self, value: Array) -> Array:
+        """Motions ``(..., 7)`` of the part in its own frame at 0, by values ``(...)``."""
+        xp = array_namespace(self.origin)
+        turns = self.turns[..., None]
+        rotation = poses.from_rotation_vector(xp.where(turns, self.axis * value[..., None], 0.0 * self.axis))
+        turned = self.origin - poses.rotate(rotation, self.origin)
+        return xp.concat([xp.where(turns, turned, self.axis * value[..., None]), rotation], axis=-1)
+
+    def pose(self, value: Array) -> Array:
+        """Poses ``(..., 7)`` of the part in the robot base frame, by values ``(...)``."""
+        return poses.multiply(self.zero, self.way(value))
+
+    def value(self, pose: Array) -> Array:
+        """Values ``(...)`` that come nearest to poses ``(..., 7)``, within the limits.
+
+        Where it turns, the value is that of the turn about the axis alone: the middle of the turns that
+        bring the part's frame at 0 onto the one given.
+        """
+        xp = array_namespace(self.origin)
+        moved = poses.multiply(poses.inverse(self.zero), pose)
+        slid = xp.sum(moved[..., :3] * self.axis, axis=-1)
+        swing = 2.0 * xp.atan2(xp.sum(moved[..., 4:] * self.axis, axis=-1), moved[..., 3])
+        swing = xp.atan2(xp.sin(swing), xp.cos(swing))
+        middle = (self.limits[..., 0] + self.limits[..., 1]) / 2  # the whole turn that is nearest to it
+        swing = swing + 2.0 * np.pi * xp.round((middle - swing) / (2.0 * np.pi))
+        value = xp.where(self.turns, swing, slid)
+        return poses.clip(value, self.limits[..., 0], self.limits[..., 1])
+
+    def shift(self, now: Array, point: Array, moved: Array) -> Array:
+        """By how much values grow ``(...)`` when a point that goes with the part is moved.
+
+        Args:
+            now: Values ``(...)`` before.
+            point: Where the point is ``(..., 3)``, robot base frame.
+            moved: Where it comes to be ``(..., 3)``.
+        """
+        xp = array_namespace(self.origin)
+        at = self.pose(now)
+        axis = poses.rotate(at[..., 3:], self.axis)
+        along = xp.sum((moved - point) * axis, axis=-1)
+        centre = poses.transform(at, self.origin)
+
+        def arm(place: Array) -> Array:
+            lever = place - centre
+            return lever - xp.sum(lever * axis, axis=-1)[..., None] * axis
+
+        a, b = arm(point), arm(moved)
+        turn = xp.atan2(xp.sum(poses.cross(a, b) * axis, axis=-1), xp.sum(a * b, axis=-1))
+        return xp.where(self.turns, turn, along)

@@ -1,0 +1,152 @@
+"""How far parts of fixtures are taken to be open: as they are seen, or as the hand has left them.
+
+A part is on its joint, whose axis is calibrated; so what is seen of it is brought onto the joint. Where the
+scene does not say that the part is sensed, the robot knows how it stands at the beginning, and from then on
+what its hand does with it: the part goes along with fingers that hold it by one of its grasps, and with a
+fist that touches it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bt_tasksim.core import poses
+from bt_tasksim.core.joints import Joints
+from bt_tasksim.core.poses import Array, constant, host
+from bt_tasksim.core.world import ObjectModel, WorldState
+from bt_tasksim.scene.configuration import ActorConfiguration
+
+HELD = 0.025
+"""Metres from the middle between fingertips to a grasp of a part within which they hold it."""
+TOUCHED = 0.012
+"""Metres from a fingertip to a part within which a fist that feels something touches it: pads have a size,
+and estimates err."""
+FIST = 0.9
+"""Closure from which a hand is a fist."""
+
+
+@dataclass(eq=False)
+class Part:
+    """One part in one world.
+
+    Attributes:
+        column: Where it stands among the objects.
+        model: What is known of it.
+        joint: Its joint ``(1,)``.
+        value: How far it is taken to be open ``(1,)``, once somebody has looked.
+    """
+
+    column: int
+    model: ObjectModel
+    joint: Joints
+    value: Array | None = None
+
+    @property
+    def sensed(self) -> bool:
+        """The robot sees how far it is open."""
+        assert self.model.joint is not None
+        return self.model.joint.sensed
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A hand at one instant, in one world: its tips ``(n_tips, 3)``, which of them touch, its closure."""
+
+    tips: Array
+    touching: Array
+    closure: float
+
+
+class Parts:
+    """The parts of the worlds of a batch.
+
+    Args:
+        n: Number of worlds.
+    """
+
+    def __init__(self, n: int) -> None:
+        self._parts: list[list[Part]] = [[] for _ in range(n)]
+        self._hands: list[Hand | None] = [None] * n
+        self._any = False
+
+    def reset(self, rows: Sequence[int] | np.ndarray, configurations: Sequence[ActorConfiguration]) -> None:
+        """Worlds begin new episodes."""
+        for row, configuration in zip(rows, configurations, strict=True):
+            found = []
+            for column, actor in enumerate(configuration.objects):
+                if actor.joint is not None:
+                    model = actor.model()
+                    assert model.joint is not None
+                    found.append(Part(column, model, Joints.of([model.joint])))
+            self._parts[row], self._hands[row] = found, None
+        self._any = any(self._parts)
+
+    def placed(
+        self, state: WorldState, touching: Array, closure: Array, estimate: Array, rows: np.ndarray
+    ) -> Array:
+        """Estimates ``(k, n_objects, 7)`` with the parts where they are taken to be.
+
+        Args:
+            state: The states ``(k, ...)``.
+            touching: Boolean ``(k, n_tips)``.
+            closure: ``(k,)``.
+            estimate: What was seen.
+            rows: Which worlds these are ``(k,)``.
+        """
+        if not self._any:
+            return estimate
+        seen, tips, felt, shut = (np.array(host(v)) for v in (estimate, state.tips, touching, closure))
+        for i, row in enumerate(rows.tolist()):
+            if self._parts[row]:
+                hand = Hand(tips[i], felt[i], float(shut[i]))
+                for part in self._parts[row]:
+                    self._follow(part, seen[i, part.column], self._hands[row], hand)
+                    if part.value is not None:
+                        seen[i, part.column] = part.joint.pose(part.value)[0]
+                self._hands[row] = hand
+        return constant(seen, estimate)
+
+    @staticmethod
+    def _follow(part: Part, seen: Array, before: Hand | None, hand: Hand) -> None:
+        if part.value is None or part.sensed:
+            if np.isfinite(seen).all():
+                part.value = part.joint.value(seen[None])
+            return
+        if before is None:
+            return
+        both = before.touching & hand.touching
+        if not both.any():
+            return
+        pose = part.joint.pose(part.value)[0]
+        was, now = before.tips[both].mean(axis=0), hand.tips[both].mean(axis=0)
+        if not _moves(part.model, pose, before, both):
+            return
+        moved = part.joint.shift(part.value, was[None], now[None])
+        low, high = part.joint.limits[:, 0], part.joint.limits[:, 1]
+        part.value = np.clip(part.value + moved, low, high)
+
+
+def _moves(model: ObjectModel, pose: Array, hand: Hand, touching: Array) -> bool:
+    """Whether a hand moves a part along: it holds it, or touches it as a fist."""
+    solid = model.solid
+    if solid is None:
+        return False
+    if int(touching.sum()) > 1 and len(solid.grips.points):
+        middle = hand.tips.mean(axis=0)
+        away = poses.transform(pose[None], solid.grips.points) - middle
+        if float(np.linalg.norm(away, axis=-1).min()) < HELD:
+            return True
+    if hand.closure < FIST:
+        return False
+    local = poses.transform(poses.inverse(pose)[None], hand.tips[touching])
+    return any(_distance(piece, local) < TOUCHED for piece in solid.pieces)
+
+
+def _distance(corners: Array, points: Array) -> float:
+    """Metres from the nearest of points ``(n, 3)`` to the upright box about corners ``(m, 3)``."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    out = np.maximum(np.maximum(low - points, points - high), 0.0)
+    return float(np.linalg.norm(out, axis=-1).min())

@@ -1,0 +1,118 @@
+"""Goals of parts of fixtures: ``open`` at least so far, ``shut``, or ``set`` to a value.
+
+Such a part may be held at the end: who opens a door often keeps it in the hand.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.joints import JointModel, Joints
+from bt_tasksim.core.outcomes import Reason, register_reason
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import METRES, RADIANS, Unit
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
+from bt_tasksim.scene.specs import Goal
+
+OPEN = 0.8
+"""Share of its way by which a part has to be open where a goal does not say how far."""
+SHUT = {"slide": 0.005, "hinge": math.radians(2.0)}
+"""Metres or radians within which a part is shut."""
+
+
+def _pair(name: str, sentence: str) -> dict[str, Reason]:
+    """One reason for what slides and one for what turns, which have other units."""
+    units: dict[str, Unit] = {"slide": METRES, "hinge": RADIANS}
+    return {
+        kind: register_reason(f"{name}_{kind}", sentence, value=unit, wanted=unit)
+        for kind, unit in units.items()
+    }
+
+
+IS_OPEN = _pair("open", "{object} is open by {value}, at least {wanted} were asked for")
+NOT_OPEN = _pair("not_open", "{object} is open by {value}, and not by {wanted}")
+IS_SHUT = _pair("shut", "{object} is shut: open by {value}, and up to {wanted} count")
+NOT_SHUT = _pair("not_shut", "{object} is not shut: open by {value}, and only up to {wanted} count")
+IS_SET = _pair("set", "{object} stands at {value}, and should at {wanted}")
+NOT_SET = _pair("not_set", "{object} stands at {value}, and not at {wanted}")
+
+
+class JointGoal(GoalRelation):
+    """A goal of a part of a fixture."""
+
+    needs_place = False
+
+    @staticmethod
+    def joint(goal: Goal, final: FinalState) -> tuple[JointModel, float]:
+        """The part's joint, and how far it truly is open.
+
+        Raises:
+            InputError: The goal's object is none.
+        """
+        joint = final.model(goal.object).joint
+        if joint is None:
+            raise InputError(
+                f"the goal '{goal.relation}' is one of parts of fixtures, such as a drawer, and "
+                f"'{goal.object}' is a free object"
+            )
+        return joint, float(Joints.of([joint]).value(final.pose(goal.object)[None])[0])
+
+    @staticmethod
+    def tolerance(goal: Goal, joint: JointModel) -> float:
+        """What the goal allows, metres or radians."""
+        return goal.angle_tolerance if joint.turns else goal.position_tolerance
+
+    @staticmethod
+    def placement(
+        reached: bool, reason: Reason, goal: Goal, joint: JointModel, value: float, off: float, wanted: float
+    ) -> Placement:
+        """The answer; what is missing stands as an error of position or of angle."""
+        outcome = reason(object=goal.object, value=value, wanted=wanted)
+        nothing = float(np.nan)
+        return Placement(reached, outcome, nothing if joint.turns else off, off if joint.turns else nothing)
+
+
+@register("goal relation", "open")
+class Open(JointGoal):
+    """Open by ``value`` at least, up to the goal's tolerance; by default by most of its way."""
+
+    def evaluate(self, goal: Goal, final: FinalState) -> Placement:
+        """See `GoalRelation.evaluate`."""
+        joint, value = self.joint(goal, final)
+        low, high = joint.limits
+        wanted = low + OPEN * (high - low) if goal.value is None else goal.value
+        off = max(wanted - value, 0.0)
+        reached = off <= self.tolerance(goal, joint) if goal.value is not None else off <= 0.0
+        reason = (IS_OPEN if reached else NOT_OPEN)[joint.kind]
+        return self.placement(reached, reason, goal, joint, value, off, wanted)
+
+
+@register("goal relation", "shut")
+class Shut(JointGoal):
+    """Shut, up to some millimetres or degrees."""
+
+    def evaluate(self, goal: Goal, final: FinalState) -> Placement:
+        """See `GoalRelation.evaluate`."""
+        joint, value = self.joint(goal, final)
+        off, allowed = value - joint.limits[0], SHUT[joint.kind]
+        reached = off <= allowed
+        reason = (IS_SHUT if reached else NOT_SHUT)[joint.kind]
+        return self.placement(reached, reason, goal, joint, value, off, allowed)
+
+
+@register("goal relation", "set")
+class SetTo(JointGoal):
+    """Open by ``value``, up to the goal's tolerance."""
+
+    def evaluate(self, goal: Goal, final: FinalState) -> Placement:
+        """See `GoalRelation.evaluate`."""
+        joint, value = self.joint(goal, final)
+        if goal.value is None:
+            raise InputError(f"the goal 'set' of '{goal.object}' needs a 'value', how far it should be open")
+        off = abs(value - goal.value)
+        reached = off <= self.tolerance(goal, joint)
+        reason = (IS_SET if reached else NOT_SET)[joint.kind]
+        return self.placement(reached, reason, goal, joint, value, off, goal.value)
