@@ -15,6 +15,7 @@ from bt_tasksim.scene.fixtures import Fixture, FixturePart
 from bt_tasksim.scene.geometry import BoxPiece
 from bt_tasksim.scene.grips import GivenGrip
 from bt_tasksim.scene.joints import Joint
+from bt_tasksim.scene.part_kind import PART
 
 UNDER = "table"
 """The place that parts are taken to stand on: it is in every scene."""
@@ -51,7 +52,7 @@ def part_actor(fixture: Fixture, part: FixturePart, value: float) -> ObjectActor
     )
     return ObjectActor(
         name=part.name,
-        kind="part",
+        kind=PART,
         size=_vector(high - low),
         exponents=(1.0, 1.0),
         mass=part.mass,

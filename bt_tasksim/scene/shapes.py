@@ -16,6 +16,7 @@ from bt_tasksim.core.registry import part, parts
 from bt_tasksim.core.world import ObjectModel
 from bt_tasksim.scene.geometry import BoxPiece, ConvexPiece, Piece, Shape, ShapeSize, Size
 from bt_tasksim.scene.grips import GivenGrip, Grips
+from bt_tasksim.scene.part_kind import PART, PartKind
 from bt_tasksim.scene.shape_kind import ShapeKind
 
 __all__ = [
@@ -57,7 +58,7 @@ def shape_kind(name: str) -> ShapeKind:
     Raises:
         InputError: There is no such kind; says which are near.
     """
-    return _made(part("shape", name))
+    return _made(PartKind if name == PART else part("shape", name))
 
 
 def shape(kind: str, size: ShapeSize) -> Shape:

@@ -6,7 +6,6 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.registry import register
 from bt_tasksim.scene import meshes
 from bt_tasksim.scene.geometry import BoxPiece, Shape, ShapeSize, polygon
 from bt_tasksim.scene.grips import Grips
@@ -14,8 +13,10 @@ from bt_tasksim.scene.meshes import TriangleMesh
 from bt_tasksim.scene.shape_kind import ShapeKind
 from bt_tasksim.scene.surfaces import PrismSurface
 
+PART = "part"
+"""The name of this kind: no object of a scene is of it, but the parts of its fixtures are."""
 
-@register("shape", "part")
+
 class PartKind(ShapeKind):
     """A drawer, a door, a knob: it comes with its fixture, and is held where the fixture says."""
 
@@ -28,7 +29,7 @@ class PartKind(ShapeKind):
         if not size.boxes:
             raise InputError(
                 "an object of kind 'part' is a part of a fixture, and comes with it: put the fixture into "
-                "the scene, such as fixtures=['drawer']"
+                "the scene, such as fixtures=['chest']"
             )
 
     def shape(self, size: ShapeSize) -> Shape:
