@@ -29,7 +29,7 @@ FIST = 0.9
 
 
 @dataclass(eq=False)
-class Part:
+class TrackedPart:
     """One part in one world.
 
     Attributes:
@@ -52,7 +52,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Hand:
+class HandContact:
     """A hand at one instant, in one world: its tips ``(n_tips, 3)``, which of them touch, its closure."""
 
     tips: Array
@@ -68,8 +68,8 @@ class Parts:
     """
 
     def __init__(self, n: int) -> None:
-        self._parts: list[list[Part]] = [[] for _ in range(n)]
-        self._hands: list[Hand | None] = [None] * n
+        self._parts: list[list[TrackedPart]] = [[] for _ in range(n)]
+        self._hands: list[HandContact | None] = [None] * n
         self._any = False
 
     def reset(self, rows: Sequence[int] | np.ndarray, configurations: Sequence[ActorConfiguration]) -> None:
@@ -80,7 +80,7 @@ class Parts:
                 if actor.joint is not None:
                     model = actor.model()
                     assert model.joint is not None
-                    found.append(Part(column, model, Joints.of([model.joint])))
+                    found.append(TrackedPart(column, model, Joints.of([model.joint])))
             self._parts[row], self._hands[row] = found, None
         self._any = any(self._parts)
 
@@ -101,7 +101,7 @@ class Parts:
         seen, tips, felt, shut = (np.array(host(v)) for v in (estimate, state.tips, touching, closure))
         for i, row in enumerate(rows.tolist()):
             if self._parts[row]:
-                hand = Hand(tips[i], felt[i], float(shut[i]))
+                hand = HandContact(tips[i], felt[i], float(shut[i]))
                 for part in self._parts[row]:
                     self._follow(part, seen[i, part.column], self._hands[row], hand)
                     if part.value is not None:
@@ -110,7 +110,7 @@ class Parts:
         return constant(seen, estimate)
 
     @staticmethod
-    def _follow(part: Part, seen: Array, before: Hand | None, hand: Hand) -> None:
+    def _follow(part: TrackedPart, seen: Array, before: HandContact | None, hand: HandContact) -> None:
         if part.value is None or part.sensed:
             if np.isfinite(seen).all():
                 part.value = part.joint.value(seen[None])
@@ -129,7 +129,7 @@ class Parts:
         part.value = np.clip(part.value + moved, low, high)
 
 
-def _moves(model: ObjectModel, pose: Array, hand: Hand, touching: Array) -> bool:
+def _moves(model: ObjectModel, pose: Array, hand: HandContact, touching: Array) -> bool:
     """Whether a hand moves a part along: it holds it, or touches it as a fist."""
     solid = model.solid
     if solid is None:
