@@ -17,8 +17,8 @@ docs/taxonomy.md, so that no number is typed by hand. Results are what the measu
   ``python -m benchmarks.faults``, ``loop.json`` by ``python -m benchmarks.loop``;
 - ``any_tree-<robot>[-...].json`` by ``python -m benchmarks.any_tree``, ``five-<tree>-<robot>.json`` by
   ``python -m benchmarks.any_tree.five``;
-- ``taxonomy.json``: of each scenario of `docs/taxonomy.md` what a sealed evaluation found, see
-  `benchmarks.taxonomy_table`;
+- ``concept-<scenario>-<robot>-<engine>.json`` by ``python -m benchmarks.concepts``, which stand in
+  docs/taxonomy.md;
 - ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
 
 ``--check`` changes nothing and fails when a table is not up to date.
@@ -56,7 +56,7 @@ KINDS = ("camera", "fromlogs")
 OTHER = ("speed", "decomposition", "learning", "remote", "faults", "loop", "planning", "taxonomy")
 APART = (
     *("oracle-", "grasp-", "experiment-", "training-", "gap-", "logs-", "decomposition-"),
-    *("any_tree-", "five-"),
+    *("any_tree-", "five-", "concept-"),
 )
 """How results begin whose tables are made in `learned_tables`, `robot_tables`, `any_tree_tables` and
 `experiments.pages`."""

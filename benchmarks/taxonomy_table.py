@@ -1,9 +1,8 @@
 """The table of docs/taxonomy.md: classes, tasks, their nodes, an example each, and what was measured.
 
 Classes, tasks and nodes come from `bt_tasksim.concept_nodes.contact_tasks`, examples from the ready-made
-scenarios: of those in whose tree a node stands the one with the fewest leaves. Measured successes are from
-``benchmarks/results/taxonomy.json``: by scenario and column of `COLUMNS`, such as
-``{"pick_and_place": {"panda sapien": {"successes": 99, "episodes": 100}}}``.
+scenarios: of those in whose tree a node stands the one with the fewest leaves. Measured successes are what
+`benchmarks.concepts` found on the last block, ``concept-<scenario>-<robot>-<engine>.json``.
 """
 
 from __future__ import annotations
@@ -17,23 +16,21 @@ from bt_tasksim.trees.load import load_source, scenarios
 from bt_tasksim.trees.walk import nodes_of
 
 COLUMNS = {
-    "panda sapien": "Panda, SAPIEN",
-    "panda mujoco": "Panda, MuJoCo",
-    "xarm7_ability sapien": "Ability hand, SAPIEN",
+    "panda-sapien": "Panda, SAPIEN",
+    "panda-mujoco": "Panda, MuJoCo",
+    "xarm7_ability-sapien": "Ability hand, SAPIEN",
 }
 
 
 def taxonomy(results: dict[str, Any]) -> str:
     """The table."""
-    measured = results.get("taxonomy") or {}
     lines = [
         f"| motion | class | task | contact | node | example | {' | '.join(COLUMNS.values())} |",
         f"|{'---|' * (6 + len(COLUMNS))}",
     ]
     for each in tasks():
         example = _example(each.node) if each.node else ""
-        found = measured.get(example, {})
-        cells = [_said(found.get(column)) for column in COLUMNS]
+        cells = [_said(results.get(f"concept-{example}-{column}")) for column in COLUMNS]
         change = f"{each.before.name} to {each.after.name}"
         task = f"{each.change.value}: {each.name.replace('_', ' ')}"
         lines.append(
@@ -43,7 +40,7 @@ def taxonomy(results: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _said(found: dict[str, int] | None) -> str:
+def _said(found: dict[str, Any] | None) -> str:
     return "" if found is None else f"{found['successes']} of {found['episodes']}"
 
 
