@@ -150,7 +150,8 @@ def _one(row: Row, options: argparse.Namespace) -> None:
     force, jerk, overlap = (found.get(what, {}) for what in ("force", "jerk", "overlap"))
     print(
         f"{row.name:45} {found['successes']:4d} of {found['episodes']}   "
-        f"wrist {force.get('largest', 0):.0f} N, jerk {jerk.get('largest', 0):.0f} m/s^3, overlap {1000 * overlap.get('largest', 0):.1f} mm  "
+        f"wrist {force.get('largest', 0):.0f} N, jerk {jerk.get('largest', 0):.0f} m/s^3, "
+        f"overlap {1000 * overlap.get('largest', 0):.1f} mm  "
         f"{found['reasons']}",
         flush=True,
     )
