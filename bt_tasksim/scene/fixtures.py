@@ -236,7 +236,8 @@ def _put(fixture: Fixture, spec: FixtureSpec) -> Fixture:
     if spec.at is not None:
         position = (*spec.at, *position[len(spec.at) :])
     if spec.yaw is not None:
-        turn = tuple(float(v) for v in poses.yaw(spec.yaw))
+        heading = sum(spec.yaw) / 2 if isinstance(spec.yaw, tuple) else spec.yaw
+        turn = tuple(float(v) for v in poses.yaw(heading))
     name, places, parts = fixture.name, fixture.places, fixture.parts
     if spec.name:
         parts = tuple(

@@ -20,6 +20,7 @@ from bt_tasksim.scene.fixture_overlap import check_fixtures
 from bt_tasksim.scene.fixtures import load_fixture
 from bt_tasksim.scene.goal_functions import GoalFunction, Judge
 from bt_tasksim.scene.parts import draw_parts
+from bt_tasksim.scene.placing import draw_fixtures
 from bt_tasksim.scene.specs import FixtureSpec, Goal, HandStart, ObjectSpec, SpotSpec, object_spec
 from bt_tasksim.scene.starts import check_hollows, draw_order
 
@@ -288,7 +289,7 @@ class Scene:
 
     def _draw(self, seed: int, stream: str, taught: CurriculumStage | None) -> ActorConfiguration:
         rng = generator(seed, stream, "scene")
-        fixtures = tuple(load_fixture(name) for name in self.fixtures)
+        fixtures = draw_fixtures(self.fixtures, generator(seed, stream, "fixtures"))
         places = {p.name: p for f in fixtures for p in f.place_models()}
         for spot in self.spots:
             places[spot.name] = sampling.draw_spot(spot, places, rng)

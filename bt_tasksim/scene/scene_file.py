@@ -92,7 +92,12 @@ def _fixture(entry: str | FixturePlacement, file: Path) -> str | FixtureSpec:
         return _named(entry, file, "a fixture file")
     at = None if entry.at is None else (entry.at[0], entry.at[1], *entry.at[2:3])
     return FixtureSpec(
-        _named(entry.fixture, file, "a fixture file"), at, entry.yaw, entry.name or "", entry.sensed
+        _named(entry.fixture, file, "a fixture file"),
+        at,
+        entry.yaw,
+        entry.name or "",
+        entry.area,
+        entry.sensed,
     )
 
 

@@ -20,7 +20,7 @@ from bt_tasksim.core.typed_file import (
     known_values,
 )
 from bt_tasksim.scene.object_schema import ObjectFile
-from bt_tasksim.scene.spec_fields import Distance, Extents, Gap, Heading, Headings, Position
+from bt_tasksim.scene.spec_fields import Distance, Extents, FixtureHeading, Gap, Headings, Position
 from bt_tasksim.scene.specs import OLD_RELATION
 
 
@@ -86,8 +86,12 @@ class FixturePlacement(Model):
     """A bundled fixture, or a fixture file in this file's folder or below."""
     at: Position | None = None
     """Where its origin is, x y or x y z, robot base frame, m; by default where its file says."""
-    yaw: Heading | None = None
-    """Its heading in the robot base frame, rad; by default that of its file."""
+    yaw: FixtureHeading | None = None
+    """Its heading in the robot base frame, rad, or the lowest and the highest; by default that of its file.
+    """
+    area: Extents = (0.0, 0.0)
+    """Half sizes of the rectangle about `at` in which its origin is drawn, m; by default it is always there.
+    """
     name: Name | None = None
     """Its own name; its places and parts are called by it, too: `<name>`, or `<name>_<place>`."""
     sensed: Switch | None = None

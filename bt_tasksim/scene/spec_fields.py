@@ -119,13 +119,23 @@ class SpotFields(Model):
     yaw: Headings
 
 
+FixtureHeading = Annotated[
+    Annotated[Heading, Tag("~heading")]
+    | Annotated[
+        tuple[Heading, Heading], Field(strict=False), sized(2), AfterValidator(_in_order), Tag("~range")
+    ],
+    Discriminator(lambda value: "~range" if isinstance(value, list | tuple) else "~heading"),
+]
+
+
 class FixtureFields(Model):
     """The fields of `bt_tasksim.scene.specs.FixtureSpec`."""
 
     fixture: FilePath
     at: Position | None
-    yaw: Heading | None
+    yaw: FixtureHeading | None
     name: str
+    area: Extents
     sensed: Switch | None
 
 

@@ -189,7 +189,10 @@ class FixtureSpec:
         fixture: Name of a bundled fixture, or path of a data file.
         at: Where its origin is ``(x, y)`` or ``(x, y, z)``, robot base frame, metres; None for where its file
             says.
-        yaw: Its heading in the robot base frame, radians; None for the file's.
+        yaw: Its heading in the robot base frame, radians, or the lowest and the highest one that it may have;
+            None for the file's.
+        area: Half sizes ``(2,)`` in metres of the rectangle about ``at``, along the axes of the robot base
+            frame, in which its origin is drawn; by default it is always there.
         name: Its own name, where the same fixture is there several times. The place that has the fixture's
             name gets this one, and other places ``<name>_<place>``; its parts likewise.
         sensed: The robot sees how far its parts are open; None for what the file says.
@@ -200,8 +203,9 @@ class FixtureSpec:
 
     fixture: str
     at: tuple[float, ...] | None = None
-    yaw: float | None = None
+    yaw: float | tuple[float, float] | None = None
     name: str = ""
+    area: tuple[float, float] = (0.0, 0.0)
     sensed: bool | None = None
 
     def __post_init__(self) -> None:
