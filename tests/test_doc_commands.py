@@ -54,6 +54,7 @@ QUICK = {
     "benchmarks.planning": "--quick",
     "benchmarks.batch": "--quick --worlds 2 --episodes 2 --trees 20",
     "benchmarks.cluster": "--times 1 --episodes 12",
+    "benchmarks.concepts": "--only grasp_then_pick --robots panda --engines sapien --episodes 1 --workers 1",
     "benchmarks.decomposition": "--seeds 1",
     "benchmarks.experiments": "--pictures pictures",
     "benchmarks.gap": "--episodes 1 --scenarios shelf_to_shelf --grasps programmed --engines sapien",
@@ -65,6 +66,7 @@ QUICK = {
     "benchmarks.sealed": "",
     "benchmarks.success": "--episodes 1 --workers 1 --seed 1010000",
     "benchmarks.tables": "--check",
+    "bt_tasksim.execution.performed": "--episodes 1 --seed 500003",
     "demos_decomp.synthetic": "--out demonstrations",
 }
 """What makes a module's measurement quick; it overrides what the documentation says."""
