@@ -66,6 +66,7 @@ QUICK = {
     "benchmarks.sealed": "",
     "benchmarks.success": "--episodes 1 --workers 1 --seed 1010000",
     "benchmarks.tables": "--check",
+    "benchmarks.taxonomy": "--sets 200",
     "bt_tasksim.execution.performed": "--episodes 1 --seed 500003",
     "demos_decomp.synthetic": "--out demonstrations",
 }
