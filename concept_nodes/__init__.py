@@ -13,8 +13,10 @@ from bt_tasksim.concept_nodes.hand_conditions import HandEmpty, Lifted, Over, Ov
 from bt_tasksim.concept_nodes.in_contact import InContact
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
+from bt_tasksim.concept_nodes.pour import Pour
 from bt_tasksim.concept_nodes.release import Release
 from bt_tasksim.concept_nodes.settle import Settle
+from bt_tasksim.concept_nodes.turned_conditions import Emptied
 from bt_tasksim.concept_nodes.wait import Wait
 from bt_tasksim.concept_nodes.withdraw import Withdraw
 from bt_tasksim.core.registry import parts
@@ -26,6 +28,7 @@ __all__ = [
     "Beside",
     "Bring",
     "Clear",
+    "Emptied",
     "Grasp",
     "HandEmpty",
     "Holding",
@@ -36,6 +39,7 @@ __all__ = [
     "OverBeside",
     "Pick",
     "Place",
+    "Pour",
     "Release",
     "Settle",
     "StandsOn",

@@ -11,6 +11,7 @@ import numpy as np
 from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept_nodes.closer import HIGHER
 from bt_tasksim.concept_nodes.holding import HOLDING
+from bt_tasksim.concept_nodes.turning import led
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
@@ -37,7 +38,8 @@ class Around:
 
     def __init__(self, view: WorldView, target: str, closer: float) -> None:
         self.view, self.target = view, target
-        self.things, self.now = view.things([target], closer=closer), view.objects[target]
+        self.things = view.things([target, *view.contents(target)], closer=closer)
+        self.now = view.objects[target]
         self.workspace = bounds(view.robot, view.tool)
         self._hands: dict[float, HandCollisions] = {}
         self._asked: tuple[bytes, float] | None = None
@@ -75,13 +77,14 @@ class Served:
     def __init__(self, around: Around, aim: Aim, aside: bool, higher: bool) -> None:
         self._around, self._aim = around, aim
         ends = aim.aside if aside and aim.aside is not None and len(aim.aside) else aim.poses
-        falls = (0.0, *HIGHER) if higher and not aim.on_the_way else (0.0,)
+        falls = (0.0, *HIGHER) if higher and not aim.on_the_way and aim.onwards is None else (0.0,)
         self._poses = np.concatenate([poses.shifted(ends, np.array([0.0, 0.0, above])) for above in falls])
         self.words = aim.words
         full = len(around.view.arm) >= FULL
         self._leans = LEANS if full or not aim.on_the_way else SWAYS
         self.screens, self.why = False, ""
         self._asked, self._tools = (b"", b""), np.zeros((0, 7))
+        self._onwards = np.zeros((0, 0, 7))  # tool poses from each of those on
 
     def by(self, goal: Array, hand: Array, turns: Sequence[float] = ()) -> bool:
         """Whether a grasp at a tool pose ``(7,)`` serves it, also turned about the tool's x axis.
@@ -101,22 +104,30 @@ class Served:
             others = [_turned(tool, angle) for angle in turns]
             return all(alone.free(other) and reached(other) for other in others)
 
-        return any(reached(tool) and turned(tool) for tool in tools)
+        if self._aim.onwards is None:
+            return any(reached(tool) and turned(tool) for tool in tools)
+        goes_on = zip(tools, self._onwards, strict=True)
+        return any(turned(tool) and led(finder, tool, on, self._leans) is not None for tool, on in goes_on)
 
     def tools(self, goal: Array, hand: Array) -> Array:
         """Tool poses ``(k, 7)`` at which it is served where the hand alone touches nothing, see `by`."""
         asked = goal.tobytes(), hand.tobytes()
         if asked != self._asked:
             around = self._around
-            every = poses.multiply(self._possible, poses.relative(around.now, goal)[None])
+            grip = poses.relative(around.now, goal)
+            every = poses.multiply(self._possible, grip[None])
+            which = np.flatnonzero(beyond(around.workspace, every) == 0.0)
             some, self.why = len(every), ""
-            every = every[beyond(around.workspace, every) == 0.0]
-            if some and not len(every):
+            if some and not len(which):
                 self.why = f" (outside the workspace of '{around.view.robot.name}')"
             elif self.screens and some:
-                every = every[~reach_of(around.view.robot).beyond(every, self._leans)]
-                self.why = "" if len(every) else " (out of reach)"
-            self._asked, self._tools = asked, every[around.alone(hand).which_free(every)]
+                which = which[~reach_of(around.view.robot).beyond(every[which], self._leans)]
+                self.why = "" if len(which) else " (out of reach)"
+            which = which[around.alone(hand).which_free(every[which])]
+            self._asked, self._tools = asked, every[which]
+            if self._aim.onwards is not None:
+                on = self._aim.onwards[self._which[which]]
+                self._onwards = poses.multiply(on, grip[None, None])
         return self._tools
 
     def far(self, tools: Array) -> Array:
@@ -127,15 +138,20 @@ class Served:
         far = [reach.far(poses.multiply(pose[None], grips)) for pose in some]
         return np.min(far, axis=0) if far else np.zeros(len(tools))
 
-    @cached_property
+    @property
     def _possible(self) -> Array:
         """Poses ``(k, 7)`` of the aim in which the object alone touches nothing, whoever holds it."""
+        found: Array = self._poses[self._which]
+        return found
+
+    @cached_property
+    def _which(self) -> Array:
+        """The numbers ``(k,)`` of those poses."""
         view, things, target = self._around.view, self._around.things, self._around.target
         alone = Held(target, STILL, pieces_of(view.model(target)))
         leave = Leave(held=self._aim.supports)
         object_ = HandCollisions(bodies_of(view.robot), None, things, alone, leave)
-        found: Array = self._poses[object_.which_free(self._poses)]
-        return found
+        return np.flatnonzero(object_.which_free(self._poses))
 
 
 def aims_of(view: WorldView, target: str, later: Sequence[Any]) -> list[Aim]:

@@ -19,9 +19,12 @@ from bt_tasksim.planning.surroundings import adrift, pieces_of, things_of
 from bt_tasksim.planning.things import Held, Leave, Thing
 from bt_tasksim.planning.ways import WayFinder
 from bt_tasksim.robot.description import RobotDescription
+from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject, beyond_hollow
 
 AT_HAND = 0.05
 """Metres beyond its own size within which the hand may hold an object."""
+WITHIN = 0.003
+"""Metres outside a hollow at which something may seem to be that lies in it."""
 PALM = 0.005
 """Metres that a palm keeps from what its fingers close on, since the estimate may be wrong."""
 
@@ -67,6 +70,22 @@ class WorldView(NamedTuple):
             grip = poses.relative(self.tool, self.objects[name])
         return Held(name, grip, pieces_of(self.model(name)))
 
+    def contents(self, name: str) -> list[str]:
+        """Names of what seems to lie in the hollow of an object, and moves with it."""
+        model, pose = self.model(name), self.objects[name]
+        boxes = np.zeros((0, 6)) if model.solid is None else model.solid.hollow
+        if not len(boxes) or not np.isfinite(pose).all():
+            return []
+        hollow = Hollow(pose[None], boxes[None])
+        found = []
+        for other, at in self.objects.items():
+            if other != name and np.isfinite(at).all():
+                corners = np.concatenate(pieces_of(self.model(other)))
+                body = PlacedObject(at[None], corners[None], np.array([self.model(other).cubic]))
+                if float(beyond_hollow(body, hollow)[0]) <= WITHIN:
+                    found.append(other)
+        return found
+
     def things(
         self, without: Collection[str] = (), closer: float = 0.0, taken: str = "", palm: bool = True
     ) -> list[Thing]:
@@ -100,7 +119,7 @@ class WorldView(NamedTuple):
 
         Args:
             without: Objects that are not looked at.
-            held: What is in the hand.
+            held: What is in the hand; what lies in that moves with it.
             leave: What may touch.
             closer: Share from 0 to 1 by which one may come closer to things than usual.
             hand: The hand's joints ``(n_hand,)``, by default the present ones.
@@ -108,11 +127,12 @@ class WorldView(NamedTuple):
             palm: Around that there is room that only fingers may enter, see `things`.
             own: Metres that the robot's own bodies keep from each other.
         """
+        within = () if held is None or held.name not in self.objects else self.contents(held.name)
         return WayFinder(
             self.robot,
             self.arm,
             self.hand if hand is None else hand,
-            self.things(without, closer, taken, palm),
+            self.things([*without, *within], closer, taken, palm),
             held,
             leave,
             own,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Hashable
 
 import numpy as np
 
-from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.transfer import sent
 from bt_tasksim.core.world import ObjectModel
@@ -80,6 +80,25 @@ class Estimates(Whereabouts):
         padded = [rows[np.minimum(np.arange(most), len(rows) - 1)] for rows in found]
         (there,) = sent([np.stack(padded)], self._seen.tool)
         return there
+
+
+class Truth(Estimates):
+    """Where everything truly is, with the geometry that objects are taken to have."""
+
+    def __init__(self, known: Known) -> None:
+        super().__init__(_AsSeen(known))  # type: ignore[arg-type]  # it has what is asked for
+
+
+class _AsSeen:
+    """The hidden state as a view that `Estimates` looks at."""
+
+    def __init__(self, known: Known) -> None:
+        self.world, self.tool = known.world, known.hidden.tool_pose
+        self.object, self.place, self.model = known.object, known.place, known.world.object
+
+    def once(self, key: Hashable, make: Callable[[], Array]) -> Array:
+        """See `Seen.once`; nobody asks twice."""
+        return make()
 
 
 def _outer(model: ObjectModel) -> Array:

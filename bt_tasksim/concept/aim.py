@@ -16,6 +16,8 @@ class Aim(NamedTuple):
         supports: Names of what the target touches there.
         on_the_way: It is only passed there, so an arm of few joints may lean it.
         aside: Other ones ``(m, 7)`` that will do where none of these is possible.
+        onwards: Poses ``(k, n, 7)`` through which the target goes on from each of ``poses``, as it is turned;
+            none where it stays there.
     """
 
     poses: Array
@@ -23,3 +25,4 @@ class Aim(NamedTuple):
     supports: frozenset[str] = frozenset()
     on_the_way: bool = False
     aside: Array | None = None
+    onwards: Array | None = None

@@ -61,7 +61,19 @@ class ConvexPiece:
         return self.vertices
 
 
-Piece = BoxPiece | ConvexPiece
+@dataclass(frozen=True, eq=False)
+class BallPiece:
+    """A ball: its middle ``(3,)`` in the object's frame and its radius, metres. Physics has it round."""
+
+    middle: Array
+    radius: float
+
+    def corners(self) -> Array:
+        """Points ``(n, 3)`` all over it, in the object's frame, metres, those on its axes among them."""
+        return self.middle + self.radius * meshes.on_unit_ball()
+
+
+Piece = BoxPiece | ConvexPiece | BallPiece
 
 
 @dataclass(frozen=True, eq=False)

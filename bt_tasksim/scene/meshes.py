@@ -5,6 +5,7 @@ Faces are counter-clockwise seen from outside. Everything is in metres.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -143,6 +144,33 @@ def cup(radius: float, height: float, wall: float, base: float, segments: int = 
         [inner, h - wall / 2], [inner, -h + base + bevel], [inner - bevel, -h + base], [0, -h + base],
     ]  # fmt: skip
     return loft(circle(segments), np.array(profile))
+
+
+@lru_cache(maxsize=1)
+def on_unit_ball() -> Array:
+    """Points ``(62, 3)`` all over the unit ball, those on its axes among them."""
+    corners = cube_sphere(3).vertices
+    corners = corners / np.linalg.norm(corners, axis=1, keepdims=True)
+    found: Array = np.concatenate([corners, np.eye(3), -np.eye(3)])
+    found.setflags(write=False)
+    return found
+
+
+def hulls(pieces: Sequence[Array]) -> TriangleMesh:
+    """The surfaces of the convex hulls of pieces, each given by its corners ``(n, 3)``, in one mesh."""
+    from scipy.spatial import ConvexHull
+
+    vertices, faces, count = [], [], 0
+    for piece in pieces:
+        found = ConvexHull(piece)
+        corners = piece[found.simplices]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        inwards = np.sum(normals * found.equations[:, :3], axis=1) < 0.0
+        turned = np.where(inwards[:, None], found.simplices[:, ::-1], found.simplices)
+        vertices.append(np.asarray(piece, float))
+        faces.append(turned + count)
+        count += len(piece)
+    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces))
 
 
 @lru_cache(maxsize=8)

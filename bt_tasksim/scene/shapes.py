@@ -14,13 +14,14 @@ from bt_tasksim.core.joints import JointModel
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import part, parts
 from bt_tasksim.core.world import ObjectModel
-from bt_tasksim.scene.geometry import BoxPiece, ConvexPiece, Piece, Shape, ShapeSize, Size
+from bt_tasksim.scene.geometry import BallPiece, BoxPiece, ConvexPiece, Piece, Shape, ShapeSize, Size
 from bt_tasksim.scene.grips import GivenGrip, Grips
 from bt_tasksim.scene.part_kind import PART, PartKind
 from bt_tasksim.scene.shape_kind import ShapeKind
 
 __all__ = [
     "KINDS",
+    "BallPiece",
     "BoxPiece",
     "ConvexPiece",
     "KnownSolid",

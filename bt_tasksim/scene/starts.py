@@ -33,6 +33,9 @@ from bt_tasksim.scene.shape_kind import ShapeKind
 from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject, beyond_hollow
 from bt_tasksim.scene.specs import Goal, ObjectSpec
 
+DEEP = 0.02
+"""Metres from the floor of a hollow up to its rim where something may start in it, if it is that deep."""
+
 
 def draw_order(specs: Mapping[str, ObjectSpec]) -> list[str]:
     """Names in an order in which each comes after the object that it starts on, in or beside.
@@ -110,6 +113,8 @@ class Candidate:
             self.pose[None], outer_corners([p.corners() for p in self.pieces])[None], np.zeros(1, bool)
         )
         boxes = container.shape().hollow
+        depth = boxes[:, 5] - boxes[:, 4]
+        boxes = boxes[depth >= min(DEEP, depth.max(initial=0.0))]  # on a spout nothing stays
         return bool(len(boxes)) and bool(
             beyond_hollow(body, Hollow(np.array(container.pose)[None], boxes[None]))[0] <= 0.0
         )

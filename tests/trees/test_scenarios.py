@@ -22,16 +22,22 @@ def runner_of(name, robot=None, scene=None, tree=None, **options):
     return Runner(tree or source.build(), scene or source.scene, EngineOptions(**options))
 
 
+SLOW = {"pour"}
+"""Scenarios of many contacts, of which one draw has to do."""
+
+
 @pytest.mark.parametrize("name", scenarios())
 def test_it_runs_to_success(name):
-    results = successes(runner_of(name).run, range(7, 12), n=2 if name.startswith("grasp") else 3)
+    count = 1 if name in SLOW else 2 if name.startswith("grasp") else 3
+    results = successes(runner_of(name).run, range(7, 12), n=count)
     for result in results:
         assert result.status == Status.SUCCESS
         verdict = result.verdict
         assert verdict.penetration < 0.002
         if result.configuration.goal.relation == "stands":
             assert verdict.position_error < 0.03 and verdict.angle_error < np.deg2rad(10)
-    assert results[0].verdict.position_error != results[1].verdict.position_error
+    if count > 1:
+        assert results[0].verdict.position_error != results[1].verdict.position_error
 
 
 @pytest.mark.parametrize("name", ["pick_and_place"])

@@ -26,7 +26,7 @@ from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 from bt_tasksim.scene.joint_inertia import value_of
 from bt_tasksim.scene.joints import Joint
-from bt_tasksim.scene.shapes import BoxPiece
+from bt_tasksim.scene.shapes import BallPiece, BoxPiece
 
 if TYPE_CHECKING:
     import mujoco as mj
@@ -225,6 +225,9 @@ def _add_object(
         if isinstance(piece, BoxPiece):
             geom.type = mujoco.mjtGeom.mjGEOM_BOX
             _place(geom, piece.pose, piece.half_size)
+        elif isinstance(piece, BallPiece):
+            geom.type, radius = mujoco.mjtGeom.mjGEOM_SPHERE, piece.radius
+            _place(geom, [*piece.middle, 1.0, 0.0, 0.0, 0.0], [radius, radius, radius])
         else:
             geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, geom.name
             geom.contype = geom.conaffinity = 0

@@ -107,11 +107,13 @@ def _compared(solids: Sequence[Any], placed: Sequence[Any]) -> Any:
 
 
 def _solid(shape: physx.PhysxCollisionShape) -> Any:
-    """A shape as coal's; None for those that are neither boxes nor convex meshes."""
+    """A shape as coal's; None for those that are no boxes, balls or convex meshes."""
     from sapien import physx
 
     if isinstance(shape, physx.PhysxCollisionShapeBox):
         return coal.Box(*(2.0 * np.asarray(shape.half_size, float)))
+    if isinstance(shape, physx.PhysxCollisionShapeSphere):
+        return coal.Sphere(float(shape.radius))
     if isinstance(shape, physx.PhysxCollisionShapeConvexMesh):
         return convex(np.asarray(shape.vertices, float) * np.asarray(shape.scale, float))
     return None

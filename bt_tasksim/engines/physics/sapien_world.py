@@ -13,7 +13,7 @@ from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.physics.sapien_joints import JointedBody, add_part
 from bt_tasksim.engines.physx import start_physx
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
-from bt_tasksim.scene.shapes import BoxPiece
+from bt_tasksim.scene.shapes import BallPiece, BoxPiece
 
 if TYPE_CHECKING:
     import sapien
@@ -167,6 +167,9 @@ def _shapes(world: World, actor: ObjectActor) -> list[physx.PhysxCollisionShape]
         if isinstance(piece, BoxPiece):
             shape: Any = physx.PhysxCollisionShapeBox(list(piece.half_size), material)
             shape.set_local_pose(sapien_pose(piece.pose))
+        elif isinstance(piece, BallPiece):
+            shape = physx.PhysxCollisionShapeSphere(piece.radius, material)
+            shape.set_local_pose(sapien_pose([*piece.middle, 1.0, 0.0, 0.0, 0.0]))
         else:
             vertices = np.asarray(piece.vertices, np.float32)
             shape = physx.PhysxCollisionShapeConvexMesh(vertices, [1.0, 1.0, 1.0], material)
