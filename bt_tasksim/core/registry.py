@@ -48,7 +48,7 @@ HOMES: dict[str, tuple[str, ...]] = {
     "engine/postprocess": ("bt_tasksim.engines.perception", "bt_tasksim.engines.remote.engines"),
     "noise model": ("bt_tasksim.engines.perception.noise",),
     "robot": ("bt_tasksim.robot.bundled",),
-    "fixture": ("bt_tasksim.scene.bundled",),
+    "fixture": ("bt_tasksim.scene.bundled", "bt_tasksim.scene.makers"),
     "shape": ("bt_tasksim.scene.kinds",),
     "log reader": ("bt_tasksim.demos_decomp.readers",),
     "tree node": ("bt_tasksim.trees.nodes",),

@@ -7,16 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.document import Document
+from bt_tasksim.core.errors import FieldError
 from bt_tasksim.core.files import file_version
 from bt_tasksim.core.named_data import named_data
 from bt_tasksim.core.names import check_name
-from bt_tasksim.core.plain import Plain
+from bt_tasksim.core.plain import Plain, shown
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel, is_container
 from bt_tasksim.scene.box import Box
@@ -216,18 +217,65 @@ def _scaled(direction: tuple[float, float, float]) -> tuple[float, float, float]
     return direction if abs(length - 1.0) < ROUNDED else (x / length, y / length, z / length)
 
 
-def load_fixture(name: str | FixtureSpec) -> Fixture:
+class Maker(Protocol):
+    """What makes fixtures by numbers, see `bt_tasksim.scene.fixture_maker.FixtureMaker`."""
+
+    @classmethod
+    def fixture(cls, name: str, parameters: Mapping[str, Any], rng: np.random.Generator | None) -> Fixture:
+        """A fixture as drawn, or the one in the middle of all ranges."""
+
+    @classmethod
+    def check(cls, name: str, parameters: Mapping[str, Any]) -> None:
+        """Check parameters at the ends of their ranges."""
+
+
+def load_fixture(name: str | FixtureSpec, rng: np.random.Generator | None = None) -> Fixture:
     """A fixture by name, one from a data file by path, or one of these where a scene puts it.
 
-    What is registered as a ``fixture`` is the path of its data file, or a `Fixture`.
+    What is registered as a ``fixture`` is the path of its data file, a `Fixture`, or what makes some.
+
+    Args:
+        name: Its name or path, or where a scene puts it.
+        rng: What parameters of a made one are drawn by; None: each is in the middle of its range.
 
     Raises:
         InputError: No such fixture, or the file is not one; says what is wrong and where.
     """
     if isinstance(name, FixtureSpec):
-        return _put(load_fixture(name.fixture), name)
-    found = named_data("fixture", name, Fixture)
-    return found if isinstance(found, Fixture) else _load(found, file_version(found))
+        return _put(_found(name.fixture, name.parameters, rng), name)
+    return _found(name, {}, rng)
+
+
+def is_made(spec: str | FixtureSpec) -> bool:
+    """Whether a fixture is made by numbers, which may differ from world to world."""
+    return not isinstance(_registered(spec if isinstance(spec, str) else spec.fixture), Path | Fixture)
+
+
+def check_parameters(spec: str | FixtureSpec) -> None:
+    """Check the parameters of a fixture, at the ends of their ranges.
+
+    Raises:
+        FieldError: Some are no good, or it takes none.
+    """
+    name, parameters = (spec, {}) if isinstance(spec, str) else (spec.fixture, spec.parameters)
+    found = _registered(name)
+    if not isinstance(found, Path | Fixture):
+        found.check(name, parameters)
+    elif parameters:
+        raise FieldError(f"the fixture '{shown(name)}' is as it is, and has no parameters", "parameters")
+
+
+def _found(name: str, parameters: Mapping[str, Any], rng: np.random.Generator | None) -> Fixture:
+    found = _registered(name)
+    if isinstance(found, Path):
+        return _load(found, file_version(found))
+    return found if isinstance(found, Fixture) else found.fixture(name, parameters, rng)
+
+
+def _registered(name: str) -> Path | Fixture | type[Maker]:
+    """What a name stands for, or the file of a path."""
+    found: Any = named_data("fixture", name, Fixture)
+    return cast("Path | Fixture | type[Maker]", found)
 
 
 def _put(fixture: Fixture, spec: FixtureSpec) -> Fixture:

@@ -29,6 +29,8 @@ class _Body:
 def check_configuration(configuration: ActorConfiguration) -> None:
     """Refuse a world whose objects overlap each other or the fixtures at the start.
 
+    A part of a fixture may be in its own fixture, and in other parts of it: engines let these pass.
+
     Args:
         configuration: The world as drawn.
 
@@ -53,8 +55,11 @@ def check_configuration(configuration: ActorConfiguration) -> None:
         )
         for fixture in configuration.fixtures
     ]
+    owners = [None if actor.joint is None else actor.joint.fixture for actor in configuration.objects]
+    still = [fixture.name for fixture in configuration.fixtures]
     for i, body in enumerate(objects):
-        for other in [*objects[:i], *fixtures]:
+        others = zip([*objects[:i], *fixtures], [*owners[:i], *still], strict=True)
+        for other in (other for other, owner in others if owners[i] is None or owner != owners[i]):
             depth = _overlap(coal, body, other)
             if depth > TOLERANCE:
                 raise InputError(

@@ -1,4 +1,7 @@
-"""Where fixtures stand in a drawn world: where their file or the scene says, or within an area of it."""
+"""Fixtures of a drawn world: those that are made by numbers, and where each stands.
+
+That is where its file or the scene says, or within an area of it.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bt_tasksim.core.errors import NoDrawError
+from bt_tasksim.core.errors import FieldError, NoDrawError
 from bt_tasksim.scene.fixture_overlap import overlap
-from bt_tasksim.scene.fixtures import Fixture, load_fixture
+from bt_tasksim.scene.fixtures import Fixture, is_made, load_fixture
 from bt_tasksim.scene.outlines import TOUCHING
 from bt_tasksim.scene.specs import FixtureSpec
 
@@ -18,25 +21,28 @@ TRIES = 50
 
 
 def draw_fixtures(specs: Sequence[str | FixtureSpec], rng: np.random.Generator) -> tuple[Fixture, ...]:
-    """Fixtures where they stand in one world, none in another.
+    """Fixtures as they are made and where they stand in one world, none in another.
 
     Args:
         specs: What the scene says of them.
         rng: Random numbers.
 
     Raises:
-        NoDrawError: None of 50 draws of where one stands was free.
+        NoDrawError: None of 50 draws of one was free, or its numbers do not fit together.
         InputError: There is no such fixture.
     """
     drawn: list[Fixture] = []
     still = [load_fixture(spec) for spec in specs if not _is_drawn(spec)]
     for spec in specs:
-        if not isinstance(spec, FixtureSpec) or not _is_drawn(spec):
+        if not _is_drawn(spec):
             drawn.append(load_fixture(spec))
             continue
         others = [*still, *(fixture for fixture in drawn if fixture not in still)]
         for _ in range(TRIES):
-            found = load_fixture(_placed(spec, rng))
+            try:
+                found = load_fixture(_placed(spec, rng), rng)
+            except FieldError as error:  # these numbers do not fit together
+                raise NoDrawError(str(error)) from error
             if all(overlap(found, other) <= TOUCHING for other in others):
                 drawn.append(found)
                 break
@@ -49,12 +55,16 @@ def draw_fixtures(specs: Sequence[str | FixtureSpec], rng: np.random.Generator) 
 
 
 def _is_drawn(spec: str | FixtureSpec) -> bool:
-    """Where it stands differs from world to world."""
-    return isinstance(spec, FixtureSpec) and (any(spec.area) or isinstance(spec.yaw, tuple))
+    """What it is, or where it stands, differs from world to world."""
+    return is_made(spec) or (
+        isinstance(spec, FixtureSpec) and (any(spec.area) or isinstance(spec.yaw, tuple))
+    )
 
 
-def _placed(spec: FixtureSpec, rng: np.random.Generator) -> FixtureSpec:
+def _placed(spec: str | FixtureSpec, rng: np.random.Generator) -> str | FixtureSpec:
     """The same fixture at one place."""
+    if not isinstance(spec, FixtureSpec) or not (any(spec.area) or isinstance(spec.yaw, tuple)):
+        return spec
     nominal = load_fixture(spec).pose
     x, y = (float(v + rng.uniform(-1, 1) * half) for v, half in zip(nominal, spec.area, strict=False))
     yaw = spec.yaw

@@ -17,7 +17,7 @@ from bt_tasksim.core.resources import is_file
 from bt_tasksim.scene import sampling
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor, check_seed, generator
 from bt_tasksim.scene.fixture_overlap import check_fixtures
-from bt_tasksim.scene.fixtures import load_fixture
+from bt_tasksim.scene.fixtures import check_parameters, load_fixture
 from bt_tasksim.scene.goal_functions import GoalFunction, Judge
 from bt_tasksim.scene.parts import draw_parts
 from bt_tasksim.scene.placing import draw_fixtures
@@ -410,6 +410,7 @@ def _fixtures(said: Sequence[str | FixtureSpec]) -> tuple[str | FixtureSpec, ...
     out: list[str | FixtureSpec] = ["table"]
     for i, entry in enumerate(said):
         with within("fixtures", i):
+            check_parameters(entry)
             load_fixture(entry)
         if isinstance(entry, FixtureSpec):
             if is_file(entry.fixture):

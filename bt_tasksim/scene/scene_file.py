@@ -98,6 +98,7 @@ def _fixture(entry: str | FixturePlacement, file: Path) -> str | FixtureSpec:
         entry.name or "",
         entry.area,
         entry.sensed,
+        entry.parameters,
     )
 
 

@@ -20,7 +20,15 @@ from bt_tasksim.core.typed_file import (
     known_values,
 )
 from bt_tasksim.scene.object_schema import ObjectFile
-from bt_tasksim.scene.spec_fields import Distance, Extents, FixtureHeading, Gap, Headings, Position
+from bt_tasksim.scene.spec_fields import (
+    Distance,
+    Extents,
+    FixtureHeading,
+    Gap,
+    Headings,
+    Parameters,
+    Position,
+)
 from bt_tasksim.scene.specs import OLD_RELATION
 
 
@@ -96,6 +104,8 @@ class FixturePlacement(Model):
     """Its own name; its places and parts are called by it, too: `<name>`, or `<name>_<place>`."""
     sensed: Switch | None = None
     """The robot sees how far its parts are open; by default as its file says."""
+    parameters: Parameters = {}
+    """Of a made fixture: values, two numbers to draw one between, or words to choose from."""
 
 
 def _fixture_form(value: object) -> str:

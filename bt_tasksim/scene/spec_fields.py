@@ -72,6 +72,26 @@ Position = Annotated[tuple[Coordinate, ...], Field(strict=False), BeforeValidato
 """x y or x y z, metres."""
 
 
+def _parameter_form(value: object) -> str:
+    if isinstance(value, str):
+        return "~word"
+    if not isinstance(value, list | tuple):
+        return "~number"
+    return "~words" if value and all(isinstance(v, str) for v in value) else "~numbers"
+
+
+Word = Annotated[str, Field(min_length=1, max_length=100)]
+Parameter = Annotated[
+    Annotated[Number, Tag("~number")]
+    | Annotated[Word, Tag("~word")]
+    | Annotated[tuple[Number, Number], Field(strict=False), sized(2), Tag("~numbers")]
+    | Annotated[tuple[Word, ...], Field(strict=False, min_length=1, max_length=50), Tag("~words")],
+    Discriminator(_parameter_form),
+]
+"""A value, the lowest and the highest one, or words to choose from."""
+Parameters = Annotated[dict[Word, Parameter], Field(max_length=100)]
+
+
 def _form(value: object) -> str:
     return "~given" if isinstance(value, GivenGrip) else "~entry"
 
@@ -137,6 +157,7 @@ class FixtureFields(Model):
     name: str
     area: Extents
     sensed: Switch | None
+    parameters: Parameters
 
 
 class HandFields(Model):

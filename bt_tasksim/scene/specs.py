@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,14 @@ from bt_tasksim.scene.grips import GivenGrip
 from bt_tasksim.scene.object_file import given_grip, load_object, object_fields, object_file
 from bt_tasksim.scene.object_schema import GraspEntry
 from bt_tasksim.scene.shapes import shape_kind
-from bt_tasksim.scene.spec_fields import FixtureFields, GoalFields, HandFields, ObjectFields, SpotFields
+from bt_tasksim.scene.spec_fields import (
+    FixtureFields,
+    GoalFields,
+    HandFields,
+    ObjectFields,
+    Parameter,
+    SpotFields,
+)
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -196,6 +204,8 @@ class FixtureSpec:
         name: Its own name, where the same fixture is there several times. The place that has the fixture's
             name gets this one, and other places ``<name>_<place>``; its parts likewise.
         sensed: The robot sees how far its parts are open; None for what the file says.
+        parameters: Of a fixture that is made by numbers, by name: a value, two numbers between which each
+            world draws one, or several words of which it chooses one; the others as the fixture says.
 
     Raises:
         FieldError: A number is no good, or the name cannot be one.
@@ -207,6 +217,7 @@ class FixtureSpec:
     name: str = ""
     area: tuple[float, float] = (0.0, 0.0)
     sensed: bool | None = None
+    parameters: Mapping[str, Parameter] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         _keep(self, FixtureFields, "a fixture")

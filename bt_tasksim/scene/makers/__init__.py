@@ -1,0 +1,1 @@
+"""Furniture that is made by numbers, one file for each."""
