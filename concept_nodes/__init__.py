@@ -14,6 +14,8 @@ from bt_tasksim.concept_nodes.in_contact import InContact
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
 from bt_tasksim.concept_nodes.pour import Pour
+from bt_tasksim.concept_nodes.pull import Pull
+from bt_tasksim.concept_nodes.push import Push
 from bt_tasksim.concept_nodes.release import Release
 from bt_tasksim.concept_nodes.settle import Settle
 from bt_tasksim.concept_nodes.turned_conditions import Emptied
@@ -40,6 +42,8 @@ __all__ = [
     "Pick",
     "Place",
     "Pour",
+    "Pull",
+    "Push",
     "Release",
     "Settle",
     "StandsOn",

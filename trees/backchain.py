@@ -131,9 +131,9 @@ def _achieved(chain: ActChain, wanted: Wanted, asking: tuple[str, ...]) -> ActCh
     if wanted.condition in asking:
         way = " needs ".join((*asking[asking.index(wanted.condition) :], wanted.condition))
         raise InputError(f"no chain of concepts leads to {said(wanted)}: {way}")
-    found: list[ActChain] = []
+    found: list[tuple[bool, ActChain]] = []
     problems: list[str] = []
-    for step in _candidates(wanted):
+    for step, sometimes in _candidates(wanted):
         lacks = [
             p.name for p in step.concept.parameters().values() if p.required and p.name not in step.arguments
         ]
@@ -141,22 +141,26 @@ def _achieved(chain: ActChain, wanted: Wanted, asking: tuple[str, ...]) -> ActCh
             problems.append(f"{step.concept.__name__} does, and nothing says its '{lacks[0]}'")
             continue
         try:
-            found.append(_with(chain, step, (*asking, wanted.condition)))
+            found.append((sometimes, _with(chain, step, (*asking, wanted.condition))))
         except InputError as error:
             problems.append(str(error))
     if not found:
         why = f": {problems[0]}" if problems else "; write one that declares it in its 'establishes'"
         raise InputError(f"no concept establishes {said(wanted)}{why}")
-    return min(found, key=lambda one: len(one.steps))
+    _, shortest = min(found, key=lambda one: (one[0], len(one[1].steps)))
+    return shortest
 
 
-def _candidates(wanted: Wanted) -> Iterator[Act]:
-    """Concepts that establish a condition, with the arguments with which they do, as far as it says them."""
+def _candidates(wanted: Wanted) -> Iterator[tuple[Act, bool]]:
+    """Concepts that establish a condition, with the arguments with which they do, as far as it says them.
+
+    And whether they do so only `sometimes` (`ConditionOf`).
+    """
     for kind in concept_kinds():
         for one in kind.establishes:
             arguments = one.inverted(wanted.arguments) if one.condition == wanted.condition else None
             if arguments is not None:
-                yield Act(kind, arguments)
+                yield Act(kind, arguments), one.sometimes
 
 
 def _with(chain: ActChain, step: Act, asking: tuple[str, ...]) -> ActChain:

@@ -17,19 +17,29 @@ class ConditionOf:
     Args:
         condition: The condition's registered name.
         given: Values of the concept's parameters, by name, with which alone this is so.
+        sometimes: It is so only where the concept can do it, such as a push, for which things have to stand
+            on one level: another concept that establishes the condition is preferred.
         parameters: By the condition's parameter, the concept's parameter that has its value.
     """
 
     condition: str
     parameters: Mapping[str, str]
     given: Mapping[str, Any]
+    sometimes: bool
 
     def __init__(
-        self, condition: str, /, *, given: Mapping[str, Any] | None = None, **parameters: str
+        self,
+        condition: str,
+        /,
+        *,
+        given: Mapping[str, Any] | None = None,
+        sometimes: bool = False,
+        **parameters: str,
     ) -> None:
         object.__setattr__(self, "condition", condition)
         object.__setattr__(self, "parameters", parameters)
         object.__setattr__(self, "given", given or {})
+        object.__setattr__(self, "sometimes", sometimes)
 
     def arguments(self, values: Mapping[str, Any]) -> dict[str, Any] | None:
         """The condition's arguments for a concept; None where the concept leaves one of them open.

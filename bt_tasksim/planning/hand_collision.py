@@ -110,6 +110,19 @@ def _corners(shape: Any) -> Array:
     return np.array(list(itertools.product(*zip(box.min_, box.max_, strict=True))))
 
 
+def hand_pieces(bodies: RobotBodies, hand: Array) -> list[Array]:
+    """Corners ``(n, 3)`` of the hand's convex bodies in the tool frame, metres.
+
+    Args:
+        bodies: The robot's.
+        hand: Positions ``(n_hand,)`` of the hand's joints.
+    """
+    return [
+        _corners(shape) @ placement.rotation.T + placement.translation
+        for _, placement, shape in hand_shapes(bodies, hand)
+    ]
+
+
 def hand_shapes(bodies: RobotBodies, hand: Array) -> list[tuple[str, Any, Any]]:
     """Links of the hand, their placements in the tool frame, and their shapes."""
     return [(name, placement, shape) for name, placement, shape, _ in bodies.hand_bodies(hand)]

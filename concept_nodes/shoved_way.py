@@ -1,0 +1,218 @@
+"""The way of a pusher: to where it stands behind a thing, along with that, and away from it, in one world."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING
+from bt_tasksim.concept_nodes.pusher import Stance, stances, tops
+from bt_tasksim.concept_nodes.view import WorldView
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.hand_collision import HandCollisions
+from bt_tasksim.planning.route import Pace, Route, followed
+from bt_tasksim.planning.surroundings import pieces_of
+from bt_tasksim.planning.things import Held, Leave
+from bt_tasksim.planning.ways import WayFinder
+
+GAP = 0.02
+"""Metres between the pusher and the thing before it begins, as far as is known."""
+ABOVE = 0.10
+"""Metres above that at which the tool comes straight down, where there is room for it."""
+COMING = Pace(0.4)
+"""How fast the tool comes there."""
+RETREATS = ((0.03, 0.10), (0.015, 0.10), (0.03, 0.04), (0.015, 0.02), (0.0, 0.04), (0.0, 0.0))
+"""Metres back, and then up, by which the pusher leaves what it has moved; the first ones that are clear."""
+SHORT = (0.0, 0.4, 0.8)
+"""Shares of the tolerance by which the way may end too early where the arm reaches no farther."""
+UP = np.array([0.0, 0.0, 1.0])
+APART = 0.02
+"""Metres between places on a thing's way at which it is looked at."""
+SAME = 0.6
+"""Radians within which the arm comes to the posture in which it was looked at as it pushes."""
+
+
+class ShovedWay(NamedTuple):
+    """How a pusher moves a thing.
+
+    Attributes:
+        stance: How it stands behind that.
+        route: The tool's way to a little behind there.
+        short: Metres by which the thing's way ends before its goal.
+        away: Metres ``(2,)`` that the pusher goes back, and up, at the end.
+        above: It presses on the thing from above, and the tool's way ends a little over it.
+    """
+
+    stance: Stance
+    route: Route
+    short: float
+    away: tuple[float, float]
+    above: bool = False
+
+
+def shoved_way(view: WorldView, target: str, goal: Array, held: str | None, slack: float) -> ShovedWay:
+    """The first stance that the arm reaches, and in which nothing is in the way.
+
+    Args:
+        view: The world.
+        target: The thing.
+        goal: Where its middle is to go ``(3,)``, at the height where it is.
+        held: What it is pushed with, if not with the hand.
+        slack: Metres by which it may be too little.
+
+    Raises:
+        NoWayError: There is none; says why not the best.
+    """
+    way = goal - view.objects[target][:3]
+    length = float(np.linalg.norm(way))
+    along = np.round(way / max(length, 1e-9), 9)
+    check_clear(view, target, goal, held)
+    reason: NoWayError | None = None
+    for stance in stances(view, target, along, held):
+        try:
+            return _Approach(view, target, stance, along, held).way(length, slack)
+        except NoWayError as error:
+            reason = reason or error.with_traceback(None)
+    raise reason or NoWayError(f"there is nothing of {target} for {held or 'the hand'} to stand behind")
+
+
+def touching_now(view: WorldView, target: str) -> frozenset[str]:
+    """Names of what a thing touches where it is, or seems to: what it stands on, and what leans on it."""
+    here = view.objects[target]
+    collisions = _flying(view, target, frozenset(), without=(target,), closer=0.5)
+    return frozenset(name for _, name in collisions.touches(here))
+
+
+def _flying(
+    view: WorldView, target: str, leave: frozenset[str], without: tuple[str, ...], closer: float
+) -> HandCollisions:
+    """A thing alone among others, asked about by its own pose."""
+    held = Held(target, poses.pose(np.zeros(3)), pieces_of(view.model(target)))
+    things = view.things(without, closer)
+    return HandCollisions(bodies_of(view.robot), None, things, held, Leave(held=leave))
+
+
+def check_clear(view: WorldView, target: str, goal: Array, held: str | None) -> None:
+    """Nothing is in a thing's way.
+
+    Raises:
+        NoWayError: Something is.
+    """
+    here, leave = view.objects[target], touching_now(view, target)
+    without = (target,) if held is None else (target, held)
+    collisions = _flying(view, target, leave, without, TOUCHING)
+    count = max(2, int(np.ceil(np.linalg.norm(goal - here[:3]) / APART)) + 1)
+    for share in np.linspace(0.0, 1.0, count):
+        pose = poses.pose(here[:3] + share * (goal - here[:3]), here[3:])
+        touch = collisions.first(pose)
+        if touch is not None:
+            raise NoWayError(f"{target} would be pushed against {touch[1]}: make room, or push it elsewhere")
+
+
+def pressed_way(view: WorldView, target: str, goal: Array, slack: float) -> ShovedWay:
+    """How fingers that press on a thing's top draw it along; arguments as of `shoved_way`.
+
+    Raises:
+        NoWayError: They cannot come there, or not go along with it.
+    """
+    way = goal - view.objects[target][:3]
+    length = float(np.linalg.norm(way))
+    along = np.round(way / max(length, 1e-9), 9)
+    check_clear(view, target, goal, None)
+    reason: NoWayError | None = None
+    for stance in tops(view, target):
+        approach = _Approach(view, target, stance, along, None, above=True)
+        try:
+            return approach.way(length, slack)
+        except NoWayError as error:
+            reason = reason or error.with_traceback(None)
+    raise reason or NoWayError(f"there is no top of {target} to press on")
+
+
+class _Approach:
+    """One stance of one pusher in one world."""
+
+    def __init__(
+        self,
+        view: WorldView,
+        target: str,
+        stance: Stance,
+        along: Array,
+        held: str | None,
+        above: bool = False,
+    ) -> None:
+        self._view, self._target, self._stance, self._along, self._name = view, target, stance, along, held
+        self._held = None if held is None else view.held(held)
+        self._above = above
+        self._start = poses.shifted(stance.tool, GAP * UP if above else -GAP * along)
+
+    def way(self, length: float, slack: float) -> ShovedWay:
+        """The whole of it.
+
+        Raises:
+            NoWayError: There is none.
+        """
+        passing = self._finder(self._view, (self._target,), CLOSER)
+        beginnings = passing.ends(self._start[None])
+        if not beginnings.free[0]:
+            raise NoWayError(passing.no_end(self._start[None]))
+        begun, end, short, pushed = self._pushed(passing, length, slack, beginnings.joints[0])
+        away = self._away(end, length - short, pushed[-1])
+        if away is None:
+            raise NoWayError(f"there is no room to draw back from {self._target}")
+        return ShovedWay(self._stance, self._coming(begun), short, away, self._above)
+
+    def _pushed(
+        self, passing: WayFinder, length: float, slack: float, begun: Array
+    ) -> tuple[Array, Array, float, Array]:
+        for share in SHORT:
+            short = min(share * slack, length)
+            end = poses.shifted(self._stance.tool, (length - short) * self._along)
+            joints = passing.straight([self._start, end], start=begun, leans=passing.leanings[-1])
+            if joints is not None:
+                return begun, end, short, joints
+        ends = passing.ends(end[None])
+        if not ends.free[0]:
+            raise NoWayError(passing.no_end(end[None]))
+        raise NoWayError(f"the arm cannot follow {self._target} to its goal")
+
+    def _away(self, end: Array, length: float, begun: Array) -> tuple[float, float] | None:
+        """How the pusher leaves the thing where it lies then."""
+        there = self._view.objects[self._target].copy()
+        there[:3] += length * self._along
+        view = self._view._replace(objects={**self._view.objects, self._target: there})
+        touches = frozenset({self._target})
+        finder = self._finder(view, (), TOUCHING, Leave(hand=touches, held=touches))
+        for back, up in ((0.0, RETREATS[0][1]), *RETREATS[-2:]) if self._above else RETREATS:
+            behind = poses.shifted(end, -back * self._along)
+            above = poses.shifted(behind, up * UP)
+            if back == up == 0.0 or finder.straight([end, behind, above], start=begun) is not None:
+                return back, up
+        return None
+
+    def _coming(self, joints: Array) -> Route:
+        """The way to a posture ``(n_arm,)`` behind the thing.
+
+        Raises:
+            NoWayError: There is none.
+        """
+        finder = self._finder(self._view, (), CLOSER)
+        tool = self._view.tool
+        above = poses.shifted(self._start, ABOVE * UP)
+        for way in ([tool, above, self._start], [tool, self._start]):
+            found = finder.straight(way) if finder.goes_straight else None
+            if found is not None and float(np.abs(found[-1] - joints).max()) < SAME:
+                return followed(finder.arm, np.concatenate([finder.start[None], found]), COMING)
+        return finder.search_posture(joints[None], COMING)
+
+    def _finder(
+        self, view: WorldView, without: tuple[str, ...], closer: float, leave: Leave | None = None
+    ) -> WayFinder:
+        held = () if self._name is None else (self._name,)
+        return view.finder(
+            [*without, *held], held=self._held, hand=self._stance.hand, closer=closer, leave=leave
+        )
