@@ -10,6 +10,7 @@ from bt_tasksim.concept_nodes.bring import Bring
 from bt_tasksim.concept_nodes.conditions import AtPose, Holding, TimePassed, Upright
 from bt_tasksim.concept_nodes.grasp import Grasp
 from bt_tasksim.concept_nodes.hand_conditions import HandEmpty, Lifted, Over, OverBeside
+from bt_tasksim.concept_nodes.hold import Hold
 from bt_tasksim.concept_nodes.in_contact import InContact
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
@@ -18,6 +19,9 @@ from bt_tasksim.concept_nodes.pull import Pull
 from bt_tasksim.concept_nodes.push import Push
 from bt_tasksim.concept_nodes.release import Release
 from bt_tasksim.concept_nodes.settle import Settle
+from bt_tasksim.concept_nodes.slide import Slide
+from bt_tasksim.concept_nodes.slide_off import SlideOff
+from bt_tasksim.concept_nodes.slide_to_stop import SlideToStop
 from bt_tasksim.concept_nodes.turned_conditions import Emptied
 from bt_tasksim.concept_nodes.wait import Wait
 from bt_tasksim.concept_nodes.withdraw import Withdraw
@@ -33,6 +37,7 @@ __all__ = [
     "Emptied",
     "Grasp",
     "HandEmpty",
+    "Hold",
     "Holding",
     "InContact",
     "Inside",
@@ -46,6 +51,9 @@ __all__ = [
     "Push",
     "Release",
     "Settle",
+    "Slide",
+    "SlideOff",
+    "SlideToStop",
     "StandsOn",
     "TimePassed",
     "Upright",

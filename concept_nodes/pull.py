@@ -47,7 +47,7 @@ class Pull(Shove):
     direction: Direction | None = None
     distance: Metres | None = None
     tool: ObjectName | None = None
-    press: Newtons = 8.0
+    press: Newtons = 12.0
     speed: MetresPerSecond = 0.12
     force_limit: Newtons = FORCE_LIMIT
 

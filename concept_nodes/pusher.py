@@ -51,6 +51,8 @@ WIDE, LIKED = 0.04, 0.05
 how its arm likes it best."""
 GOOD, ENOUGH = 0.0, 24
 """What a stance may cost that is tried before others are looked for; and of the rest, how many are tried."""
+FLAT = 1.1
+"""The same for what is drawn by its top: its height over that distance."""
 LEVEL = 1e-3
 """Metres from a thing's ends at which the first and the last cut are."""
 _KEPT = 100
@@ -145,8 +147,14 @@ def stances(view: WorldView, target: str, along: Array, held: str | None = None)
     yield from sorted(rest, key=lambda stance: round(stance.cost, 6))[:ENOUGH]
 
 
-def tops(view: WorldView, target: str) -> list[Stance]:
-    """Ways in which a closed hand that points down may stand on the middle of a thing, the best first."""
+def tops(view: WorldView, target: str, along: Array) -> list[Stance]:
+    """Ways in which a closed hand that points down may stand on the middle of a thing, the best first.
+
+    There are none on what would tip over: what is drawn by its top has to be flat.
+    """
+    thing = _thing(view, target, along)
+    if float(thing.heights[-1]) + LEVEL - thing.floor > FLAT * thing.ahead:
+        return []
     robot = view.robot
     closure = CLOSURES[0]
     hand = robot.hand_position(np.array([closure]))

@@ -26,7 +26,7 @@ from bt_tasksim.concept.parameters import (
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.destination import destination
-from bt_tasksim.concept_nodes.holding import BETWEEN, holding, may_hold, not_held
+from bt_tasksim.concept_nodes.holding import BETWEEN, REACH, holding, not_held, tool_distance
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.shoved_way import GAP, ShovedWay, shoved_way
 from bt_tasksim.concept_nodes.surface import carrying
@@ -113,16 +113,25 @@ EMPTY = 0.9
 """Closure from which on nothing is between the fingers but each other."""
 LAGS = 0.05
 """Metres by which the thing may lag behind the pusher."""
-DOWN, YIELDS = 0.02, 0.002
+DRAWS = 0.05
+"""Metres per second at which it draws a thing by its top."""
+DOWN, YIELDS = 0.015, 0.0006
 """Metres per second at which it comes down on a thing from above; and that it goes on for each newton that is
 missing there."""
+SURELY, SMOOTH = 0.5, 0.25
+"""Share of the force with which it is to press at which it draws; and of each reading in the smoothed one."""
 DRIFTS = 0.04
 """Metres by which it may drift beside the straight way: more cannot be led back."""
 LATE = 0.3
 """Seconds after it has drawn back until which the thing may still be seen to come to its goal."""
 GOOD = 0.03
 """Metres from its goal within which it is where it should be."""
-TOOL_LOST = register_reason("tool_lost", "{object} is no longer in the hand")
+TOOL_LOST = register_reason(
+    "tool_lost",
+    "{object} is no longer in the hand: it is {value} from the tool, more than {limit}",
+    value=METRES,
+    limit=METRES,
+)
 
 
 class ShoveMemory(NamedTuple):
@@ -143,6 +152,7 @@ class ShoveMemory(NamedTuple):
         gone: How far ``(N, 2)`` the tool has been told to go along the way and across it since it stood
             behind the thing, metres.
         lowered: How far ``(N,)`` it has been told to go down since then, metres.
+        firm: Newtons ``(N,)`` that hold the tool up there, smoothed.
         pressed: Boolean ``(N,)``: it has felt the thing below it.
         speed: How fast ``(N, 2)``, m/s.
         ended: Seconds ``(N,)`` since the push ended; negative before.
@@ -161,6 +171,7 @@ class ShoveMemory(NamedTuple):
     above: Array
     gone: Array
     lowered: Array
+    firm: Array
     pressed: Array
     speed: Array
     ended: Array
@@ -289,6 +300,7 @@ class Shove(ConceptModel[ShoveMemory]):
             above=above,
             gone=nothing,
             lowered=nothing[:, 0],
+            firm=nothing[:, 0],
             pressed=booleans(seen.tool, False),
             speed=nothing,
             ended=before,
@@ -337,13 +349,13 @@ class Shove(ConceptModel[ShoveMemory]):
         going = begun & (memory.ended < 0.0) & ~ends
         nothing = xp.zeros_like(ahead)
         from_above = memory.above > 0.0
-        pressed = memory.pressed | (going & from_above & (self._felt(seen) >= 0.5 * self._press))
-        lowered = memory.lowered + xp.where(
-            going & from_above, self._lowering(seen, pressed) * period, nothing
-        )
-        going = going & (pressed | ~from_above)
+        firm = memory.firm + xp.where(going, SMOOTH * (self._felt(seen) - memory.firm), nothing)
+        touched = memory.pressed | (going & from_above & (self._felt(seen) >= SURELY * self._press))
+        down = xp.where(going & from_above, self._lowering(firm, touched), nothing)
+        going = going & ((touched & (firm >= SURELY * self._press)) | ~from_above)
         slowing = xp.sqrt(SLOWEST**2 + 2.0 * SLOWER * xp.maximum(ahead - NEAR, nothing))
         pace = xp.minimum(slowing, xp.full_like(slowing, self.speed))
+        pace = xp.where(from_above, xp.minimum(pace, xp.full_like(pace, DRAWS)), pace)
         comes = memory.gone[:, 0] < memory.gap
         pace = xp.where(comes, xp.minimum(pace, xp.full_like(pace, COMES_UPON)), pace)
         before, most = memory.speed, FASTER * period
@@ -355,7 +367,10 @@ class Shove(ConceptModel[ShoveMemory]):
         begins = xp.where(ends, nothing, memory.ended)
         ended = xp.where(memory.ended >= 0.0, memory.ended + period, begins)
         gone = memory.gone + period * speed
-        return memory._replace(gone=gone, speed=speed, ended=ended, lowered=lowered, pressed=pressed)
+        lowered = memory.lowered + period * down
+        return memory._replace(
+            gone=gone, speed=speed, ended=ended, lowered=lowered, firm=firm, pressed=touched
+        )
 
     @property
     def _press(self) -> float:
@@ -366,11 +381,11 @@ class Shove(ConceptModel[ShoveMemory]):
         """Newtons ``(N,)`` that hold the tool up."""
         return poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])[:, 2]
 
-    def _lowering(self, seen: Seen, pressed: Array) -> Array:
+    def _lowering(self, firm: Array, touched: Array) -> Array:
         """Metres per second ``(N,)`` at which the tool goes down: to the thing, then as it presses."""
-        xp = array_namespace(seen.tool)
-        more = poses.clip(YIELDS * (self._press - self._felt(seen)), -DOWN, DOWN)
-        return xp.where(pressed, more, xp.full_like(more, DOWN))
+        xp = array_namespace(firm)
+        more = poses.clip(YIELDS * (self._press - firm), -DOWN, DOWN)
+        return xp.where(touched, more, xp.full_like(more, DOWN))
 
     def _slope(self, ahead: Array, aside: Array, memory: ShoveMemory) -> Array:
         """How far ``(N,)`` the pusher is to go across the way for a metre along it.
@@ -414,10 +429,7 @@ class Shove(ConceptModel[ShoveMemory]):
 
     def _lost(self, seen: Seen) -> tuple[Limit, ...]:
         assert self.tool is not None
-        held = may_hold(seen, self.tool)
-        xp = array_namespace(seen.tool)
-        lost = xp.astype(~held, seen.tool.dtype)
-        return (Limit(TOOL_LOST, lost, 0.5, {"object": self.tool}),)
+        return (Limit(TOOL_LOST, tool_distance(seen, self.tool), REACH, {"object": self.tool}),)
 
     def done(self, seen: Seen, memory: ShoveMemory) -> Array:
         """The pusher has drawn back, and the thing is where it should be."""

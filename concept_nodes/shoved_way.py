@@ -32,6 +32,8 @@ SHORT = (0.0, 0.4, 0.8)
 UP = np.array([0.0, 0.0, 1.0])
 APART = 0.02
 """Metres between places on a thing's way at which it is looked at."""
+FINE = 0.005
+"""The same where it is asked where it meets something."""
 SAME = 0.6
 """Radians within which the arm comes to the posture in which it was looked at as it pushes."""
 
@@ -87,6 +89,26 @@ def touching_now(view: WorldView, target: str) -> frozenset[str]:
     return frozenset(name for _, name in collisions.touches(here))
 
 
+def free_until(view: WorldView, target: str, down: Array, way: Array) -> float:
+    """Share of a way up to which a thing touches nothing that it does not touch now; 1 where it is free.
+
+    Args:
+        view: The world.
+        target: The thing.
+        down: Displacement ``(3,)`` to where its way begins.
+        way: Displacement ``(3,)`` along it.
+    """
+    collisions = _flying(view, target, frozenset(), without=(target,), closer=TOUCHING)
+    here = poses.shifted(view.objects[target], down)
+    now = {name for _, name in collisions.touches(here)}
+    count = max(2, int(np.ceil(np.linalg.norm(way) / FINE)) + 1)
+    for share in np.linspace(0.0, 1.0, count).tolist():
+        touches = {name for _, name in collisions.touches(poses.shifted(here, share * way))}
+        if touches - now:
+            return max(float(share) - 1.0 / (count - 1), 0.0)
+    return 1.0
+
+
 def _flying(
     view: WorldView, target: str, leave: frozenset[str], without: tuple[str, ...], closer: float
 ) -> HandCollisions:
@@ -124,13 +146,13 @@ def pressed_way(view: WorldView, target: str, goal: Array, slack: float) -> Shov
     along = np.round(way / max(length, 1e-9), 9)
     check_clear(view, target, goal, None)
     reason: NoWayError | None = None
-    for stance in tops(view, target):
+    for stance in tops(view, target, along):
         approach = _Approach(view, target, stance, along, None, above=True)
         try:
             return approach.way(length, slack)
         except NoWayError as error:
             reason = reason or error.with_traceback(None)
-    raise reason or NoWayError(f"there is no top of {target} to press on")
+    raise reason or NoWayError(f"{target} is too tall to be drawn along by its top")
 
 
 class _Approach:

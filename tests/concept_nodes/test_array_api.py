@@ -27,6 +27,7 @@ from bt_tasksim.concept_nodes import (
     Emptied,
     Grasp,
     HandEmpty,
+    Hold,
     Holding,
     InContact,
     Inside,
@@ -36,8 +37,13 @@ from bt_tasksim.concept_nodes import (
     Pick,
     Place,
     Pour,
+    Pull,
+    Push,
     Release,
     Settle,
+    Slide,
+    SlideOff,
+    SlideToStop,
     StandsOn,
     TimePassed,
     Upright,
@@ -87,6 +93,13 @@ def concepts(target="target", place="goal"):
         "withdraw": Withdraw.value(),
         "withdraw upwards": Withdraw.value(direction=(0.0, 0.0, 1.0)),
         "settle": Settle.value(),
+        # What is there already needs no plan, which takes a second in each world.
+        "push": Push.value(target, direction=(1.0, 0.0, 0.0), distance=0.01),
+        "pull": Pull.value(target, direction=(-1.0, 0.0, 0.0), distance=0.01),
+        "slide": Slide.value(target, direction=(0.0, 1.0, 0.0), distance=0.05, via=((0.02, 0.0, 0.0),)),
+        "slide to a stop": SlideToStop.value(target, direction=(1.0, 0.0, 0.0), distance=0.05),
+        "slide off": SlideOff.value(target, direction=(-1.0, 0.0, 0.0), distance=0.05),
+        "hold": Hold.value(target, direction=(1.0, 0.0, 0.0)),
     }
 
 

@@ -1,0 +1,154 @@
+"""Hold: press a held object against a stop for a while."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.limit import Limit
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Direction, Newtons, ObjectName, Seconds
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
+from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import METRES, NEWTONS, SECONDS
+from bt_tasksim.core.world import Command
+
+PRESSED = Form(
+    "{object} is pressed with {force:.1f}, {held:.1f} of {duration:.1f} held",
+    {"force": NEWTONS, "held": SECONDS, "duration": SECONDS},
+)
+GIVES_WAY = register_reason(
+    "gives_way",
+    "{object} has gone {value} before it was pressed against anything, more than {limit}",
+    value=METRES,
+    limit=METRES,
+)
+YIELDS, QUICKEST, SMOOTH = 0.0008, 0.01, 0.3
+"""Metres per second for each newton that is missing, at most so many; and the share of each reading of the
+force in the smoothed one."""
+
+
+class HoldMemory(NamedTuple):
+    """What is remembered in ``N`` worlds.
+
+    Attributes:
+        start: Tool pose ``(N, 7)`` at the begin.
+        pushed: Metres ``(N,)`` that the tool is told to go beyond there.
+        pressed: Newtons ``(N,)`` with which it presses, smoothed.
+        held: Seconds ``(N,)`` for which that has been between its limits.
+    """
+
+    start: Array
+    pushed: Array
+    pressed: Array
+    held: Array
+
+
+@register("concept")
+class Hold(ConceptModel[HoldMemory]):
+    """Press a held object against a stop for a while (keeps contact: FT).
+
+    The force is led to the middle of its limits; the time counts for which it stays between them.
+
+    Args:
+        target: The held object.
+        direction: Which way it is pressed, robot base frame.
+        duration: For how long, without a break.
+        least: Force with which it presses at least.
+        most: Force with which it presses at most.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    direction: Direction
+    duration: Seconds = 2.0
+    least: Newtons = 5.0
+    most: Newtons = 25.0
+    force_limit: Newtons = FORCE_LIMIT
+
+    maintains = (HOLDING,)
+    contact = ContactChange(ContactState.FT, ContactState.FT)
+    presentation = Presentation(
+        colour="#6b4f9b",
+        spoken=r"hold .* (?:against|there)|press",
+        sayings=("hold it there", "I press the {} against it"),
+    )
+    default_timeout = 15.0
+    default_tolerance = 0.03
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """For how long."""
+        return f"for {float(parameters['duration']):.1f} s" if "duration" in parameters else ""
+
+    def contradiction(self) -> str:
+        """Limits in their order."""
+        return "" if self.least < self.most else "'least' should be less than 'most'"
+
+    def initial_state(self, seen: Seen) -> Possible:
+        """The object must be in the hand."""
+        return not_held(seen, self.target)
+
+    def begin(self, seen: Seen) -> HoldMemory:
+        """Where the tool is, and what is felt."""
+        nothing = array_namespace(seen.tool).zeros_like(seen.tool[:, 0])
+        felt = self._against(seen)
+        return HoldMemory(seen.tool, nothing, felt, nothing)
+
+    def command(self, action: Array, seen: Seen, memory: HoldMemory) -> Command:
+        """A little beyond where it began."""
+        after = self.advance(action, seen, memory)
+        along = constant(np.array(self.direction), seen.tool)
+        return Command(tool=poses.shifted(memory.start, after.pushed[:, None] * along))
+
+    def advance(self, action: Array, seen: Seen, memory: HoldMemory) -> HoldMemory:
+        """Lead the force to the middle of its limits, and count the time."""
+        xp, period = array_namespace(seen.tool), seen.world.control_period
+        pressed = memory.pressed + SMOOTH * (self._against(seen) - memory.pressed)
+        middle = (self.least + self.most) / 2
+        speed = poses.clip(YIELDS * (middle - pressed), -QUICKEST, QUICKEST)
+        within = (pressed >= self.least) & (pressed <= self.most)
+        held = xp.where(within, memory.held + period, xp.zeros_like(memory.held))
+        return memory._replace(pushed=memory.pushed + period * speed, pressed=pressed, held=held)
+
+    def done(self, seen: Seen, memory: HoldMemory) -> Array:
+        """It has been pressed for long enough."""
+        return memory.held >= self.duration
+
+    def limits(self, seen: Seen, memory: HoldMemory) -> tuple[Limit, ...]:
+        """The force at the wrist; and there is a stop."""
+        gone = poses.dot(
+            seen.tool[:, :3] - memory.start[:, :3], constant(np.array(self.direction), seen.tool)
+        )
+        return strain(seen, self.force_limit), Limit(GIVES_WAY, gone, self.tolerance, {"object": self.target})
+
+    def maintained(self, goal: str, seen: Seen, memory: HoldMemory) -> Array:
+        """The object may still be in the hand."""
+        return may_hold(seen, self.target)
+
+    def necessary_cost(self, seen: Seen, memory: HoldMemory) -> Array:
+        """Seconds that are left."""
+        return poses.clip(self.duration - memory.held, 0.0, self.duration)
+
+    def sufficient_cost(self, known: Known, memory: HoldMemory) -> Array:
+        """1 unless the object touches something besides the hand."""
+        xp, like = array_namespace(known.hidden.tool_pose), known.hidden.tool_pose[:, 0]
+        return xp.where(known.supported(self.target), xp.zeros_like(like), xp.ones_like(like))
+
+    def explain(self, seen: Seen, memory: HoldMemory) -> Statement:
+        """What is felt, and for how long it has been so."""
+        return PRESSED(object=self.target, force=memory.pressed, held=memory.held, duration=self.duration)
+
+    def _against(self, seen: Seen) -> Array:
+        """Force ``(N,)`` against the direction, N."""
+        force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+        return -poses.dot(force, constant(np.array(self.direction), force))

@@ -1,0 +1,95 @@
+"""Slide: move a held object along what it is pressed on, as one wipes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.demonstrated import position_words, straight_words
+from bt_tasksim.concept.parameters import (
+    Direction,
+    Metres,
+    MetresPerSecond,
+    Newtons,
+    ObjectName,
+    PlaceName,
+    Points,
+    Position,
+)
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept_nodes.destination import destination
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.concept_nodes.slid import Slid, level, not_level
+from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.core.registry import register
+
+
+@register("concept")
+class Slide(Slid):
+    """Slide a held object along what it is pressed on (keeps contact: TR).
+
+    It comes down until the wrist feels what is below, goes along it through ``via`` to its goal, and presses
+    all the way. Its height is that at which it presses, so what it slides on need not be quite level.
+
+    Args:
+        target: The held object.
+        to: The place over whose origin its middle goes.
+        position: Where its middle goes, robot base frame; the height is of no account.
+        direction: Which way it goes, robot base frame, level.
+        distance: How far it goes in ``direction``.
+        via: Positions of its middle on the way, relative to where that ends, base-frame axes.
+        press: Force with which it presses.
+        speed: Peak speed of the tool.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    to: PlaceName | None = None
+    position: Position | None = None
+    direction: Direction | None = None
+    distance: Metres | None = None
+    via: Points = ()
+    press: Newtons = 5.0
+    speed: MetresPerSecond = 0.12
+    force_limit: Newtons = FORCE_LIMIT
+
+    contact = ContactChange(ContactState.TR, ContactState.TR)
+    presentation = Presentation(
+        colour="#7a8f3a",
+        spoken=r"wip|slid(?:e|ing)|sweep|rub",
+        sayings=("I wipe along here", "slide the {} along", "and wipe the table"),
+    )
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """Where to."""
+        said = [f"to {parameters['to']}"] if "to" in parameters else []
+        if "position" in parameters:
+            said.append(f"to {position_words(parameters['position'])}")
+        if "direction" in parameters and "distance" in parameters:
+            said.append(straight_words(parameters))
+        return ", ".join(said)
+
+    def contradiction(self) -> str:
+        """One goal, and a way that is level."""
+        by_way = self.direction is not None or self.distance is not None
+        if sum((self.to is not None, self.position is not None, by_way)) != 1:
+            return "give either 'to', 'position', or 'direction' and 'distance'"
+        if by_way and (self.direction is None or self.distance is None):
+            return "'direction' and 'distance' go together"
+        return not_level(self.direction)
+
+    def waypoints(self, seen: Seen) -> Sequence[Array]:
+        """See `Slid.waypoints`."""
+        xp, now = array_namespace(seen.tool), seen.object(self.target)[:, :3]
+        if self.to is not None:
+            end = destination(seen, self.to)[0][:, :3] - now
+        elif self.position is not None:
+            end = constant(self.position, now) - now
+        else:
+            assert self.direction is not None and self.distance is not None
+            end = level(self.direction, self.distance, now) + xp.zeros_like(now)
+        points = [*(end + constant(via, now) for via in self.via), end]
+        return [xp.concat([point[:, :2], xp.zeros_like(point[:, 2:])], axis=-1) for point in points]

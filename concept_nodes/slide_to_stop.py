@@ -1,0 +1,111 @@
+"""Slide to a stop: move a held object along what it is pressed on until something holds it up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.demonstrated import straight_words
+from bt_tasksim.concept.limit import Limit
+from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.concept_nodes.shoved_way import free_until
+from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, level, not_level
+from bt_tasksim.concept_nodes.standing import supports_of
+from bt_tasksim.concept_nodes.view import WorldView
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import register_reason
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import SECONDS
+
+NO_STOP = register_reason(
+    "no_stop",
+    "nothing has held {object} up on all of its way, {value} after that's end, more than {limit}",
+    value=SECONDS,
+    limit=SECONDS,
+)
+
+
+@register("concept")
+class SlideToStop(Slid):
+    """Slide a held object along what it is pressed on against a stop (makes contact: TR to OT).
+
+    It comes down until the wrist feels what is below, and goes along it, slowly, until the force against its
+    way says that an edge, a wall or another thing holds it up.
+
+    Args:
+        target: The held object.
+        direction: Which way it goes, robot base frame, level.
+        distance: How far it goes at most: the stop should be nearer.
+        against: The place or the object that it comes to stand against, which it may touch.
+        resistance: Force against the way that counts as the stop: more than friction.
+        press: Force with which it presses on what it slides on.
+        speed: Peak speed of the tool.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    direction: Direction
+    distance: Metres = 0.2
+    against: PlaceName | None = None
+    resistance: Newtons = 10.0
+    press: Newtons = 4.0
+    speed: MetresPerSecond = 0.06
+    force_limit: Newtons = FORCE_LIMIT
+
+    contact = ContactChange(ContactState.TR, ContactState.OT)
+    presentation = Presentation(
+        colour="#3a6f8f",
+        spoken=r"against|up to the (?:edge|wall|stop)|until it stops",
+        sayings=("slide it against the wall", "up to the stop", "until it stops"),
+    )
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """Which way, and how far at most."""
+        return straight_words(parameters) if "distance" in parameters else ""
+
+    def contradiction(self) -> str:
+        """A way that is level."""
+        return not_level(self.direction)
+
+    def waypoints(self, seen: Seen) -> Sequence[Array]:
+        """See `Slid.waypoints`."""
+        nothing = array_namespace(seen.tool).zeros_like(seen.tool[:, :3])
+        return (level(self.direction, self.distance, seen.tool) + nothing,)
+
+    def _until(self, view: WorldView, drop: float, way: Sequence[Array]) -> Sequence[Array]:
+        """To where it meets something: the hand has to be clear of that."""
+        (end,) = way
+        down = np.array([0.0, 0.0, ABOVE - drop])
+        reached = free_until(view, self.target, down, end[:3] - view.tool[:3])
+        return (poses.shifted(view.tool, reached * (end[:3] - view.tool[:3])),)
+
+    def _touches(self, view: WorldView) -> frozenset[str]:
+        """The stop, wherever it is; where it is not named, any furniture and any object may be it."""
+        if self.against is not None:
+            return frozenset({self.against}) | supports_of(view, self.against)
+        return frozenset({*view.objects, *(box.fixture or "furniture" for box in view.world.obstacles)})
+
+    def _goes(self, resisted: Array) -> Array:
+        return resisted < self.resistance
+
+    def _ended(self, seen: Seen, memory: SlidMemory) -> Array:
+        return memory.found & (memory.resisted >= self.resistance)
+
+    def limits(self, seen: Seen, memory: SlidMemory) -> tuple[Limit, ...]:
+        """The force at the wrist; a support that is not there; and no stop on all of the way."""
+        late = memory.progress - memory.path.duration
+        return (*super().limits(seen, memory), Limit(NO_STOP, late, LATE, {"object": self.target}))
+
+
+ABOVE = 0.003
+"""Metres above its support at which it is looked at where it meets something."""
+LATE = 0.5
+"""Seconds after its way's end until which it may still be held up."""
