@@ -19,7 +19,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.hand_collision import hand_pieces
-from bt_tasksim.planning.profiles import Solid, fronts, moved, solids
+from bt_tasksim.planning.profiles import ConvexSolid, fronts, moved, solids
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.hand import standing_side
@@ -92,7 +92,7 @@ class Pusher(NamedTuple):
 
     hand: Array
     closure: float
-    solids: Sequence[Solid]
+    solids: Sequence[ConvexSolid]
 
 
 class _Behind(NamedTuple):
@@ -109,7 +109,7 @@ class _Behind(NamedTuple):
     width: float
 
 
-class Thing(NamedTuple):
+class MovedThing(NamedTuple):
     """What is moved, in a frame along the way.
 
     Attributes:
@@ -171,7 +171,7 @@ def tops(view: WorldView, target: str, along: Array) -> list[Stance]:
 def _leaning(
     view: WorldView,
     target: str,
-    thing: Thing,
+    thing: MovedThing,
     along: Array,
     held: str | None,
     pushers: Sequence[Pusher],
@@ -194,7 +194,7 @@ def _leaning(
 
 def _contacts(
     view: WorldView,
-    thing: Thing,
+    thing: MovedThing,
     along: Array,
     held: str | None,
     pushers: Sequence[Pusher],
@@ -243,7 +243,7 @@ def _from_neutral(view: WorldView, tool: Array) -> float:
     return float(poses.angle_between(neutral[None, 3:], tool[None, 3:])[0])
 
 
-def _thing(view: WorldView, target: str, along: Array) -> Thing:
+def _thing(view: WorldView, target: str, along: Array) -> MovedThing:
     pose: Array = np.round(view.objects[target], 9)
     pose[:3] = 0.0
     turn = poses.pose(np.zeros(3), poses.quat_conjugate(_heading(along)))
@@ -254,7 +254,7 @@ def _thing(view: WorldView, target: str, along: Array) -> Thing:
     count = min(max(3, math.ceil((top - low) / STEP)), 6)
     heights = np.linspace(low, top - LEVEL, count)
     back = [piece._replace(corners=piece.corners * [-1.0, 1.0, 1.0]) for piece in pieces]
-    return Thing(heights, -fronts(back, heights, ACROSS), floor, float(corners[:, 0].max()))
+    return MovedThing(heights, -fronts(back, heights, ACROSS), floor, float(corners[:, 0].max()))
 
 
 def clearance(height: float) -> float:
@@ -301,7 +301,7 @@ def _wrapped(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def _behind(thing: Thing, body: Sequence[Solid]) -> _Behind | None:
+def _behind(thing: MovedThing, body: Sequence[ConvexSolid]) -> _Behind | None:
     """Where a pusher of some pieces touches a thing best; None where it would pass by.
 
     Its tool is right behind the thing's middle, or the middle of what it has in front is.
@@ -319,7 +319,7 @@ def _behind(thing: Thing, body: Sequence[Solid]) -> _Behind | None:
     return min((one for one in found if one is not None), key=lambda one: one.cost, default=None)
 
 
-def _touching(thing: Thing, reached: Array, middle: float, height: float) -> _Behind | None:
+def _touching(thing: MovedThing, reached: Array, middle: float, height: float) -> _Behind | None:
     """See `_behind`, for a front ``(h, g)`` whose tool is so many metres aside of the thing's middle."""
     both = np.isfinite(thing.backs) & np.isfinite(reached)
     if not both.any():

@@ -8,7 +8,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.demos_decomp.log import Floats
-from bt_tasksim.demos_decomp.segmentation import Hold
+from bt_tasksim.demos_decomp.segmentation import HandClosed
 from bt_tasksim.demos_decomp.signals import RATE, SmoothMotion, simplified
 from bt_tasksim.demos_decomp.support import Support
 
@@ -18,7 +18,7 @@ VIA_TOLERANCE = 0.02
 PATH_POINTS = 32
 
 
-def grasp_parameters(motion: SmoothMotion, hold: Hold) -> dict[str, Any]:
+def grasp_parameters(motion: SmoothMotion, hold: HandClosed) -> dict[str, Any]:
     """Target, approach direction and closing axis, averaged over the last 0.2 s before the hand is closed."""
     span = slice(max(0, hold.first - int(0.2 * RATE)), hold.first + 1)
     hand, target = motion.hand[span, 3:], motion.objects[hold.target][span, 3:]

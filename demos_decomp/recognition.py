@@ -16,7 +16,7 @@ from bt_tasksim.demos_decomp.evidence import Check, confidence, spoken_odds
 from bt_tasksim.demos_decomp.log import Demonstration, Floats
 from bt_tasksim.demos_decomp.parameters import bring_parameters, grasp_parameters, straight_parameters
 from bt_tasksim.demos_decomp.remarks import Remark, RemarkKind
-from bt_tasksim.demos_decomp.segmentation import DROP, Flight, Hold, find_flights, find_holds
+from bt_tasksim.demos_decomp.segmentation import DROP, Flight, HandClosed, find_flights, find_holds
 from bt_tasksim.demos_decomp.signals import SmoothMotion, evenly_sampled
 from bt_tasksim.demos_decomp.support import Support, bin_under, resting_on
 
@@ -65,14 +65,14 @@ def recognise(shown: Demonstration) -> tuple[list[Task], list[Remark]]:
     return tasks, remarks
 
 
-def _grasp(shown: Demonstration, motion: SmoothMotion, hold: Hold, since: int) -> Task:
+def _grasp(shown: Demonstration, motion: SmoothMotion, hold: HandClosed, since: int) -> Task:
     checks = list(hold.checks)
     parameters = grasp_parameters(motion, hold)
     return _task(motion, name_of(GRASPS), since, hold.first, checks, parameters)
 
 
 def _release(
-    shown: Demonstration, motion: SmoothMotion, hold: Hold, flights: list[Flight], since: int
+    shown: Demonstration, motion: SmoothMotion, hold: HandClosed, flights: list[Flight], since: int
 ) -> Task:
     assert hold.opening is not None
     name = hold.target
@@ -98,7 +98,7 @@ def _release(
 
 
 def _flight_tasks(
-    shown: Demonstration, motion: SmoothMotion, hold: Hold, flight: Flight, since: int
+    shown: Demonstration, motion: SmoothMotion, hold: HandClosed, flight: Flight, since: int
 ) -> list[Task]:
     """Pick, bring and place of one flight; those that took place."""
     name = hold.target
@@ -142,7 +142,9 @@ def _flight_tasks(
     return tasks
 
 
-def _slides(motion: SmoothMotion, hold: Hold, flight: Flight) -> dict[ContactChange, tuple[Check, Remark]]:
+def _slides(
+    motion: SmoothMotion, hold: HandClosed, flight: Flight
+) -> dict[ContactChange, tuple[Check, Remark]]:
     """Motion along the support before a pick and after a place, which these do not explain, by what they do.
 
     A short one counts for nothing: hands push what they take, and settle what they set down.
@@ -169,7 +171,7 @@ def _checks_of(slides: dict[ContactChange, tuple[Check, Remark]], does: ContactC
 
 
 def _phases(
-    shown: Demonstration, motion: SmoothMotion, hold: Hold, flight: Flight, lands: bool
+    shown: Demonstration, motion: SmoothMotion, hold: HandClosed, flight: Flight, lands: bool
 ) -> tuple[int, int, Check]:
     """Where pick ends and place begins on the path of a flight, and whether there is a bring between."""
     path = motion.objects[hold.target][flight.first : flight.last + 1, :3]
@@ -226,7 +228,7 @@ def _cleared(path: Floats) -> int:
 
 
 def _destination(
-    shown: Demonstration, motion: SmoothMotion, hold: Hold, flight: Flight, lands: bool
+    shown: Demonstration, motion: SmoothMotion, hold: HandClosed, flight: Flight, lands: bool
 ) -> Support | None:
     if lands:
         pose = _standing(motion, hold.target, flight.last, flight.rest_after)

@@ -40,7 +40,7 @@ STILL = 0.03
 
 
 @dataclass(frozen=True)
-class Hold:
+class HandClosed:
     """A span of time in which the hand holds an object.
 
     Attributes:
@@ -83,7 +83,7 @@ class Flight:
     rest_after: Floats
 
 
-def find_holds(shown: Demonstration, motion: SmoothMotion) -> tuple[list[Hold], list[Remark]]:
+def find_holds(shown: Demonstration, motion: SmoothMotion) -> tuple[list[HandClosed], list[Remark]]:
     """Finds what the hand holds, and when.
 
     Args:
@@ -103,7 +103,7 @@ def find_holds(shown: Demonstration, motion: SmoothMotion) -> tuple[list[Hold], 
     for i, swing in enumerate(found):
         if swing.change < 0:
             closed.append((swing, found[i + 1] if i + 1 < len(found) else None))
-    holds: list[Hold] = []
+    holds: list[HandClosed] = []
     remarks: list[Remark] = []
     for closing, opening in closed:
         first = closing.last if closing else 0
@@ -119,7 +119,9 @@ def find_holds(shown: Demonstration, motion: SmoothMotion) -> tuple[list[Hold], 
     return [replace(hold, until=limit) for hold, limit in zip(holds, limits, strict=False)], remarks
 
 
-def find_flights(shown: Demonstration, motion: SmoothMotion, hold: Hold) -> tuple[list[Flight], list[Remark]]:
+def find_flights(
+    shown: Demonstration, motion: SmoothMotion, hold: HandClosed
+) -> tuple[list[Flight], list[Remark]]:
     """Finds when a held object is in the air.
 
     Args:
@@ -181,11 +183,11 @@ def _held(
     closing: Swing | None,
     opening: Swing | None,
     threshold: float,
-) -> tuple[Hold | None, str]:
+) -> tuple[HandClosed | None, str]:
     """The hold between two samples, if it is one; and if not, what speaks most clearly against it."""
     if last - first < 3:
         return None, "it opened at once"
-    best: Hold | None = None
+    best: HandClosed | None = None
     score = np.inf
     against: list[Check] = []
     hand = motion.hand[first : last + 1]
@@ -216,12 +218,12 @@ def _held(
             checks.append(Check("hand is not shut, m", left, 0.001, spread / 2))
         ratio = slip / max(travel, 1e-9) + distance
         if all(checks) and ratio < score:
-            best, score = Hold(name, first, last, closing, opening, last, tuple(checks)), ratio
+            best, score = HandClosed(name, first, last, closing, opening, last, tuple(checks)), ratio
         against.append(min(checks, key=lambda check: check.probability))
     return best, str(max(against, key=lambda check: check.probability))
 
 
-def _until_parting(motion: SmoothMotion, hold: Hold) -> Hold:
+def _until_parting(motion: SmoothMotion, hold: HandClosed) -> HandClosed:
     """The hold up to where the opening hand parts from the object, not just begins to open."""
     if hold.opening is None:
         return hold
@@ -232,9 +234,9 @@ def _until_parting(motion: SmoothMotion, hold: Hold) -> Hold:
     return replace(hold, last=hold.last + parted)
 
 
-def _without_regrips(motion: SmoothMotion, holds: Sequence[Hold]) -> list[Hold]:
+def _without_regrips(motion: SmoothMotion, holds: Sequence[HandClosed]) -> list[HandClosed]:
     """Joins holds of one object between which the hand only shifted its grip."""
-    joined: list[Hold] = []
+    joined: list[HandClosed] = []
     for hold in holds:
         earlier = joined[-1] if joined else None
         if (
@@ -257,13 +259,13 @@ def _without_regrips(motion: SmoothMotion, holds: Sequence[Hold]) -> list[Hold]:
     return joined
 
 
-def _rest_before(motion: SmoothMotion, hold: Hold) -> Floats:
+def _rest_before(motion: SmoothMotion, hold: HandClosed) -> Floats:
     end = hold.first if hold.closing else min(hold.first + 5, hold.last)
     begin = max(0, (hold.closing.first if hold.closing else hold.first) - int(0.3 * RATE))
     return np.asarray(np.median(motion.objects[hold.target][begin : end + 1, :3], axis=0))
 
 
-def _rest_after(motion: SmoothMotion, hold: Hold) -> Floats:
+def _rest_after(motion: SmoothMotion, hold: HandClosed) -> Floats:
     """Where the object has come to rest after the hold, or where the hold ends."""
     if hold.opening is None:
         return motion.objects[hold.target][hold.last, :3]
@@ -272,12 +274,12 @@ def _rest_after(motion: SmoothMotion, hold: Hold) -> Floats:
     return np.asarray(np.median(motion.objects[hold.target][begin : end + 1, :3], axis=0))
 
 
-def _stands_at_start(shown: Demonstration, motion: SmoothMotion, hold: Hold) -> bool:
+def _stands_at_start(shown: Demonstration, motion: SmoothMotion, hold: HandClosed) -> bool:
     resting = resting_on(shown, motion, hold.target, hold.first)
     return resting is not None and abs(resting.gap) < 0.012
 
 
-def _landing(shown: Demonstration, motion: SmoothMotion, hold: Hold, after: Floats) -> Check | None:
+def _landing(shown: Demonstration, motion: SmoothMotion, hold: HandClosed, after: Floats) -> Check | None:
     """The claim that the object was placed and not let go in the air; None while it is held."""
     if hold.opening is None:
         return None
@@ -304,7 +306,7 @@ def _landing(shown: Demonstration, motion: SmoothMotion, hold: Hold, after: Floa
     return Check(f"{hold.target} falls after release, m", drop, DROP, spread, below=True, odds=odds)
 
 
-def _pauses(shown: Demonstration, motion: SmoothMotion, hold: Hold) -> list[tuple[int, int]]:
+def _pauses(shown: Demonstration, motion: SmoothMotion, hold: HandClosed) -> list[tuple[int, int]]:
     """Spans within a hold in which the object was put down, not let go, and lifted again."""
     track = motion.objects[hold.target]
     slow = speed(track[:, :3]) < STILL

@@ -22,7 +22,7 @@ _FEW = 12
 """Points of which all pairs are looked at sooner than their hull is found."""
 
 
-class Solid(NamedTuple):
+class ConvexSolid(NamedTuple):
     """A convex piece.
 
     Attributes:
@@ -34,18 +34,18 @@ class Solid(NamedTuple):
     edges: Array
 
 
-def solids(pieces: Sequence[Array], pose: Array | None = None) -> list[Solid]:
+def solids(pieces: Sequence[Array], pose: Array | None = None) -> list[ConvexSolid]:
     """Convex pieces, each by its corners ``(n, 3)``, in the frame in which their own has a pose ``(7,)``."""
-    found = [Solid(np.asarray(piece, float), _edges_of(piece)) for piece in pieces]
+    found = [ConvexSolid(np.asarray(piece, float), _edges_of(piece)) for piece in pieces]
     return found if pose is None else moved(found, pose)
 
 
-def moved(pieces: Sequence[Solid], pose: Array) -> list[Solid]:
+def moved(pieces: Sequence[ConvexSolid], pose: Array) -> list[ConvexSolid]:
     """The same pieces in the frame in which their own one has a pose ``(7,)``."""
     return [piece._replace(corners=poses.transform(pose, piece.corners)) for piece in pieces]
 
 
-def fronts(pieces: Sequence[Solid], heights: Array, across: Array) -> Array:
+def fronts(pieces: Sequence[ConvexSolid], heights: Array, across: Array) -> Array:
     """How far pieces reach along the first axis ``(h, g)``; minus infinity where none is.
 
     Args:
@@ -63,7 +63,7 @@ def fronts(pieces: Sequence[Solid], heights: Array, across: Array) -> Array:
     return found
 
 
-def section(piece: Solid, height: float) -> Array:
+def section(piece: ConvexSolid, height: float) -> Array:
     """Points ``(k, 2)`` whose hull is the cut of a piece by the level plane at a height; none beside it."""
     ends = piece.corners[piece.edges]
     heights = ends[..., 2]
