@@ -12,6 +12,8 @@ from bt_tasksim.concept_nodes.grasp import Grasp
 from bt_tasksim.concept_nodes.hand_conditions import HandEmpty, Lifted, Over, OverBeside
 from bt_tasksim.concept_nodes.hold import Hold
 from bt_tasksim.concept_nodes.in_contact import InContact
+from bt_tasksim.concept_nodes.insert import Insert
+from bt_tasksim.concept_nodes.inserted import Inserted
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
 from bt_tasksim.concept_nodes.pour import Pour
@@ -40,6 +42,8 @@ __all__ = [
     "Hold",
     "Holding",
     "InContact",
+    "Insert",
+    "Inserted",
     "Inside",
     "Lifted",
     "Over",

@@ -14,6 +14,7 @@ ALIKE = {
     "Command": "what a tick asks of the robot; a command of the command line, as Typer calls it",
     "ContactReader": "the same of two simulators",
     "Inside": "the goal relation, as physics tells it; the condition, as a robot sees it",
+    "Inserted": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Lifted": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Policy": "what decides in a leaf; what a limit of a robot does, in its file",
     "World": "the same of two simulators",

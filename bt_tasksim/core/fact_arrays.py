@@ -103,7 +103,7 @@ class PlaceFacts(FactArrays):
         clearance: ``(...)`` metres.
         container: Boolean ``(...)``: it is one, such as a bin, and ``height`` is that of its walls.
         rank: ``(...)`` its number among the places of its own world, whichever column it has.
-        carries: Boolean ``(...)``: it is of some furniture, and no mark in the air.
+        carries: Boolean ``(...)``: it is of some furniture, and neither a mark in the air nor a hole.
     """
 
     present: Array

@@ -78,7 +78,7 @@ def place_facts(worlds: Sequence[WorldModel], names: Sequence[str]) -> PlaceFact
         clearance=each(lambda place: place.clearance, 0.0),
         container=each(lambda place: place.container, False),
         rank=np.array(ranks, float).reshape(shape),
-        carries=each(lambda place: bool(place.fixture), False),
+        carries=each(lambda place: place.carries, False),
     )
 
 

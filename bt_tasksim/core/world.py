@@ -83,6 +83,10 @@ class ObjectModel:
     joint: JointModel | None = None
 
 
+HOLE = "hole"
+"""Kind of places that things are pushed into along one line, which may point anywhere."""
+
+
 def is_container(kind: str) -> bool:
     """Whether things are put into a place of this kind, and not onto it."""
     return kind == "bin"
@@ -94,12 +98,13 @@ class PlaceModel:
 
     Attributes:
         name: Its name.
-        kind: ``table``, ``board``, ``spot`` or ``bin``.
+        kind: ``table``, ``board``, ``spot``, ``bin`` or ``hole``.
         pose: Pose ``(7,)`` in the robot base frame; origin on the surface, where a thing placed without an
-            offset stands; z out of the surface.
+            offset stands; z out of the surface. Of a hole the origin is at its stop, and z points out of it.
         extent: Full size ``(2,)`` along x and y, metres, centred on ``centre``.
         centre: Centre ``(2,)`` of the surface in the place's own frame, metres.
-        height: Free height above the surface, metres (to the next board); walls' height for a bin.
+        height: Free height above the surface, metres (to the next board); walls' height for a bin, and how
+            deep a hole is.
         access: Unit vector ``(3,)``, robot base frame: the direction in which a hand comes to objects here.
         fixture: Name of the fixture it belongs to; empty where nothing carries it, such as a goal in the air.
         exit: Unit vector ``(3,)``, robot base frame: the way in which a lifted object leaves the fixture.
@@ -126,6 +131,11 @@ class PlaceModel:
     def container(self) -> bool:
         """Things are put into it, and not onto it."""
         return is_container(self.kind)
+
+    @property
+    def carries(self) -> bool:
+        """It is of some furniture, and things may stand on it or in it."""
+        return bool(self.fixture) and self.kind != HOLE
 
     @property
     def rim(self) -> float:

@@ -16,6 +16,7 @@ from bt_tasksim.core.typed_file import (
     NotNegative,
     Number,
     Pose7,
+    Quaternion,
     Share,
     Size3,
     Switch,
@@ -57,22 +58,33 @@ class PlaceEntry(Model):
 
     name: Name
     """Its name in trees and scenes."""
-    kind: Literal["table", "board", "bin", "spot"]
-    """What it is; a spot is marked with a colour."""
+    kind: Literal["table", "board", "bin", "spot", "hole"]
+    """What it is; a spot is marked with a colour, and into a hole things are pushed along one line."""
     position: Vector3
-    """Its origin in the fixture's frame, m: where something stands that is put there without an offset."""
+    """Its origin in the fixture's frame, m: where something stands that is put there without an offset; of a
+    hole the middle of its end."""
+    turn: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    """Unit quaternion w x y z in the fixture's frame, of a hole, out of which z points; others lie level."""
     extent: Extent2
     """Full size along x and y, m."""
     centre: Vector2 = (0.0, 0.0)
     """Middle of that size, from the origin, m."""
     height: Length = 10.0
-    """Free height above it, m; of a bin, that of its rim."""
+    """Free height above it, m; of a bin, that of its rim; of a hole, how deep it is."""
     access: Direction = (0.0, 0.0, -1.0)
     """Direction in which the hand comes, fixture's frame; scaled to length one."""
     exit: Direction = (0.0, 0.0, 1.0)
     """Direction in which things leave it, fixture's frame; scaled to length one."""
     clearance: Annotated[NotNegative, Field(le=10.0)] = 0.1
     """Distance along `access` that a hand keeps before it comes close, m."""
+
+    @model_validator(mode="after")
+    def _level(self) -> PlaceEntry:
+        if abs(sum(v * v for v in self.turn) - 1.0) > 1e-3:
+            raise ValueError(f"'turn' should be a unit quaternion w x y z, found {self.turn}")
+        if self.kind != "hole" and self.turn != (1.0, 0.0, 0.0, 0.0):
+            raise ValueError("only a hole may be turned, other places lie level: leave out 'turn'")
+        return self
 
 
 class HoldEntry(Model):

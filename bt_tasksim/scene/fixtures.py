@@ -45,6 +45,7 @@ class FixturePlace:
     access: tuple[float, float, float]
     exit: tuple[float, float, float]
     clearance: float
+    turn: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
 
     @property
     def container(self) -> bool:
@@ -133,7 +134,7 @@ class Fixture:
             PlaceModel(
                 name=place.name,
                 kind=place.kind,
-                pose=poses.multiply(frame, poses.pose(place.position)),
+                pose=poses.multiply(frame, np.array([*place.position, *place.turn])),
                 extent=place.extent,
                 centre=place.centre,
                 height=place.height,
@@ -172,6 +173,7 @@ class Fixture:
                 _scaled(p.access),
                 _scaled(p.exit),
                 p.clearance,
+                p.turn,
             )
             for p in file.places
         )

@@ -14,6 +14,7 @@ from bt_tasksim.core.own_files import own_file
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.renamed import renamed_arguments, renamed_fields
 from bt_tasksim.core.resources import is_file
+from bt_tasksim.core.world import HOLE
 from bt_tasksim.scene import sampling
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor, check_seed, generator
 from bt_tasksim.scene.fixture_overlap import check_fixtures
@@ -182,6 +183,7 @@ class Scene:
         """Every name that is used is one of the scene, and means one thing."""
         furniture = [p for f in self.fixtures for p in load_fixture(f).places]
         places, containers = {p.name for p in furniture}, [p.name for p in furniture if p.container]
+        holes = [p.name for p in furniture if p.kind == HOLE]
         moving = self._part_names()
         if twice := {name for name in moving if name in places or moving.count(name) > 1}:
             raise FieldError(
@@ -227,6 +229,14 @@ class Scene:
                 _require("goal", goal.object, {*specs, *moving}, (*where, "object"))
                 if goal.place:
                     _require("goal", goal.place, {*places, *specs, *moving}, (*where, "place"))
+                if goal.relation == "inserted" and goal.place not in holes:
+                    said = f"such as {', '.join(holes)}" if holes else "such as that of a peg_block"
+                    raise FieldError(
+                        f"the goal of '{goal.object}' is inserted in '{goal.place}', which is no hole: name "
+                        f"one, {said}",
+                        *where,
+                        "place",
+                    )
                 if goal.relation == "inside" and goal.place in places and goal.place not in containers:
                     said = f"such as {', '.join(containers)}" if containers else "such as a trash_bin or tray"
                     raise FieldError(

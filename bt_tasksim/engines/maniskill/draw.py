@@ -13,6 +13,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.engines.maniskill.environment import Environment
+from bt_tasksim.engines.maniskill.openings import BoxHole, opening
 from bt_tasksim.engines.maniskill.schema import TargetEntry
 from bt_tasksim.engines.maniskill.shapes import CollisionSolid, boxes, solid
 from bt_tasksim.engines.physics.sapien_world import array
@@ -95,8 +96,14 @@ def places(environment: Environment, to_base: Array) -> tuple[PlaceModel, ...]:
     fixed = {e.actor or name: name for name, e in environment.file.fixture_entries.items()}
     found = []
     for name, entry in environment.file.places.items():
-        pose = array(body_of(environment.actor(entry.actor)).entity_pose)
-        found.append(_place(name, entry, poses.multiply(to_base, pose), fixed))
+        body = body_of(environment.actor(entry.actor))
+        pose = poses.multiply(to_base, array(body.entity_pose))
+        if entry.through is None:
+            found.append(_place(name, entry, pose, fixed))
+        else:
+            solids = boxes(body.get_collision_shapes(), FURNITURE)
+            there = opening(solids, np.array(entry.through), f"actor '{entry.actor}'")
+            found.append(_hole(name, entry, pose, there, fixed))
     return tuple(found)
 
 
@@ -110,6 +117,21 @@ def _place(name: str, entry: TargetEntry, pose: Array, fixed: Mapping[str, str])
         extent=entry.extent,
         centre=entry.centre,
         height=entry.height,
+        access=_unit(entry.access),
+        exit=_unit(entry.exit),
+        fixture=fixed.get(entry.actor, ""),
+        clearance=entry.clearance,
+    )
+
+
+def _hole(name: str, entry: TargetEntry, pose: Array, found: BoxHole, fixed: Mapping[str, str]) -> PlaceModel:
+    return PlaceModel(
+        name=name,
+        kind=entry.kind,
+        pose=poses.multiply(pose, found.pose),
+        extent=found.extent,
+        centre=(0.0, 0.0),
+        height=found.depth,
         access=_unit(entry.access),
         exit=_unit(entry.exit),
         fixture=fixed.get(entry.actor, ""),

@@ -42,11 +42,15 @@ class TargetEntry(Model):
     """A place that trees name, where an actor is when the episode begins."""
 
     actor: Text
-    """Name of the actor in ManiSkill whose pose, turned about the vertical alone, it has."""
+    """Name of the actor in ManiSkill whose pose, turned about the vertical alone, it has; a hole is turned as
+    the actor is."""
     offset: Vector3 = (0.0, 0.0, 0.0)
     """Its origin in the actor's frame, m: where something stands that is put there without an offset."""
-    kind: Literal["table", "board", "bin", "spot"] = "spot"
+    kind: Literal["table", "board", "bin", "spot", "hole"] = "spot"
     """What it is."""
+    through: Direction | None = None
+    """Of a hole: the way into it in the actor's frame, along an axis of its boxes. Where it is, how wide and
+    how deep, is that of the room between them."""
     extent: Extent2 = (0.1, 0.1)
     """Full size along x and y, m."""
     centre: Vector2 = (0.0, 0.0)
@@ -59,6 +63,12 @@ class TargetEntry(Model):
     """Direction in which things leave it, robot base frame."""
     clearance: Annotated[NotNegative, Field(le=10.0)] = 0.1
     """Distance along `exit` after which a hand is clear of it, m."""
+
+    @model_validator(mode="after")
+    def _holes_go_through(self) -> TargetEntry:
+        if (self.kind == "hole") != (self.through is not None):
+            raise ValueError("a hole, and nothing else, has 'through', the way into it, such as [1, 0, 0]")
+        return self
 
 
 class DistanceEntry(Model):

@@ -148,7 +148,7 @@ class _Truth(Whereabouts):
         place = self._final.place(name)
         half = np.array([place.extent], float) / 2
         return LevelSurface(
-            place.pose[None], np.array([place.centre], float), half, np.array([bool(place.fixture)])
+            place.pose[None], np.array([place.centre], float), half, np.array([place.carries])
         )
 
     def hollow(self, name: str) -> Hollow:

@@ -63,6 +63,8 @@ def test_volume_and_inertia(case):
     wall, base = WALL, 0.005
     expected = {
         "box": x * y * z,
+        "book": x * y * z,
+        "peg": x * y * z,
         "cube": x * y * z,
         "cylinder": np.pi / 4 * x * y * z,
         "oval": np.pi / 4 * x * y * z,

@@ -43,6 +43,25 @@ def still(maniskill):
     made.pipeline.close()
 
 
+def test_a_hole_is_where_the_environment_has_it():
+    made = runner(sequence("wait", Wait(0.2)), "maniskill:PegInsertionSide-v1")
+    try:
+        (hole,) = [place for place in made.scene.sample(100).places if place.name == "hole"]
+        base = made.pipeline.physics._open().base
+        theirs = base.box_hole_pose.raw_pose[0].numpy().astype(float)
+        theirs[:3] += [0.615, 0.0, 0.0]
+        mine, length = np.asarray(hole.pose), float(base.peg_half_sizes[0, 0])
+        assert mine[:3] - length * poses.rotate(theirs[3:], np.array([1.0, 0, 0])) == pytest.approx(
+            theirs[:3], abs=1e-5
+        )
+        assert poses.z_axis(mine[3:]) == pytest.approx(-poses.to_matrix(theirs[3:])[:, 0], abs=1e-5)
+        wide = 2.0 * float(base.box_hole_radii[0])
+        assert hole.extent == pytest.approx((wide, wide), abs=1e-5)
+        assert hole.height == pytest.approx(2.0 * length, abs=1e-5)
+    finally:
+        made.pipeline.close()
+
+
 def test_a_drawn_world_is_the_environments_own_in_the_robots_frame(still):
     world = still.scene.sample(5)
     (cube,), base = world.objects, still.pipeline.physics._open().base

@@ -1,0 +1,124 @@
+"""The way of something that is held to before a hole, and straight in."""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, TOUCHING, with_room
+from bt_tasksim.concept_nodes.insertion import fitting_poses, hole_of, in_fingers
+from bt_tasksim.concept_nodes.view import WorldView
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.planning.route import Pace, Route
+from bt_tasksim.planning.surroundings import pieces_of
+from bt_tasksim.planning.things import Held, Leave
+from bt_tasksim.planning.ways import WayFinder
+
+STANDOFF = 0.015
+"""Metres before the mouth at which it comes to rest, is lined up anew and goes straight in."""
+ROOMS = (CARRIED, BROUGHT, TOUCHING)
+"""How much closer than usual one may come to things, tried one after the other."""
+OTHERS, POSTURES = 8, 4
+"""Ways round in which it may go in, and postures before the mouth, that are tried."""
+ROWS = 33
+"""Poses straight in for which joints are computed."""
+
+
+class WayIn(NamedTuple):
+    """The way into a hole in one world.
+
+    Attributes:
+        route: The motion to before the mouth.
+        joints: The arm's ``(n, n_arm)`` from there straight in, evenly along the way.
+        start: Pose ``(7,)`` of the object before the mouth.
+        end: Where it should end.
+        lies: How it lies in the hand ``(7,)``, as seen from where it seems to be.
+    """
+
+    route: Route
+    joints: Array
+    start: Array
+    end: Array
+    lies: Array
+
+
+def ends_in(view: WorldView, target: str, into: str, leading: Array | None, share: float) -> Array:
+    """Poses ``(k, 7)`` in which an object may end in a hole, see `fitting_poses`.
+
+    Args:
+        view: The world.
+        target: The object.
+        into: The hole.
+        leading: Axis of the object that goes in first.
+        share: How deep, of the hole's depth.
+
+    Raises:
+        NoWayError: It is no hole, or it does not fit.
+    """
+    hole = hole_of(view, into)
+    found = fitting_poses(view, target, hole, leading)
+    return poses.shifted(found, (1.0 - share) * hole.height * poses.z_axis(np.asarray(hole.pose)[3:]))
+
+
+def way_in(
+    view: WorldView, target: str, into: str, leading: Array | None, share: float, speed: float
+) -> WayIn:
+    """The way, with what is held turned as little as it may be; arguments as of `ends_in`.
+
+    Raises:
+        NoWayError: There is none; says what is in the way.
+    """
+    hole, held, seen = hole_of(view, into), in_fingers(view, target), view.objects[target]
+    ends = ends_in(view, target, into, leading, share)[:OTHERS]
+    grip = poses.relative(held, view.tool)
+    carried = Held(target, poses.relative(view.tool, held), pieces_of(view.model(target)))
+    back = (share * hole.height + STANDOFF) * poses.z_axis(np.asarray(hole.pose)[3:])
+    leave = Leave(held={hole.fixture or "furniture"})
+    inside = view.finder([target], held=carried, leave=leave, closer=TOUCHING)
+
+    def find(room: tuple[float, Array]) -> WayIn:
+        closer, end = room
+        start = poses.shifted(end, back)
+        finder = view.finder([target], held=carried, closer=closer)
+        tools = poses.multiply(np.array([start, end]), grip[None])
+        line = np.repeat(tools[:1], ROWS, axis=0)
+        line[:, :3] += np.linspace(0.0, 1.0, ROWS)[:, None] * (tools[1] - tools[0])[None, :3]
+        good = []
+        for q in itertools.islice(finder.postures(tools[0]), POSTURES):
+            joints = inside.arm.along(q, line[1:])
+            if joints is not None and inside.clear(np.concatenate([q[None], joints])):
+                good.append(np.concatenate([q[None], joints]))
+        if not good:
+            why = _why_not(finder, inside, tools)
+            raise NoWayError(f"{target} cannot be pushed into {into}: {why}")
+        route = finder.search_posture(np.array([joints[0] for joints in good]), Pace(speed))
+        nearest = min(good, key=lambda joints: float(abs(joints[0] - route.joints[-1]).max()))
+        return WayIn(route, nearest, start, end, poses.relative(seen, held))
+
+    return with_room(itertools.product(ROOMS, ends), find)
+
+
+def _why_not(finder: WayFinder, inside: WayFinder, tools: Array) -> str:
+    """Why the hand cannot be before a hole or in it, tool poses ``(2, 7)``."""
+    if not finder.ends(tools[:1]).free[0]:
+        return finder.no_end(tools[:1])
+    if not inside.ends(tools[1:]).free[0]:
+        return inside.no_end(tools[1:])
+    return "the arm cannot follow the way in"
+
+
+def sides_of(rotation: Array, inward: Array) -> Array:
+    """Unit vectors ``(N, 2, 3)`` across ways: where a hand holds loosely, and at right angles to that.
+
+    Fingers hold firmly across their faces, the tool's y; along x and z they may hold anywhere.
+    """
+    xp = array_namespace(rotation)
+    axes = [poses.rotate(rotation, constant(axis, inward)) for axis in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])]
+    across = [axis - poses.dot(axis, inward)[:, None] * inward for axis in axes]
+    first = xp.where((poses.norm(across[0]) > 0.5)[:, None], across[0], across[1])
+    first = first / poses.norm(first)[:, None]
+    return xp.stack([first, poses.cross(inward, first)], axis=1)
