@@ -1,0 +1,44 @@
+"""Random chores: functions of their seeds, that fit, and are judged by the physics."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from benchmarks import chores
+from benchmarks.chores import __main__ as command
+from benchmarks.chores.chore import KINDS, SLOTS
+from benchmarks.chores.draw import task
+from bt_tasksim.core.errors import InputError
+
+
+def test_a_seed_is_one_task():
+    one, two = task(910003), task(910003)
+    assert one.words == two.words and one.scene.sample(910003) == two.scene.sample(910003)
+    assert len({task(seed).words for seed in range(910000, 910006)}) > 3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_has_things_goals_and_leaves(kind):
+    drawn = task(910010, kinds=[kind])
+    assert {chore.kind for chore in drawn.chores} == {kind}
+    assert 1 <= len(drawn.chores) <= len(SLOTS)
+    tree = drawn.tree()
+    assert len(tree.children) == sum(len(chore.leaves()) for chore in drawn.chores)
+    assert all(chore.goals for chore in drawn.chores)
+
+
+def test_an_unknown_kind_is_refused():
+    with pytest.raises(InputError, match="no kind of chore 'juggle'"):
+        task(0, kinds=["juggle"])
+
+
+def test_one_is_measured(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert command.main(["--episodes", "1", "--seed", "910000", "--kinds", "carry", "--oracle", "0"]) == 0
+    (file,) = tmp_path.glob("runs/benchmarks/chores-panda.json")
+    found = json.loads(file.read_text())
+    assert found["episodes"] == 1 and found["draws"][0]["kinds"]
+    assert "possible ones" in capsys.readouterr().out
+    assert chores.__doc__
