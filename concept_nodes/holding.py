@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.outcomes import Possible, register_reason
-from bt_tasksim.core.poses import Array, array_namespace, localise, norm
+from bt_tasksim.core.poses import Array, array_namespace, localise, mean, norm, transform
 from bt_tasksim.core.units import METRES
 
 NOT_HELD = register_reason("not_held", "{object} is not held ({distance} from the tool)", distance=METRES)
@@ -14,6 +16,9 @@ REACH = 0.03
 """Metres by which the estimate of something that is held may lie outside the grasp."""
 BETWEEN = 0.003
 """The same of what is between the fingers."""
+AT_HANDLE = 0.03
+"""Metres from the middle between the fingertips to a handle of a part of furniture, within which they hold
+it."""
 
 
 def tool_distance(seen: Seen, target: str) -> Array:
@@ -34,7 +39,32 @@ def holding(seen: Seen, target: str, reach: float = REACH) -> Array:
         target: The object.
         reach: Metres by which the estimate may lie outside the grasp.
     """
-    return seen.opposed() & (tool_distance(seen, target) < reach)
+    near = tool_distance(seen, target) < reach
+    return seen.opposed() & by_handle(seen, target, near)
+
+
+def by_handle(seen: Seen, target: str, near: Array) -> Array:
+    """Boolean ``(N,)``: an object is in the hand; a part of furniture is where its handle is.
+
+    Args:
+        seen: What is seen.
+        target: The object.
+        near: Booleans ``(N,)``: it is near enough to the tool.
+    """
+    jointed, xp = seen.model(target).jointed, array_namespace(near)
+    return xp.where(jointed, off_handle(seen, target) < AT_HANDLE, near) if bool(xp.any(jointed)) else near
+
+
+def off_handle(seen: Seen, target: str) -> Array:
+    """Distance ``(N,)`` in metres of the middle between the fingertips from the nearest of a part's handles.
+
+    Infinite where it has none.
+    """
+    model, xp = seen.model(target), array_namespace(seen.tool)
+    middle = mean(xp.permute_dims(seen.observation.tips, (0, 2, 1)))
+    handles = transform(seen.object(target)[:, None, :], model.handles)
+    away = norm(handles - middle[:, None, :])
+    return xp.min(xp.where(model.handle_counts, away, xp.full_like(away, math.inf)), axis=-1)
 
 
 def may_hold(seen: Seen, target: str) -> Array:
@@ -46,10 +76,14 @@ def may_hold(seen: Seen, target: str) -> Array:
     """
     distance = tool_distance(seen, target)
     felt = array_namespace(distance).any(seen.contacts, axis=-1)
-    return (seen.opposed() & (distance < REACH)) | (felt & (distance < BETWEEN))
+    held = (seen.opposed() & (distance < REACH)) | (felt & (distance < BETWEEN))
+    return held & by_handle(seen, target, held)
 
 
 def not_held(seen: Seen, target: str) -> Possible:
-    """The outcome that an object is not in the hand, where it is not, see `may_hold`."""
-    held = may_hold(seen, target)
+    """The outcome that an object is not in the hand, where it is not, see `may_hold`.
+
+    A part of furniture is no object that can be carried.
+    """
+    held = may_hold(seen, target) & ~seen.model(target).jointed
     return NOT_HELD.where(~held, object=target, distance=tool_distance(seen, target))

@@ -88,6 +88,22 @@ def chain_to(wanted: Wanted) -> ActChain:
     return _achieved(ActChain(), wanted, ())
 
 
+def chains_to(wanted: Wanted) -> list[ActChain]:
+    """The chains that make a condition hold, one for each kind of thing that it may be about.
+
+    What never changes (`Condition.lasting`), such as whether a part of furniture slides or turns, tells them
+    apart; of those that need the same of it the surest and shortest counts.
+
+    Raises:
+        InputError: No concept establishes it, or what one needs leads back to where it began.
+    """
+    found: dict[tuple[str, ...], ActChain] = {}
+    for chain in _every(ActChain(), wanted, ()):
+        kind = tuple(said(need) for need in chain.given if condition_named(need.condition).lasting)
+        found.setdefault(kind, chain)
+    return list(found.values())
+
+
 def let_go(chain: ActChain) -> ActChain:
     """A chain with what ends the goals that it has reached: after it the hand is free.
 
@@ -127,7 +143,12 @@ def concept_kinds() -> Iterator[type[ConceptModel]]:
 
 
 def _achieved(chain: ActChain, wanted: Wanted, asking: tuple[str, ...]) -> ActChain:
-    """A chain made longer until a condition holds."""
+    """A chain made longer until a condition holds, in the shortest way."""
+    return _every(chain, wanted, asking)[0]
+
+
+def _every(chain: ActChain, wanted: Wanted, asking: tuple[str, ...]) -> list[ActChain]:
+    """A chain made longer until a condition holds, in each of the ways, the surest and shortest first."""
     if wanted.condition in asking:
         way = " needs ".join((*asking[asking.index(wanted.condition) :], wanted.condition))
         raise InputError(f"no chain of concepts leads to {said(wanted)}: {way}")
@@ -147,8 +168,7 @@ def _achieved(chain: ActChain, wanted: Wanted, asking: tuple[str, ...]) -> ActCh
     if not found:
         why = f": {problems[0]}" if problems else "; write one that declares it in its 'establishes'"
         raise InputError(f"no concept establishes {said(wanted)}{why}")
-    _, shortest = min(found, key=lambda one: (one[0], len(one[1].steps)))
-    return shortest
+    return [one for _, one in sorted(found, key=lambda pair: (pair[0], len(pair[1].steps)))]
 
 
 def _candidates(wanted: Wanted) -> Iterator[tuple[Act, bool]]:

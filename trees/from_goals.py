@@ -17,8 +17,10 @@ from bt_tasksim.trees.backchain import (
     Wanted,
     after,
     chain_to,
+    chains_to,
     concept_leaf,
     condition_leaf,
+    condition_named,
     goals_of,
     let_go,
 )
@@ -198,19 +200,28 @@ def _stage(goal: Goal, below: Goal | None = None) -> Behaviour:
         below: The goal of what the object is to stand on or beside, where that comes first.
     """
     wanted, title = _asked(goal), f"{goal.object} {goal.relation} {goal.place}".strip()
-    chain = _chain(goal, wanted)
-    needs = [condition_leaf(need) for need in chain.given]
-    if below is not None:
-        needs.insert(0, _check(below))
-    work = sequence(f"get {title}", *needs, *_acts(chain), condition_leaf(wanted))
-    return fallback(title, condition_leaf(wanted), work)
+    works = []
+    chains = _chains(goal, wanted)
+    for chain in chains:
+        needs = sorted(chain.given, key=lambda need: not condition_named(need.condition).lasting)
+        asked = [condition_leaf(need) for need in needs if len(chains) > 1 or not _lasting(need)]
+        if below is not None:
+            asked.insert(0, _check(below))
+        called = f"get {title}" if len(chains) == 1 else f"get {title}: {asked[0].name}"
+        works.append(sequence(called, *asked, *_acts(chain), condition_leaf(wanted)))
+    return fallback(title, condition_leaf(wanted), *works)
 
 
-def _chain(goal: Goal, wanted: Wanted) -> ActChain:
-    """What reaches a goal, and lets go where the object is not to be held."""
+def _lasting(need: Wanted) -> bool:
+    """Whether it never changes: then nobody need ask where there is one way alone."""
+    return condition_named(need.condition).lasting
+
+
+def _chains(goal: Goal, wanted: Wanted) -> list[ActChain]:
+    """What reaches a goal, by kinds of things, and lets go where the object is not to be held."""
     try:
-        chain = chain_to(wanted)
-        return chain if _condition(goal).in_hand else let_go(chain)
+        chains = chains_to(wanted)
+        return chains if _condition(goal).in_hand else [let_go(chain) for chain in chains]
     except InputError as error:
         raise InputError(f"goal '{goal.object} {goal.relation} {goal.place}': {error}") from error
 
@@ -235,7 +246,7 @@ def _parked(goal: Goal, parking: str) -> list[Behaviour]:
     """A fallback that brings an object to the parking place where its own spot is still taken by another."""
     wanted = _asked(goal)
     blocked = [
-        condition_leaf(a) for a in _chain(goal, wanted).given if a.arguments.get("place") == goal.place
+        condition_leaf(a) for a in _chains(goal, wanted)[0].given if a.arguments.get("place") == goal.place
     ]
     if not blocked:
         return []

@@ -18,6 +18,9 @@ class Aim(NamedTuple):
         aside: Other ones ``(m, 7)`` that will do where none of these is possible.
         onwards: Poses ``(k, n, 7)`` through which the target goes on from each of ``poses``, as it is turned;
             none where it stays there.
+        along: All of them have to be possible, one after the other, from where the target is taken: it goes
+            that way.
+        carried: Names of what goes along with it.
     """
 
     poses: Array
@@ -26,3 +29,5 @@ class Aim(NamedTuple):
     on_the_way: bool = False
     aside: Array | None = None
     onwards: Array | None = None
+    along: bool = False
+    carried: frozenset[str] = frozenset()

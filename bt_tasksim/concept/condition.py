@@ -91,6 +91,10 @@ class Condition(LeafModel, _CalledCondition):
     """A goal of its `relation` puts its object on or in its place, which has to be where it should be before.
     Otherwise the two only refer to each other, and may do so in a circle."""
 
+    lasting: ClassVar[bool] = False
+    """What it asks never changes, such as how a part of furniture moves: where several chains of concepts
+    lead to a goal, it says which of them does in a world."""
+
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._bind(args, kwargs, f"condition {type(self).__name__}")
 

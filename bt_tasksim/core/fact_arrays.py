@@ -56,6 +56,8 @@ class ObjectFacts(FactArrays):
         joint_zero: Poses ``(..., 7)`` of the part where it is shut.
         joint_limits: Lowest and highest value ``(..., 2)``, metres or radians.
         joint_sensed: Boolean ``(...)``: the robot sees how far it is open.
+        handles: Points ``(..., most, 3)`` in the part's frame where two fingers may hold it, metres.
+        handle_counts: Boolean ``(..., most)``: there is such a point.
     """
 
     present: Array
@@ -73,6 +75,8 @@ class ObjectFacts(FactArrays):
     joint_zero: Array
     joint_limits: Array
     joint_sensed: Array
+    handles: Array
+    handle_counts: Array
 
     @property
     def joints(self) -> Joints:
@@ -145,6 +149,7 @@ FILLING: Mapping[str, Any] = {
     "grasp_axes": (0.0, 1.0, 0.0),
     "grasp_widths": math.inf,
     "pose": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+    "handles": (0.0, 0.0, 0.0),
     "joint_axis": (1.0, 0.0, 0.0),
     "joint_zero": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
     "joint_limits": (0.0, 1.0),

@@ -23,6 +23,7 @@ def object_facts(worlds: Sequence[WorldModel], names: Sequence[str]) -> ObjectFa
     widths = [(np.inf,) if model is None else model.grasp_widths for model in models]
     shape = (len(rows), len(rows[0]))
     turned, counts = _padded(turns, shape, "rotations")
+    handles, handle_counts = _padded([_handles(model) for model in models], shape, "handles")
     return ObjectFacts(
         present=np.array([model is not None for model in models], bool).reshape(shape),
         extent=np.array([(1.0,) * 3 if m is None else m.extent for m in models], float).reshape(*shape, 3),
@@ -34,8 +35,18 @@ def object_facts(worlds: Sequence[WorldModel], names: Sequence[str]) -> ObjectFa
         rotation_counts=counts,
         grasp_axes=_padded(axes, shape, "grasp_axes")[0],
         grasp_widths=_padded(widths, shape, "grasp_widths")[0],
+        handles=handles,
+        handle_counts=handle_counts,
         **_joint_facts([None if model is None else model.joint for model in models], shape),
     )
+
+
+def _handles(model: ObjectModel | None) -> Array:
+    """Where two fingers may hold a part of a fixture ``(k, 3)``, in its own frame."""
+    if model is None or model.joint is None or model.solid is None:
+        return np.zeros((0, 3))
+    found: Array = np.asarray(model.solid.grips.points, float).reshape(-1, 3)
+    return found
 
 
 def _joint_facts(joints: Sequence[JointModel | None], shape: tuple[int, int]) -> dict[str, Array]:

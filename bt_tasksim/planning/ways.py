@@ -92,6 +92,11 @@ class WayFinder:
         self._workspace = bounds(robot, self.arm.tool(self.start))
 
     @property
+    def hand(self) -> Array:
+        """The hand's joints ``(n_hand,)`` on the way."""
+        return self._hand
+
+    @property
     def goes_straight(self) -> bool:
         """The arm has the joints to follow any line, turning as it likes."""
         return len(self.start) >= FULL

@@ -20,10 +20,14 @@ from bt_tasksim.checking.questions import QUESTIONS, Asked, spoken
 from bt_tasksim.checking.situations import alike, perturbed, situation_of, together
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes import (
+    AdjustDoor,
+    AdjustDrawer,
     AtPose,
     Beside,
     Bring,
     Clear,
+    CloseDoor,
+    CloseDrawer,
     Emptied,
     Grasp,
     HandEmpty,
@@ -33,7 +37,12 @@ from bt_tasksim.concept_nodes import (
     Insert,
     Inserted,
     Inside,
+    IsOpen,
+    IsShut,
+    JointAt,
     Lifted,
+    OpenDoor,
+    OpenDrawer,
     Over,
     OverBeside,
     Pick,
@@ -45,9 +54,11 @@ from bt_tasksim.concept_nodes import (
     Settle,
     Slide,
     SlideOff,
+    Slides,
     SlideToStop,
     StandsOn,
     TimePassed,
+    Turns,
     Upright,
     Wait,
     Withdraw,
@@ -71,7 +82,18 @@ SCENES = {
     "shelf_to_shelf": ("cup", "lower_board"),
     "pick_and_throw": ("cup", "trash_bin"),
 }
-OWN = {"insert": ("insert", ("peg", "hole"))}
+DRAWER = ("open_drawer", ("drawer", "chest"))
+OWN = {
+    "insert": ("insert", ("peg", "hole")),
+    "open a drawer": DRAWER,
+    "open a drawer wholly": DRAWER,
+    "adjust a drawer": DRAWER,
+    "close a drawer": DRAWER,
+    "open a door": DRAWER,
+    "open a door wholly": DRAWER,
+    "adjust a door": DRAWER,
+    "close a door": DRAWER,
+}
 """Concepts that begin in no such scene: a scenario of their own, with its target and its place."""
 KINDS = ("cube", "box", "cup", "cylinder", "oval", "diamond", "superellipsoid")
 
@@ -98,6 +120,15 @@ def concepts(target="target", place="goal"):
         "withdraw": Withdraw.value(),
         "withdraw upwards": Withdraw.value(direction=(0.0, 0.0, 1.0)),
         "settle": Settle.value(),
+        "open a drawer": OpenDrawer.value(target, distance=0.15),
+        "open a drawer wholly": OpenDrawer.value(target),
+        "adjust a drawer": AdjustDrawer.value(target, distance=0.1),
+        "close a drawer": CloseDrawer.value(target),
+        # Of a drawer they are refused at the begin, and asked all the same.
+        "open a door": OpenDoor.value(target, angle=0.1),
+        "open a door wholly": OpenDoor.value(target),
+        "adjust a door": AdjustDoor.value(target, angle=0.1),
+        "close a door": CloseDoor.value(target),
         # What is there already needs no plan, which takes a second in each world.
         "push": Push.value(target, direction=(1.0, 0.0, 0.0), distance=0.01),
         "pull": Pull.value(target, direction=(-1.0, 0.0, 0.0), distance=0.01),
@@ -123,6 +154,12 @@ def conditions(target="target", place="goal"):
         "in contact": InContact.value(target, place),
         "emptied": Emptied.value(target),
         "inside": Inside.value(target, place),
+        "slides": Slides.value(target),
+        "turns": Turns.value(target),
+        "open": IsOpen.value(target, by=0.15),
+        "open wholly": IsOpen.value(target),
+        "shut": IsShut.value(target),
+        "set": JointAt.value(target, at=0.1),
         "inserted": Inserted.value(target, place),
         "on": StandsOn.value(target, place),
         "beside": Beside.value(target, target),

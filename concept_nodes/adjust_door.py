@@ -1,0 +1,53 @@
+"""AdjustDoor: turn a door that is half open to where it should be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
+from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, Radians
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+
+
+@register("concept")
+class AdjustDoor(OnJoint):
+    """Turn a half-open door, or anything on a hinge, by the handle in the hand (keeps PR).
+
+    Args:
+        target: The door.
+        angle: How far it is open in the end, from where it is shut.
+        speed: Peak speed of the tool.
+        press: Force against the motion by which a stop is felt.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    angle: Radians
+    speed: MetresPerSecond = 0.15
+    press: Newtons = 12.0
+    force_limit: Newtons = FORCE_LIMIT
+
+    turns = True
+    establishes = (ConditionOf("JointAt", target="target", at="angle"),)
+    requires = (ConditionOf("Turns", target="target"),)
+    contact = ContactChange(ContactState.PR, ContactState.PR, "rotation")
+    presentation = Presentation(
+        colour="#79a3b1",
+        spoken=r"adjust.*door|(?:half|part).* open|a bit (?:farther|further)",
+        sayings=("I adjust the {}", "swing the {} a bit", "leave the {} ajar"),
+    )
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """How far."""
+        return f"by {float(parameters['angle']):.2f} rad" if "angle" in parameters else ""
+
+    def wanted(self, now: Array, limits: Array) -> Array:
+        """See `OnJoint.wanted`."""
+        xp = array_namespace(now)
+        return xp.minimum(xp.maximum(limits[:, 0], self.angle + 0.0 * now), limits[:, 1])

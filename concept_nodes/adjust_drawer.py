@@ -1,0 +1,52 @@
+"""AdjustDrawer: pull or push a drawer that is half open to where it should be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
+from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, ObjectName
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+
+
+@register("concept")
+class AdjustDrawer(OnJoint):
+    """Pull or push a half-open drawer, or anything that slides, by the handle in the hand (keeps PR).
+
+    Args:
+        target: The drawer.
+        distance: How far it is open in the end, from where it is shut.
+        speed: Peak speed of the tool.
+        press: Force against the motion by which a stop is felt.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    distance: Metres
+    speed: MetresPerSecond = 0.15
+    press: Newtons = 12.0
+    force_limit: Newtons = FORCE_LIMIT
+
+    establishes = (ConditionOf("JointAt", target="target", at="distance"),)
+    requires = (ConditionOf("Slides", target="target"),)
+    contact = ContactChange(ContactState.PR, ContactState.PR)
+    presentation = Presentation(
+        colour="#c79a4e",
+        spoken=r"adjust.*drawer|(?:half|part).* open|a bit (?:farther|further)",
+        sayings=("I adjust the {}", "move the {} a bit", "half open the {}"),
+    )
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """How far."""
+        return f"by {float(parameters['distance']):.2f} m" if "distance" in parameters else ""
+
+    def wanted(self, now: Array, limits: Array) -> Array:
+        """See `OnJoint.wanted`."""
+        xp = array_namespace(now)
+        return xp.minimum(xp.maximum(limits[:, 0], self.distance + 0.0 * now), limits[:, 1])

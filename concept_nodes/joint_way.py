@@ -1,0 +1,92 @@
+"""The way of a hand that holds a part of furniture and goes along its joint, in one world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from functools import cached_property
+
+import numpy as np
+
+from bt_tasksim.concept_nodes.view import WorldView
+from bt_tasksim.core import poses
+from bt_tasksim.core.joints import Joints
+from bt_tasksim.core.poses import Array
+from bt_tasksim.planning.surroundings import pieces_of
+from bt_tasksim.planning.things import Held, Leave
+from bt_tasksim.planning.ways import WayFinder
+
+STEP = {False: 0.02, True: math.radians(3.0)}
+"""Metres or radians between poses of the way, by whether the part turns."""
+ABOUT = 0.01
+"""Metres above and beside a part within which the middle of what stands in or on it may be."""
+
+
+class JointWay:
+    """A part of furniture, and whatever goes along with it.
+
+    Args:
+        view: The world.
+        target: The part.
+    """
+
+    def __init__(self, view: WorldView, target: str) -> None:
+        joint = view.model(target).joint
+        assert joint is not None, "it is a part of furniture"
+        self._view, self._target, self._joint = view, target, Joints.of([joint])
+        self._turns = joint.turns
+
+    @property
+    def now(self) -> float:
+        """How far it is taken to be open."""
+        return float(self._joint.value(self._view.objects[self._target][None])[0])
+
+    def poses(self, begin: float, end: float) -> Array:
+        """Poses ``(n, 7)`` of the part on the way from one value to another, both included."""
+        n = max(2, 1 + math.ceil(abs(end - begin) / STEP[self._turns]))
+        found: Array = self._joint.pose(np.linspace(begin, end, n))
+        return found
+
+    @cached_property
+    def carried(self) -> frozenset[str]:
+        """Things that stand in or on the part, and go along with it."""
+        return carried_by(self._view, self._target)
+
+    @cached_property
+    def beside(self) -> frozenset[str]:
+        """What the part touches on its way: furniture and the other parts of it."""
+        return beside(self._view, self._target)
+
+    def finder(self, tool: Array, closer: float, hand: Array | None = None) -> WayFinder:
+        """Ways of an arm whose hand holds the part at a tool pose ``(7,)``."""
+        view, at = self._view, self._view.objects[self._target]
+        held = Held(self._target, poses.relative(tool, at), pieces_of(view.model(self._target)))
+        apart = [self._target, *self.carried]
+        return view.finder(apart, held=held, leave=Leave(held=self.beside), closer=closer, hand=hand)
+
+    def tools(self, tool: Array, parts: Array) -> Array:
+        """Tool poses ``(n, 7)`` for poses ``(n, 7)`` of the part, by where the tool holds it now."""
+        grip = poses.relative(self._view.objects[self._target], tool)
+        found: Array = poses.multiply(parts, grip[None])
+        return found
+
+
+def carried_by(view: WorldView, target: str) -> frozenset[str]:
+    """Names of what is within the box about an object, or stands on it."""
+    size, here = np.array(view.model(target).extent) / 2, view.objects[target]
+    found = set()
+    for name, pose in view.objects.items():
+        model = view.model(name)
+        if name == target or model.joint is not None or not np.isfinite(pose).all():
+            continue
+        x, y, z = np.abs(poses.localise(here, pose[:3])) - size
+        if max(x, y) < ABOUT and z < ABOUT + max(model.extent) / 2:
+            found.add(name)
+    return frozenset(found)
+
+
+def beside(view: WorldView, target: str) -> frozenset[str]:
+    """Names of furniture and of its parts, but for one of them."""
+    fixtures: Collection[str] = {box.fixture or "furniture" for box in view.world.obstacles}
+    others = {m.name for m in view.world.objects if m.joint is not None and m.name != target}
+    return frozenset({*fixtures, *others})

@@ -1,0 +1,341 @@
+"""The law of all tasks that move a part of furniture along its joint: the hand that holds it goes along."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from bt_tasksim.concept.aim import Aim
+from bt_tasksim.concept.limit import Limit
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName
+from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes.closer import TOUCHING, VERY_CLOSE, with_room
+from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
+from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
+from bt_tasksim.concept_nodes.joint_way import JointWay
+from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
+from bt_tasksim.concept_nodes.view import WorldView, views
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.joints import Joints
+from bt_tasksim.core.outcomes import Form, Possible, Reason, Statement, register_reason
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.transfer import fetched
+from bt_tasksim.core.units import METRES, NEWTONS, RADIANS, Unit
+from bt_tasksim.core.world import Command
+from bt_tasksim.planning.reference_motion import Path, at_times, plan, position, searched_for
+from bt_tasksim.planning.route import Pace, Route, followed
+from bt_tasksim.planning.routes import SAMPLES, with_routes
+
+UNITS: Mapping[bool, Unit] = {False: METRES, True: RADIANS}
+"""Of what a part does, by whether it turns."""
+
+
+def _by_kind(name: str, sentence: str, **numbers: str) -> dict[bool, Reason]:
+    """A reason for what slides and one for what turns, which have other units."""
+    return {
+        turns: register_reason(
+            f"{name}_{'turning' if turns else 'sliding'}",
+            sentence,
+            **dict.fromkeys(numbers or ("value", "limit"), unit),
+        )
+        for turns, unit in UNITS.items()
+    }
+
+
+def _form(turns: bool) -> Form:
+    unit = UNITS[turns]
+    return Form(
+        "{object} is open by {value}, and should be by {wanted}; {force} at the wrist",
+        {"value": unit, "wanted": unit, "force": NEWTONS},
+    )
+
+
+JAMMED = _by_kind("jammed", "{object} does not follow the hand: it is {value} behind, more than {limit}")
+NOT_THERE = _by_kind("stopped_short", "{object} stopped {value} from where it should be, more than {limit}")
+STANDS = {turns: _form(turns) for turns in UNITS}
+FORCE_LIMIT = 50.0
+"""N at the wrist: what a stiff drawer takes, and well below what tears a handle off."""
+SOFT, HARD = 0.5, 0.9
+"""Shares of the force limit between which the hand goes slower and slower, until it stands."""
+NEAR = {False: 0.015, True: math.radians(4.0)}
+"""Metres or radians from its stop within which a part that is felt to be stopped is at it."""
+BEYOND = {False: 0.008, True: math.radians(2.5)}
+"""Metres or radians beyond the stop to which the hand goes unless it feels it before."""
+BEHIND = {False: 0.04, True: math.radians(10.0)}
+"""Metres or radians by which a part may be behind the hand."""
+PATIENCE = 1.0
+"""Seconds for which it may be farther behind, and after the way's end until which it may come there."""
+SLOWLY = 0.008
+"""Metres of the hand's way before a stop from which on it goes no faster than `GENTLY`."""
+GENTLY = 0.01
+"""Metres per second: what meets its stop at 60 mm/s in the hand of a stiff arm strains the wrist with
+54 N."""
+BRAKES = 0.1
+"""m/s^2 by which it comes to go so slowly."""
+FELT = 2
+"""Ticks in a row for which a stop must be felt."""
+TOLERANCE = {False: 0.004, True: math.radians(1.5)}
+"""Metres or radians within which a value counts as reached."""
+ACCELERATION = 0.4
+"""Peak acceleration of the tool, m/s^2."""
+TURN = 1.0
+"""Peak turning rate of the tool, rad/s."""
+ROOMS = (VERY_CLOSE, TOUCHING)
+"""How much closer than usual the arm may come to things, tried one after the other."""
+SHARES = (1.0, 0.95, 0.9, 0.85)
+"""Shares of the whole way that are tried where the arm cannot go all of it, and all of it was meant."""
+
+
+class JointMemory(NamedTuple):
+    """What such a task remembers in ``N`` worlds.
+
+    Attributes:
+        path: Tool path along the joint.
+        grip: Pose ``(N, 7)`` of the part in the tool frame.
+        goal: Value ``(N,)`` that is wanted, metres or radians.
+        baseline: Force ``(N,)`` against the motion when it began, N.
+        progress: Seconds ``(N,)`` of the path that have been commanded.
+        felt: Ticks ``(N,)`` in a row with the stop's force.
+        behind: Seconds ``(N,)`` in a row for which the part was far behind the hand.
+        late: Seconds ``(N,)`` since the path's end.
+    """
+
+    path: Path
+    grip: Array
+    goal: Array
+    baseline: Array
+    progress: Array
+    felt: Array
+    behind: Array
+    late: Array
+
+
+class OnJoint(ConceptModel[JointMemory]):
+    """A task in which the hand holds ``target``, a part of furniture, and takes it along its joint."""
+
+    target: ObjectName
+    speed: MetresPerSecond
+    press: Newtons
+    force_limit: Newtons
+
+    turns: ClassVar[bool] = False
+    """It is a task of what turns, and not of what slides."""
+    stops: ClassVar[int] = 0
+    """-1 or 1: it ends where the part is felt to be stopped, at the lower or the upper end."""
+
+    maintains = (HOLDING,)
+    default_timeout = 20.0
+
+    def wanted(self, now: Array, limits: Array) -> Array:
+        """The value ``(N,)`` at which it should end.
+
+        Args:
+            now: The present one ``(N,)``.
+            limits: Lowest and highest ``(N, 2)``.
+        """
+        raise NotImplementedError
+
+    @property
+    def wholly(self) -> bool:
+        """The end of the way is not given: less of it will do where the arm cannot go all of it."""
+        return False
+
+    def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
+        """The part must move as this task has it, and its handle be in the hand."""
+        model = seen.model(self.target)
+        away = off_handle(seen, self.target)
+        return (
+            NO_PART.where(~model.jointed, object=self.target),
+            OTHER_PART[self.turns].where(model.joint_turns != self.turns, object=self.target),
+            NOT_HELD.where(~at_handle(seen, self.target), object=self.target, distance=away),
+        )
+
+    def begin(self, seen: Seen) -> JointMemory:
+        """The way of hand and arm along the joint, to its end.
+
+        Raises:
+            NoWayError: The arm cannot go there in one of the worlds.
+        """
+        xp, now = array_namespace(seen.tool), self._value(seen)
+        limits = seen.model(self.target).joints.limits
+        (goals, values) = (np.asarray(v, float) for v in fetched([self.wanted(now, limits), now]))
+        found = [self._way(view, values[k], goals[k]) for k, view in enumerate(views(seen))]
+        path = plan([seen.tool], self.speed, samples=SAMPLES)
+        path = with_routes(
+            path, {k: [route] for k, (_, route) in enumerate(found)}, len(seen.robot.arm_joints)
+        )
+        nothing = xp.zeros_like(path.duration)
+        return JointMemory(
+            path=path,
+            grip=poses.relative(seen.tool, seen.object(self.target)),
+            goal=poses.constant(np.array([goal for goal, _ in found]), now),
+            baseline=nothing,
+            progress=nothing,
+            felt=xp.astype(nothing, xp.int64),
+            behind=nothing,
+            late=nothing,
+        )
+
+    def _way(self, view: WorldView, now: float, goal: float) -> tuple[float, Route]:
+        """The value at the end, and the motion, in one world."""
+        if view.model(self.target).joint is None:
+            raise NoWayError(NO_PART(object=self.target).sentence)
+        way, shares = JointWay(view, self.target), SHARES if self.wholly else SHARES[:1]
+        pace = Pace(self.speed, TURN, ACCELERATION)
+
+        def find(asked: tuple[float, float]) -> tuple[float, Route]:
+            share, closer = asked
+            end = now + share * (goal - now)
+            beyond = self.stops * BEYOND[self.turns] if share == 1.0 else 0.0
+            finder = way.finder(view.tool, closer)
+            tools = way.tools(view.tool, way.poses(now, end + beyond))
+            joints = finder.arm.along(finder.start, tools)
+            if joints is None:
+                raise NoWayError(self._too_far(way, finder, view, now, end))
+            if not finder.clear(np.concatenate([finder.start[None], joints])):
+                touch = next((t for q in joints for t in finder.collisions.touches(q)), None)
+                what = f"{touch[0]} would touch {touch[1]}" if touch else "something would be touched"
+                raise NoWayError(f"{self.target} cannot be moved: {what} on the way: make room there")
+            return end, followed(finder.arm, np.concatenate([finder.start[None], joints]), pace)
+
+        return with_room(((share, closer) for share in shares for closer in ROOMS), find)
+
+    def _too_far(self, way: JointWay, finder: Any, view: WorldView, now: float, end: float) -> str:
+        """How far the arm can go along, in one sentence."""
+        last, joints = now, finder.start
+        for value in np.linspace(now, end, 21)[1:]:
+            tools = way.tools(view.tool, way.poses(last, float(value)))
+            after = finder.arm.along(joints, tools)
+            if after is None:
+                break
+            last, joints = float(value), after[-1]
+        unit = UNITS[self.turns]
+        return (
+            f"the arm cannot go along with {self.target} farther than to {unit.text(last)}, and "
+            f"{unit.text(end)} are wanted: take it otherwise, or move it less"
+        )
+
+    def aim(self, view: WorldView) -> Aim | None:
+        """All of the way from where the part is."""
+        if view.model(self.target).joint is None:
+            return None
+        way = JointWay(view, self.target)
+        joint = view.model(self.target).joint
+        assert joint is not None
+        goal = float(self.wanted(np.array([way.now]), np.array([joint.limits]))[0])
+        if self.wholly:
+            goal = way.now + SHARES[-1] * (goal - way.now)
+        unit = UNITS[self.turns]
+        words = f"be taken from {unit.text(way.now)} to {unit.text(goal)}"
+        return Aim(way.poses(way.now, goal), words, way.beside, along=True, carried=way.carried)
+
+    def _law(self, seen: Seen) -> Joints:
+        return seen.model(self.target).joints
+
+    def _value(self, seen: Seen) -> Array:
+        """How far ``(N,)`` the part is taken to be open."""
+        return self._law(seen).value(seen.object(self.target))
+
+    def _command(self, seen: Seen, memory: JointMemory) -> tuple[Array, Array | None]:
+        """Where the hand should be now, tool poses ``(N, 7)``, and the arm's joints there."""
+        return at_times(memory.path, memory.progress)
+
+    def _against(self, seen: Seen, memory: JointMemory) -> Array:
+        """Force ``(N,)`` at the wrist against the motion along the joint, N."""
+        xp, now = array_namespace(seen.tool), self._value(seen)
+        ahead = xp.sign(memory.goal - now + self.stops * BEYOND[self.turns])
+        law = self._law(seen)
+        step = 0.01
+        there = poses.multiply(law.pose(now + step * ahead), poses.inverse(memory.grip))
+        here = poses.multiply(law.pose(now), poses.inverse(memory.grip))
+        moved = there[:, :3] - here[:, :3]
+        long = poses.norm(moved)
+        along = moved / poses.clip(long, 1e-9, math.inf)[:, None]
+        return -poses.dot(poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3]), along)
+
+    def advance(self, action: Array, seen: Seen, memory: JointMemory) -> JointMemory:
+        """Go on, slower where the wrist feels force; notice a stop, and a part that does not follow."""
+        xp, period = array_namespace(seen.tool), seen.world.control_period
+        force, now = force_at_wrist(seen), self._value(seen)
+        tool, _ = self._command(seen, memory)
+        asked = self._law(seen).value(poses.multiply(tool, memory.grip))
+        share = poses.clip((HARD - force / self.force_limit) / (HARD - SOFT), 0.0, 1.0)
+        if self.stops:
+            here, next_one = (position(memory.path, memory.progress + dt) for dt in (0.0, period))
+            ahead = poses.clip(poses.norm(next_one - here), 1e-9, math.inf)
+            end = poses.multiply(self._law(seen).pose(memory.goal), poses.inverse(memory.grip))
+            left = poses.clip(poses.norm(end[:, :3] - here) - SLOWLY, 0.0, math.inf)
+            most = xp.sqrt(GENTLY**2 + 2.0 * BRAKES * left)
+            share = xp.minimum(share, poses.clip(most * period / ahead, 0.0, 1.0))
+            share = xp.where(memory.felt > 0, xp.zeros_like(share), share)
+        progress = memory.progress + period * share
+        far = abs(asked - now) > BEHIND[self.turns]
+        against = self._against(seen, memory)
+        ticks = xp.where(against > 1.5 * self.press, FELT + 0 * memory.felt, 1 + 0 * memory.felt)
+        feels = against > self.press
+        at_stop = abs(now - memory.goal) < NEAR[self.turns]
+        felt = feels & at_stop if self.stops else xp.zeros_like(far)
+        over = (progress >= memory.path.duration) | (share <= 0.0)
+        return memory._replace(
+            progress=xp.minimum(progress, memory.path.duration),
+            felt=xp.where(felt, memory.felt + ticks, xp.zeros_like(memory.felt)),
+            behind=xp.where(far, memory.behind + period, xp.zeros_like(memory.behind)),
+            late=xp.where(over, memory.late + period, xp.zeros_like(memory.late)),
+        )
+
+    def command(self, action: Array, seen: Seen, memory: JointMemory) -> Command:
+        """Follow the path; the hand keeps its grip."""
+        tool, arm = self._command(seen, memory)
+        return Command(tool=tool, posture=arm)
+
+    def planned(self, memory: JointMemory) -> Array | float:
+        """How long the way takes."""
+        return searched_for(memory.path)
+
+    def limits(self, seen: Seen, memory: JointMemory) -> tuple[Limit, ...]:
+        """The force at the wrist; a part that does not follow; one that stopped short."""
+        names = {"object": self.target}
+        tool, _ = self._command(seen, memory)
+        now = self._value(seen)
+        asked = self._law(seen).value(poses.multiply(tool, memory.grip))
+        off = abs(now - memory.goal)
+        return (
+            strain(seen, self.force_limit),
+            Limit(JAMMED[self.turns], abs(asked - now), BEHIND[self.turns], names, memory.behind >= PATIENCE),
+            Limit(NOT_THERE[self.turns], off, TOLERANCE[self.turns], names, memory.late >= PATIENCE),
+        )
+
+    def done(self, seen: Seen, memory: JointMemory) -> Array:
+        """The value is reached and the hand at rest, or the stop is felt."""
+        off = abs(self._value(seen) - memory.goal)
+        arrived = (memory.progress >= memory.path.duration) & (off <= TOLERANCE[self.turns])
+        return arrived | (memory.felt >= FELT)
+
+    def maintained(self, goal: str, seen: Seen, memory: JointMemory) -> Array:
+        """The handle may still be in the hand."""
+        return at_handle(seen, self.target)
+
+    def necessary_cost(self, seen: Seen, memory: JointMemory) -> Array:
+        """How far the value is from the wanted one, metres or radians."""
+        return abs(self._value(seen) - memory.goal)
+
+    def sufficient_cost(self, known: Known, memory: JointMemory) -> Array:
+        """How far the part truly is from the wanted value, over what a goal allows."""
+        law = known.world.object(self.target).joints
+        off = abs(law.value(known.object(self.target)) - memory.goal)
+        return off / ALLOWED[self.turns]
+
+    def explain(self, seen: Seen, memory: JointMemory) -> Statement:
+        """How far it is, how far it should be, and the force at the wrist."""
+        return STANDS[self.turns](
+            object=self.target, value=self._value(seen), wanted=memory.goal, force=force_at_wrist(seen)
+        )
+
+
+ALLOWED = {False: 0.02, True: math.radians(8.0)}
+"""Metres or radians from the wanted value that are tolerable."""

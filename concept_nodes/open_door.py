@@ -1,0 +1,63 @@
+"""OpenDoor: turn a door open by the handle that the hand holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
+from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, Radians
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+
+
+@register("concept")
+class OpenDoor(OnJoint):
+    """Turn a door, or anything on a hinge, off its stop by the handle in the hand (OP to PR).
+
+    Args:
+        target: The door.
+        angle: How far it is open in the end, from where it is shut; by default all the way.
+        speed: Peak speed of the tool.
+        press: Force against the motion by which a stop is felt.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    angle: Radians | None = None
+    speed: MetresPerSecond = 0.15
+    press: Newtons = 12.0
+    force_limit: Newtons = FORCE_LIMIT
+
+    turns = True
+    establishes = (
+        ConditionOf("IsOpen", target="target", by="angle"),
+        ConditionOf("IsOpen", target="target", given={"angle": None}),
+    )
+    requires = (ConditionOf("Turns", target="target"),)
+    contact = ContactChange(ContactState.OP, ContactState.PR, "rotation")
+    presentation = Presentation(
+        colour="#4f7f8f",
+        spoken=r"open.*door|swing .* open",
+        sayings=("I open the {}", "swing the {} open", "turn the {} open"),
+    )
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """How far."""
+        return f"by {float(parameters['angle']):.2f} rad" if "angle" in parameters else ""
+
+    @property
+    def wholly(self) -> bool:
+        """See `OnJoint.wholly`."""
+        return self.angle is None
+
+    def wanted(self, now: Array, limits: Array) -> Array:
+        """See `OnJoint.wanted`: what is farther open stays so."""
+        if self.angle is None:
+            return limits[:, 1]
+        xp = array_namespace(now)
+        return xp.minimum(xp.maximum(now, self.angle + 0.0 * now), limits[:, 1])

@@ -1,0 +1,62 @@
+"""OpenDrawer: pull a drawer out by the handle that the hand holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
+from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, ObjectName
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+
+
+@register("concept")
+class OpenDrawer(OnJoint):
+    """Pull a drawer, or anything that slides, out of its stop by the handle in the hand (OP to PR).
+
+    Args:
+        target: The drawer.
+        distance: How far it is open in the end, from where it is shut; by default all the way.
+        speed: Peak speed of the tool.
+        press: Force against the motion by which a stop is felt.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    distance: Metres | None = None
+    speed: MetresPerSecond = 0.15
+    press: Newtons = 12.0
+    force_limit: Newtons = FORCE_LIMIT
+
+    establishes = (
+        ConditionOf("IsOpen", target="target", by="distance"),
+        ConditionOf("IsOpen", target="target", given={"distance": None}),
+    )
+    requires = (ConditionOf("Slides", target="target"),)
+    contact = ContactChange(ContactState.OP, ContactState.PR)
+    presentation = Presentation(
+        colour="#b0792c",
+        spoken=r"open.*drawer|pull .* out\b|slide .* open",
+        sayings=("I open the {}", "pull the {} open", "now open the {}"),
+    )
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """How far."""
+        return f"by {float(parameters['distance']):.2f} m" if "distance" in parameters else ""
+
+    @property
+    def wholly(self) -> bool:
+        """See `OnJoint.wholly`."""
+        return self.distance is None
+
+    def wanted(self, now: Array, limits: Array) -> Array:
+        """See `OnJoint.wanted`: what is farther open stays so."""
+        if self.distance is None:
+            return limits[:, 1]
+        xp = array_namespace(now)
+        return xp.minimum(xp.maximum(now, self.distance + 0.0 * now), limits[:, 1])

@@ -1,0 +1,86 @@
+"""Drawers and doors: the hand goes along the joint, and refuses what it cannot do in one sentence."""
+
+import pytest
+from draws import successes
+from py_trees.common import Status
+
+from bt_tasksim.concept_nodes import AdjustDrawer, CloseDrawer, Grasp, OpenDoor, OpenDrawer, Pick, Release
+from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
+from bt_tasksim.concept_nodes.holding import NOT_HELD
+from bt_tasksim.concept_nodes.limits import WRIST_STRAINED
+from bt_tasksim.concept_nodes.on_joint import JAMMED, NOT_THERE
+from bt_tasksim.core.outcomes import NO_WAY
+from bt_tasksim.core.resources import asset
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene
+from bt_tasksim.trees import same_tree, sequence, tidy, tree_from_xml, tree_to_xml
+
+CUP = {"cup": ObjectSpec(kinds=("cup",), on="table", centre=(-0.1, -0.25), area=(0.0, 0.0))}
+
+
+def ran(*leaves, seed=3, goal=None, engines="sapien", fixture="chest", **scene):
+    goal = goal or Goal("drawer", relation="shut")
+    made = Scene(fixtures=[FixtureSpec(fixture)], goal=goal, name="chest", **scene)
+    return Runner(sequence("the tree", *leaves), made, EngineOptions(engines=engines)).run(seed)
+
+
+def stiff(tmp_path, friction):
+    """The chest with a drawer that takes more to move."""
+    text = asset("fixtures", "chest.yaml").read_text().replace("friction: 4.0", f"friction: {friction}")
+    found = tmp_path / "chest.yaml"
+    found.write_text(text)
+    return str(found)
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize("engines", ["sapien", "mujoco"])
+def test_a_drawer_is_opened_adjusted_and_shut_again(engines):
+    def run(seed):
+        moved = (
+            OpenDrawer("drawer", distance=0.18),
+            AdjustDrawer("drawer", distance=0.10),
+            CloseDrawer("drawer"),
+        )
+        return ran(Grasp("drawer"), *moved, Release("drawer"), seed=seed, engines=engines)
+
+    (result,) = successes(run, range(3, 6), n=1)
+    assert result.status == Status.SUCCESS and result.verdict.penetration < 0.002
+
+
+@pytest.mark.parametrize(
+    ("leaf", "reason"),
+    [
+        (OpenDrawer("drawer"), NOT_HELD),
+        (OpenDoor("drawer"), OTHER_PART[True]),
+        (OpenDrawer("cup"), NO_PART),
+        (Pick("drawer"), NOT_HELD),
+    ],
+)
+def test_what_cannot_be_done_is_refused(leaf, reason):
+    result = ran(leaf, objects=CUP)
+    assert result.status == Status.FAILURE and result.outcome.is_a(reason)
+
+
+def test_a_drawer_that_is_stuck_is_given_up_before_anything_breaks(tmp_path):
+    fixture = stiff(tmp_path, 300.0)
+    result = ran(Grasp("drawer"), OpenDrawer("drawer", distance=0.15), fixture=fixture)
+    assert result.status == Status.FAILURE
+    assert any(
+        result.outcome.is_a(why) for why in (JAMMED[False], NOT_THERE[False], WRIST_STRAINED, NOT_HELD)
+    )
+
+
+def test_a_way_that_the_arm_cannot_go_is_refused_before_it_is_begun():
+    far = FixtureSpec("chest", at=(0.95, 0.0))
+    made = Scene(fixtures=[far], goal=Goal("drawer", relation="open"), name="far")
+    tree = sequence("the tree", Grasp("drawer"), OpenDrawer("drawer"))
+    result = Runner(tree, made, EngineOptions()).run(3)
+    assert result.status == Status.FAILURE and result.outcome.is_a(NO_WAY)
+
+
+def test_goals_of_parts_become_trees_of_what_moves_them():
+    tree = tidy([Goal("drawer", relation="open", value=0.15), Goal("door", relation="shut")])
+    said = tree_to_xml(tree)
+    assert all(f"<{name} " in said for name in ("Slides", "OpenDrawer", "Turns", "CloseDoor", "IsShut"))
+    assert same_tree(tree, tree_from_xml(said))
