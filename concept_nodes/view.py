@@ -163,7 +163,10 @@ def views(seen: Seen) -> list[WorldView]:
 
 
 def _adrift(world: WorldModel, estimates: Mapping[str, Array], holds: Array | None) -> frozenset[str]:
-    """Objects in the air, see `adrift`, but for what a hand that holds something has at its tool ``(7,)``."""
+    """Objects in the air, see `adrift`, but for what a hand that holds something has at its tool ``(7,)``.
+
+    Parts of fixtures are none: their joints bear them.
+    """
     known = {name: pose for name, pose in estimates.items() if np.isfinite(pose).all()}
     loose = {name: pose for name, pose in known.items() if world.object(name).joint is None}
     free = (name for name, pose in loose.items() if holds is None or _beyond(world.object(name), pose, holds))

@@ -60,7 +60,8 @@ class Joint(JointModel):
         """Force or torque of spring, latch and damping on the part, N or Nm.
 
         Damping is that of the mean speed over the step, ``v (1 - exp(-d t / m)) m / (d t)``, which never
-        turns the motion round, however strong it is.
+        turns the motion round, however strong it is. What else acts in the step is not known here, so it is
+        weaker than it should be where ``d t / m`` is not small: by a twentieth where that is 0.1.
 
         Args:
             value: How far it is open.

@@ -1,9 +1,9 @@
 """How far parts of fixtures are taken to be open: as they are seen, or as the hand has left them.
 
 A part is on its joint, whose axis is calibrated; so what is seen of it is brought onto the joint. Where the
-scene does not say that the part is sensed, the robot knows how it stands at the beginning, and from then on
-what its hand does with it: the part goes along with fingers that hold it by one of its grasps, and with a
-fist that touches it.
+scene does not say that the part is sensed, the robot knows how it stands at the beginning, as it was seen
+then or else as the scene says, and from then on what its hand does with it: the part goes along with fingers
+that hold it by one of its grasps, and with a fist that touches it.
 """
 
 from __future__ import annotations
@@ -36,12 +36,14 @@ class TrackedPart:
         column: Where it stands among the objects.
         model: What is known of it.
         joint: Its joint ``(1,)``.
+        told: How far it is open at the beginning ``(1,)``, as the scene says.
         value: How far it is taken to be open ``(1,)``, once somebody has looked.
     """
 
     column: int
     model: ObjectModel
     joint: Joints
+    told: Array
     value: Array | None = None
 
     @property
@@ -80,7 +82,9 @@ class Parts:
                 if actor.joint is not None:
                     model = actor.model()
                     assert model.joint is not None
-                    found.append(TrackedPart(column, model, Joints.of([model.joint])))
+                    joint = Joints.of([model.joint])
+                    told = joint.value(np.array(actor.pose, float)[None])
+                    found.append(TrackedPart(column, model, joint, told))
             self._parts[row], self._hands[row] = found, None
         self._any = any(self._parts)
 
@@ -114,6 +118,8 @@ class Parts:
         if part.value is None or part.sensed:
             if np.isfinite(seen).all():
                 part.value = part.joint.value(seen[None])
+            elif not part.sensed:
+                part.value = part.told
             return
         if before is None:
             return

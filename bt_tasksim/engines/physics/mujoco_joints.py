@@ -11,6 +11,10 @@ from bt_tasksim.scene.joints import Joint
 if TYPE_CHECKING:
     import mujoco as mj
 
+STICKING = [0.9999, 0.9999, 0.001, 0.5, 2.0]
+"""Impedance of friction: the most that MuJoCo has, so that a part creeps by a hundredth of a millimetre a
+second under the force that just moves it. With MuJoCo's own it is a centimetre a second."""
+
 
 def add_part_joint(mujoco: ModuleType, body: mj.MjsBody, name: str, joint: Joint) -> None:
     """The joint of a part, in a body that stands where the part is shut. A latch is the engine's to apply."""
@@ -21,6 +25,7 @@ def add_part_joint(mujoco: ModuleType, body: mj.MjsBody, name: str, joint: Joint
     made.range = joint.limits
     made.solref_limit, made.solimp_limit = list(SOLREF), list(SOLIMP)
     made.frictionloss = joint.friction
+    made.solimp_friction = STICKING
     made.damping = _set(made.damping, joint.damping)
     made.stiffness = _set(made.stiffness, joint.stiffness)
     made.springref = joint.rest

@@ -5,17 +5,21 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.files import file_version
+from bt_tasksim.core.joints import KINDS as JOINTS
 from bt_tasksim.core.resources import asset
 from bt_tasksim.engines.perception.noise import noise_model
 from bt_tasksim.engines.remote.plain import shown
 from bt_tasksim.robot.description import RobotDescription
-from bt_tasksim.scene.configuration import STREAMS, ActorConfiguration
+from bt_tasksim.scene.box import Box
+from bt_tasksim.scene.configuration import STREAMS, ActorConfiguration, ObjectActor
+from bt_tasksim.scene.part_kind import PART
 from bt_tasksim.scene.shapes import KINDS
 
 MOST_ACTORS = 128
@@ -25,6 +29,7 @@ FREQUENCIES = (1, 10_000)
 """Hz, of physics and of control."""
 _FAR = 1000.0
 _SIZES = (1e-4, 100.0)
+_STRONGEST = 1e5
 
 
 def for_sending(configuration: ActorConfiguration, robot: RobotDescription) -> ActorConfiguration:
@@ -101,8 +106,8 @@ def check(configuration: ActorConfiguration, robot: RobotDescription) -> None:
         raise InputError(f"the world is for the robot {shown(c.robot)}, and this engine's is '{robot.name}'")
     if max(len(c.objects), len(c.fixtures), len(c.places)) > MOST_ACTORS:
         raise InputError(f"a world has at most {MOST_ACTORS} objects, fixtures and places")
-    if sum(len(f.boxes) for f in c.fixtures) > MOST_BOXES:
-        raise InputError(f"a world's fixtures have at most {MOST_BOXES} boxes")
+    if sum(len(thing.boxes) for thing in (*c.fixtures, *c.objects)) > MOST_BOXES:
+        raise InputError(f"a world's fixtures and their parts have at most {MOST_BOXES} boxes")
     low, high = FREQUENCIES
     if not (low <= c.control_frequency <= c.physics_frequency <= high):
         raise InputError(
@@ -122,10 +127,7 @@ def check(configuration: ActorConfiguration, robot: RobotDescription) -> None:
         _check_object(actor)
     for fixture in c.fixtures:
         _pose(fixture.pose, f"fixture {shown(fixture.name)}")
-        for box in fixture.boxes:
-            _pose(box.pose, f"a box of {shown(fixture.name)}")
-            _within(box.size, _SIZES, f"size of a box of {shown(fixture.name)}")
-            _within((box.friction,), (0.0, 100.0), "friction")
+        _boxes(fixture.boxes, fixture.name)
     for place in c.places:
         _pose(tuple(place.pose), f"place {shown(place.name)}")
     names = [actor.name for actor in c.objects]
@@ -137,7 +139,11 @@ def check(configuration: ActorConfiguration, robot: RobotDescription) -> None:
 
 def _check_object(actor: Any) -> None:
     where = f"object {shown(actor.name)}"
-    if actor.kind not in KINDS:  # whose own sentence would show what was sent as it is
+    if actor.kind == PART:
+        _check_part(actor, where)
+    elif actor.boxes or actor.joint is not None:
+        raise InputError(f"{where}: only parts of fixtures have boxes and a joint")
+    elif actor.kind not in KINDS:  # whose own sentence would show what was sent as it is
         raise InputError(f"{where} is of unknown kind {shown(actor.kind)}{nearest(actor.kind, KINDS)}")
     _pose(actor.pose, where)
     _within(actor.size, _SIZES, f"{where}: size")
@@ -149,6 +155,34 @@ def _check_object(actor: Any) -> None:
         raise InputError(f"{where}: at most {MOST_GRASPS} grasps, found {len(actor.grasps)}")
     if actor.symmetry is not None:
         _within((actor.symmetry,), (0, 360), f"{where}: symmetry")
+
+
+def _check_part(actor: ObjectActor, where: str) -> None:
+    joint = actor.joint
+    if joint is None or not actor.boxes:
+        raise InputError(f"{where}: a part of a fixture has boxes and a joint")
+    _boxes(actor.boxes, actor.name)
+    if joint.kind not in JOINTS:
+        raise InputError(
+            f"{where}: its joint is of unknown kind {shown(joint.kind)}{nearest(joint.kind, JOINTS)}"
+        )
+    _pose(joint.zero, f"{where}: where it is shut")
+    if len(joint.axis) != 3 or abs(math.hypot(*joint.axis) - 1.0) > 1e-3:
+        raise InputError(f"{where}: the axis of its joint is a unit vector")
+    _within(joint.origin, (-_FAR, _FAR), f"{where}: origin of its joint")
+    if len(joint.origin) != 3 or len(joint.limits) != 2 or not joint.limits[0] < joint.limits[1]:
+        raise InputError(f"{where}: a joint has an origin and two limits, the lower one first")
+    _within(joint.limits, (-_FAR, _FAR), f"{where}: limits")
+    forces = (joint.friction, joint.damping, joint.stiffness, joint.latch)
+    _within(forces, (0.0, _STRONGEST), f"{where}: friction, damping, stiffness and latch")
+    _within((joint.rest,), (-_FAR, _FAR), f"{where}: rest of its spring")
+
+
+def _boxes(boxes: Iterable[Box], whose: str) -> None:
+    for box in boxes:
+        _pose(box.pose, f"a box of {shown(whose)}")
+        _within(box.size, _SIZES, f"size of a box of {shown(whose)}")
+        _within((box.friction,), (0.0, 100.0), "friction")
 
 
 def _pose(pose: tuple[float, ...], where: str) -> None:

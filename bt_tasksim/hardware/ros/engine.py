@@ -12,6 +12,7 @@ import time
 import uuid
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import compress
 from typing import ClassVar, Self
 
 import numpy as np
@@ -36,7 +37,7 @@ from bt_tasksim.hardware.ros.start import WayToStart
 from bt_tasksim.hardware.safety import checks
 from bt_tasksim.hardware.safety.engine import ChannelSpec, EmergencyStop, JointReading, RealEngine
 from bt_tasksim.robot.description import RobotDescription
-from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 
 MATCH = 0.3
 """Seconds after which whoever listens to a topic has found whoever publishes there."""
@@ -91,6 +92,7 @@ class RosRobot(RealEngine):
         self._lock = threading.RLock()
         self._held, self._run, self._period, self._announced = True, "", 0.05, 0.0
         self.began = 0.0
+        self._seen = np.zeros(0, bool)
         self.joints = JointFeed(robot, setting)
         self.sensors = Sensors(robot, setting, self.joints.convert)
         self._forget()
@@ -156,7 +158,10 @@ class RosRobot(RealEngine):
 
     def _connected(self, configuration: ActorConfiguration) -> Link:
         """The connection, with the topics of this world's objects."""
-        objects = tuple(actor.name for actor in configuration.objects) if self.tracked else ()
+        seen = [_is_tracked(actor) for actor in configuration.objects]
+        names = [actor.name for actor in configuration.objects]
+        objects = tuple(compress(names, seen)) if self.tracked else ()
+        self._seen = np.array(seen, bool)
         if self.link is not None and not self.link.lost and objects == self.sensors.objects:
             return self.link
         self.close()
@@ -339,8 +344,14 @@ class RosRobot(RealEngine):
             tip_force=self.sensors.tip_force(effort),
             tool_pose=self.kinematics.forward(position),
             tips=self.kinematics.tips(position),
-            objects=self.sensors.poses() if self.tracked else None,
+            objects=self._objects() if self.tracked else None,
         )
+
+    def _objects(self) -> Array:
+        """Poses ``(n_objects, 7)``, NaN for parts of fixtures that nobody tracks."""
+        found = np.full((len(self._seen), 7), np.nan)
+        found[self._seen] = self.sensors.poses()
+        return found
 
     def _alive(self) -> Link:
         if self.link is None:
@@ -354,3 +365,8 @@ class RosRobot(RealEngine):
         if self.link is not None:
             self.link.close()
             self.link = None
+
+
+def _is_tracked(actor: ObjectActor) -> bool:
+    """Something says where it is; of a part of a fixture only where the scene says that it is sensed."""
+    return actor.joint is None or actor.joint.sensed
