@@ -80,7 +80,7 @@ def judge_goal(goal: Goal, final: FinalState) -> GoalVerdict:
     relation = relation_named(goal.relation)
     placement = relation.evaluate(goal, final)
     wrong = None if placement.reached else placement.outcome
-    if wrong is None and not relation.in_hand:
+    if wrong is None and not (relation.in_hand or relation.may_be_held):
         wrong = _not_left_alone(goal.object, final)
     return GoalVerdict(
         str(goal),

@@ -106,7 +106,7 @@ def check(configuration: ActorConfiguration, robot: RobotDescription) -> None:
         raise InputError(f"the world is for the robot {shown(c.robot)}, and this engine's is '{robot.name}'")
     if max(len(c.objects), len(c.fixtures), len(c.places)) > MOST_ACTORS:
         raise InputError(f"a world has at most {MOST_ACTORS} objects, fixtures and places")
-    if sum(len(thing.boxes) for thing in (*c.fixtures, *c.objects)) > MOST_BOXES:
+    if sum(len(f.boxes) for f in c.fixtures) + sum(len(o.boxes) for o in c.objects) > MOST_BOXES:
         raise InputError(f"a world's fixtures and their parts have at most {MOST_BOXES} boxes")
     low, high = FREQUENCIES
     if not (low <= c.control_frequency <= c.physics_frequency <= high):

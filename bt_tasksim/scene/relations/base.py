@@ -186,6 +186,8 @@ class GoalRelation(abc.ABC):
 
     in_hand: ClassVar[bool] = False
     """The object is to be held at the end; else it must be let go and at rest."""
+    may_be_held: ClassVar[bool] = False
+    """The object may be in the hand at the end, or let go."""
     needs_place: ClassVar[bool] = True
     """A goal names a place or an object besides."""
 

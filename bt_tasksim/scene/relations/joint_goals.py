@@ -44,6 +44,7 @@ class JointGoal(GoalRelation):
     """A goal of a part of a fixture."""
 
     needs_place = False
+    may_be_held = True
 
     @staticmethod
     def joint(goal: Goal, final: FinalState) -> tuple[JointModel, float]:

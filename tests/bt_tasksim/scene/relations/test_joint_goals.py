@@ -1,0 +1,64 @@
+"""Open, shut and set: how far a part of a fixture truly is open, held or let go."""
+
+import numpy as np
+import pytest
+
+from bt_tasksim.core.errors import InputError
+from bt_tasksim.core.world import Hidden
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.relations.joint_goals import IS_OPEN, IS_SET, IS_SHUT, NOT_OPEN, NOT_SET, NOT_SHUT
+from bt_tasksim.scene.scene import Scene
+from bt_tasksim.scene.specs import FixtureSpec, Goal
+from bt_tasksim.scene.success import evaluate_success
+
+DOOR = FixtureSpec("door", parameters={"opens": 1.5})
+DRAWER = FixtureSpec("drawer", parameters={"opens": 0.2})
+
+
+def judged(fixture, goal, value, force=0.0):
+    world = Scene(fixtures=[fixture], objects={"cup": "on table"}, goals=[goal]).sample(0)
+    robot = load_robot("panda")
+    n, bodies = len(world.objects), len(world.objects) + len(world.fixtures)
+    objects = [o.pose if o.joint is None else o.joint.pose(value) for o in world.objects]
+    hidden = Hidden(
+        time=np.float64(5.0),
+        objects=np.array(objects, float),
+        velocities=np.zeros((n, 6)),
+        hand_force=np.array([0.0, force]),
+        hand_distance=np.array([1.0, 0.0 if force else 0.1]),
+        support=np.zeros((n, bodies), bool),
+        penetration=np.float64(0.0),
+        tool_pose=np.array([0.5, 0, 0.5, 1, 0, 0, 0]),
+    )
+    return evaluate_success(world, world.world_model([t.name for t in robot.tips], robot.opening), hidden)
+
+
+@pytest.mark.parametrize(
+    ("fixture", "goal", "value", "reason"),
+    [
+        (DOOR, {"relation": "open"}, 1.21, IS_OPEN["hinge"]),
+        (DOOR, {"relation": "open"}, 1.19, NOT_OPEN["hinge"]),
+        (DOOR, {"relation": "open", "value": 1.0, "angle_tolerance": 0.1}, 0.91, IS_OPEN["hinge"]),
+        (DOOR, {"relation": "open", "value": 1.0, "angle_tolerance": 0.1}, 0.89, NOT_OPEN["hinge"]),
+        (DRAWER, {"relation": "open", "value": 0.1, "position_tolerance": 0.01}, 0.15, IS_OPEN["slide"]),
+        (DRAWER, {"relation": "shut"}, 0.004, IS_SHUT["slide"]),
+        (DRAWER, {"relation": "shut"}, 0.006, NOT_SHUT["slide"]),
+        (DOOR, {"relation": "shut"}, 0.03, IS_SHUT["hinge"]),
+        (DOOR, {"relation": "shut"}, 0.04, NOT_SHUT["hinge"]),
+        (DRAWER, {"relation": "set", "value": 0.1, "position_tolerance": 0.01}, 0.109, IS_SET["slide"]),
+        (DRAWER, {"relation": "set", "value": 0.1, "position_tolerance": 0.01}, 0.111, NOT_SET["slide"]),
+        (DOOR, {"relation": "set", "value": 0.7}, 0.8, IS_SET["hinge"]),
+    ],
+)
+@pytest.mark.parametrize("force", [0.0, 5.0])
+def test_by_the_true_state(fixture, goal, value, reason, force):
+    name = "door" if fixture is DOOR else "drawer"
+    found = judged(fixture, Goal(name, **goal), value, force)
+    assert found.outcome.is_a(reason) and found.success is not reason.name.startswith("not")
+
+
+def test_what_is_no_part_or_has_no_value_is_refused():
+    with pytest.raises(InputError, match="'cup' is a free object"):
+        judged(DOOR, Goal("cup", relation="shut"), 0.0)
+    with pytest.raises(InputError, match="needs a 'value'"):
+        judged(DOOR, Goal("door", relation="set"), 0.0)
