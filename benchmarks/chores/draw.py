@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from py_trees.behaviour import Behaviour
 
-from benchmarks.chores import carrying, pushing  # noqa: F401  # which announce their kinds
+from benchmarks.chores import carrying, opening, pushing  # noqa: F401  # which announce their kinds
 from benchmarks.chores.chore import IN_FRONT, KINDS, SLOTS, Chore
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.scene import Scene
