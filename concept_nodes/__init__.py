@@ -31,6 +31,7 @@ from bt_tasksim.concept_nodes.settle import Settle
 from bt_tasksim.concept_nodes.slide import Slide
 from bt_tasksim.concept_nodes.slide_off import SlideOff
 from bt_tasksim.concept_nodes.slide_to_stop import SlideToStop
+from bt_tasksim.concept_nodes.turn_knob import TurnKnob
 from bt_tasksim.concept_nodes.turned_conditions import Emptied
 from bt_tasksim.concept_nodes.wait import Wait
 from bt_tasksim.concept_nodes.withdraw import Withdraw
@@ -39,6 +40,7 @@ from bt_tasksim.core.registry import parts
 one_module(__name__)
 
 __all__ = [
+    "TurnKnob",
     "CloseDoor",
     "AdjustDoor",
     "OpenDoor",

@@ -6,7 +6,7 @@ Where it may be held says the object itself (`bt_tasksim.scene.grips`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -70,6 +70,9 @@ POOR, LEANT = 0.6, 0.2
 swings leans from which it is."""
 ALIKE = 0.35
 """Radians of turn within which what was wrong with one grasp is mostly wrong with another one, too."""
+LEANING = (0.0, 0.35, -0.35, 0.7, -0.7)
+"""Radians by which a hand may come to the handle of a part of furniture turned about the closing axis from the
+given approach: to go along with a door is harder than to hold it."""
 WRONG = 0.8
 """What a grasp costs more for each one like it that was no good, in radians of turn from the usual one."""
 
@@ -140,7 +143,8 @@ def candidates(view: WorldView, target: str, approach: Array, neutral: Array) ->
         return Candidates(np.zeros((0, 7)), np.zeros(0), np.zeros(0))
     grips = model.solid.grips
     grips = grips.taken(fits_between(grips.widths, view.robot.opening))
-    which, along = _directions(pose, grips.closing, grips.approach)
+    leaning = LEANING if model.joint is not None else LEANING[:1]
+    which, along = _directions(pose, grips.closing, grips.approach, leaning)
     points = poses.transform(pose[None], grips.points)[which]
     closing = poses.rotate(pose[None, 3:], grips.closing)[which]
     widths, firmness = grips.widths[which], grips.firmness[which]
@@ -228,11 +232,24 @@ def narrowest_grip(view: WorldView, target: str) -> float:
     return float(np.min(solid.grips.widths, initial=np.inf)) if solid is not None else np.inf
 
 
-def _directions(pose: Array, closing: Array, approach: Array) -> tuple[Array, Array]:
-    """By which grips ``(m,)`` hands may come in which directions ``(m, 3)``, robot base frame."""
+def _directions(
+    pose: Array, closing: Array, approach: Array, leaning: Sequence[float] = LEANING[:1]
+) -> tuple[Array, Array]:
+    """By which grips ``(m,)`` hands may come in which directions ``(m, 3)``, robot base frame.
+
+    Args:
+        pose: The object's ``(7,)``.
+        closing: Closing axes ``(k, 3)`` in its frame.
+        approach: Given directions ``(k, 3)``, likewise; NaN where any across the closing axis will do.
+        leaning: Radians by which a hand may come turned from a given direction about the closing axis.
+    """
     which, along = [], []
     for k, (axis, come) in enumerate(zip(poses.rotate(pose[None, 3:], closing), approach, strict=True)):
-        ways = across(axis) if not np.isfinite(come).all() else poses.rotate(pose[3:], come)[None]
+        if np.isfinite(come).all():
+            turns = poses.from_rotation_vector(np.array(leaning)[:, None] * axis)
+            ways = poses.rotate(turns, poses.rotate(pose[3:], come)[None])
+        else:
+            ways = across(axis)
         ways = ways[ways[:, 2] <= STEEPEST]
         which += [k] * len(ways)
         along.append(ways)

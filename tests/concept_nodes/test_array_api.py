@@ -58,6 +58,7 @@ from bt_tasksim.concept_nodes import (
     SlideToStop,
     StandsOn,
     TimePassed,
+    TurnKnob,
     Turns,
     Upright,
     Wait,
@@ -93,6 +94,7 @@ OWN = {
     "open a door wholly": DRAWER,
     "adjust a door": DRAWER,
     "close a door": DRAWER,
+    "turn a knob": DRAWER,
 }
 """Concepts that begin in no such scene: a scenario of their own, with its target and its place."""
 KINDS = ("cube", "box", "cup", "cylinder", "oval", "diamond", "superellipsoid")
@@ -129,6 +131,7 @@ def concepts(target="target", place="goal"):
         "open a door wholly": OpenDoor.value(target),
         "adjust a door": AdjustDoor.value(target, angle=0.1),
         "close a door": CloseDoor.value(target),
+        "turn a knob": TurnKnob.value(target, angle=0.1),
         # What is there already needs no plan, which takes a second in each world.
         "push": Push.value(target, direction=(1.0, 0.0, 0.0), distance=0.01),
         "pull": Pull.value(target, direction=(-1.0, 0.0, 0.0), distance=0.01),

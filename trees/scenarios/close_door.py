@@ -11,7 +11,7 @@ from bt_tasksim.trees import sequence
 
 def scene(robot: str = "panda") -> Scene:
     """A cabinet with a door that is open; its sizes, place, handle and friction are drawn."""
-    stands = {"value": (0.5, 1.1), "x": (0.58, 0.66), "heading": (-0.2, 0.2)}
+    stands = {"value": (0.5, 1.1), "x": (0.66, 0.72), "heading": (-0.2, 0.2)}
     return Scene(
         robot,
         fixtures=[FixtureSpec("door", parameters=stands)],

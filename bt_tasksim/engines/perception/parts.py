@@ -8,6 +8,7 @@ that hold it by one of its grasps, and with a fist that touches it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,6 +25,8 @@ HELD = 0.025
 TOUCHED = 0.012
 """Metres from a fingertip to a part within which a fist that feels something touches it: pads have a size,
 and estimates err."""
+ASIDE, TURNED = 0.002, math.radians(2.0)
+"""Metres and radians by which good estimates are wrong."""
 FIST = 0.9
 """Closure from which a hand is a fist."""
 
@@ -117,7 +120,7 @@ class Parts:
     def _follow(part: TrackedPart, seen: Array, before: HandContact | None, hand: HandContact) -> None:
         if part.value is None or part.sensed:
             if np.isfinite(seen).all():
-                part.value = part.joint.value(seen[None])
+                part.value = _value(part.joint, seen)
             elif not part.sensed:
                 part.value = part.told
             return
@@ -127,12 +130,42 @@ class Parts:
         if not both.any():
             return
         pose = part.joint.pose(part.value)[0]
-        was, now = before.tips[both].mean(axis=0), hand.tips[both].mean(axis=0)
+        was, now = before.tips[both], hand.tips[both]
         if not _moves(part.model, pose, before, both):
             return
-        moved = part.joint.shift(part.value, was[None], now[None])
+        moved = _moved(part.joint, part.value, was, now)
         low, high = part.joint.limits[:, 0], part.joint.limits[:, 1]
         part.value = np.clip(part.value + moved, low, high)
+
+
+def _moved(joint: Joints, value: Array, was: Array, now: Array) -> Array:
+    """By how much a value ``(1,)`` grows when fingertips that hold the part go from ``(k, 3)`` to ``(k, 3)``.
+
+    Of what turns it is the turn about the axis that fits all of them best: fingers on a knob go round it.
+    """
+    if not bool(joint.turns[0]):
+        return joint.shift(value, was.mean(axis=0)[None], now.mean(axis=0)[None])
+    pose = joint.pose(value)[0]
+    axis, centre = poses.rotate(pose[3:], joint.axis[0]), poses.transform(pose, joint.origin[0])
+    a, b = ((tips - centre) - ((tips - centre) @ axis)[:, None] * axis for tips in (was, now))
+    turn: Array = np.arctan2((np.cross(a, b) @ axis).sum(), (a * b).sum())
+    return np.array([turn])
+
+
+def _value(joint: Joints, seen: Array) -> Array:
+    """The value ``(1,)`` of a part that is seen at a pose ``(7,)``.
+
+    Of what turns, where it is says more than how it is turned, the more so the farther its middle is from the
+    axis: the two are weighed by what they are usually wrong by.
+    """
+    turned: Array = joint.value(seen[None])
+    if not bool(joint.turns[0]):
+        return turned
+    lever = float(np.linalg.norm(np.cross(joint.axis[0], joint.origin[0])))
+    moved = joint.shift(turned, joint.pose(turned)[:, :3], seen[None, :3])
+    sure, less = (lever / ASIDE) ** 2, (1.0 / TURNED) ** 2
+    found: Array = turned + moved * sure / (sure + less)
+    return np.clip(found, joint.limits[:, 0], joint.limits[:, 1])
 
 
 def _moves(model: ObjectModel, pose: Array, hand: HandContact, touching: Array) -> bool:
