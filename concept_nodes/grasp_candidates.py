@@ -71,8 +71,8 @@ swings leans from which it is."""
 ALIKE = 0.35
 """Radians of turn within which what was wrong with one grasp is mostly wrong with another one, too."""
 LEANING = (0.0, 0.35, -0.35, 0.7, -0.7)
-"""Radians by which a hand may come to the handle of a part of furniture turned about the closing axis from the
-given approach: to go along with a door is harder than to hold it."""
+"""Radians by which a hand may come to the handle of a part of furniture turned about the closing axis from
+the given approach: to go along with a door is harder than to hold it."""
 WRONG = 0.8
 """What a grasp costs more for each one like it that was no good, in radians of turn from the usual one."""
 
