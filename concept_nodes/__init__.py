@@ -12,6 +12,7 @@ from bt_tasksim.concept_nodes.bring import Bring
 from bt_tasksim.concept_nodes.close_door import CloseDoor
 from bt_tasksim.concept_nodes.close_drawer import CloseDrawer
 from bt_tasksim.concept_nodes.conditions import AtPose, Holding, TimePassed, Upright
+from bt_tasksim.concept_nodes.extract import Extract
 from bt_tasksim.concept_nodes.grasp import Grasp
 from bt_tasksim.concept_nodes.hand_conditions import HandEmpty, Lifted, Over, OverBeside
 from bt_tasksim.concept_nodes.hold import Hold
@@ -57,6 +58,7 @@ __all__ = [
     "Bring",
     "Clear",
     "Emptied",
+    "Extract",
     "Grasp",
     "HandEmpty",
     "Hold",

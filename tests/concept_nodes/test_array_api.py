@@ -29,6 +29,7 @@ from bt_tasksim.concept_nodes import (
     CloseDoor,
     CloseDrawer,
     Emptied,
+    Extract,
     Grasp,
     HandEmpty,
     Hold,
@@ -86,6 +87,7 @@ SCENES = {
 DRAWER = ("open_drawer", ("drawer", "chest"))
 OWN = {
     "insert": ("insert", ("peg", "hole")),
+    "extract": ("extract", ("peg", "hole")),
     "open a drawer": DRAWER,
     "open a drawer wholly": DRAWER,
     "adjust a drawer": DRAWER,
@@ -116,6 +118,7 @@ def concepts(target="target", place="goal"):
         "place on what is below": Place.value(target, anywhere=True),
         "place by a distance": Place.value(target, on=place, distance=0.02),
         "pour": Pour.value(target, into=place),
+        "extract": Extract.value(target, out_of=place),
         "insert": Insert.value(target, into=place),
         "release": Release.value(target),
         "wait": Wait.value(1.0),

@@ -204,18 +204,18 @@ def test_tasks_are_those_of_the_registered_concepts_and_of_the_paper():
         assert {each.state for each in tasks() if each.motion == motion} == set(ContactState)
 
 
-def test_a_new_concept_takes_the_place_of_the_papers_task():
+def test_a_new_concept_announces_its_task():
     with scratch():
 
         @register("concept")
-        class Shove(ConceptModel):
-            """Slide something over its support."""
+        class Wedge(ConceptModel):
+            """Push something that slides until it is stuck."""
 
-            contact = ContactChange(ContactState.TR, ContactState.TR)
+            contact = ContactChange(ContactState.TR, ContactState.FT)
 
-        assert task("shove").node == "Shove"
-        assert "slide" not in {each.name for each in tasks()}
-    assert "slide" in {each.name for each in tasks() if not each.node} or task("slide").node
+        assert task("wedge").node == "Wedge" and task("wedge").change is Change.MAKES
+        assert task("wedge") in tasks_between(ContactState.TR, ContactState.FT)
+    assert not tasks_between(ContactState.TR, ContactState.FT)
 
 
 def test_bad_input_is_refused_in_one_sentence():
