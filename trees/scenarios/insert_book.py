@@ -10,7 +10,7 @@ from bt_tasksim.trees import sequence
 
 
 def scene(robot: str = "panda") -> Scene:
-    """A book that stands on the table, and a row with a gap 6 to 14 mm wider than it is thick."""
+    """A book that stands on the table, and a row with a gap 4 to 8 mm wider than it is thick."""
     return Scene(
         robot,
         fixtures=[FixtureSpec("book_row", area=(0.03, 0.03), yaw=(-0.3, 0.3))],

@@ -10,4 +10,4 @@ from bt_tasksim.scene.kinds.box import BoxKind
 class BookKind(BoxKind):
     """A book that stands upright, its spine to the side."""
 
-    size_range = ((0.110, 0.024, 0.160), (0.135, 0.032, 0.200))
+    size_range = ((0.110, 0.030, 0.160), (0.135, 0.034, 0.200))
