@@ -32,7 +32,10 @@ def hole_of(view: WorldView, name: str) -> PlaceModel:
     """
     place = view.world.places[name]
     if place.kind != HOLE:
-        raise NoWayError(f"'{name}' is no hole but a {place.kind}: things are put there with Place, or let fall there with Release")
+        raise NoWayError(
+            f"'{name}' is no hole but a {place.kind}: things are put there with Place, or fall there with "
+            "Release"
+        )
     return place
 
 

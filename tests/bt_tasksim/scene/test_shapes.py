@@ -65,6 +65,7 @@ def test_volume_and_inertia(case):
         "box": x * y * z,
         "book": x * y * z,
         "peg": x * y * z,
+        "sponge": x * y * z,
         "cube": x * y * z,
         "cylinder": np.pi / 4 * x * y * z,
         "oval": np.pi / 4 * x * y * z,
