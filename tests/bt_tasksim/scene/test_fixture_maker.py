@@ -49,7 +49,9 @@ def test_every_parameter_says_what_it_is_and_in_which_unit(name):
     for field_name, field in maker.model_fields.items():
         assert field.description, field_name
         if field.annotation is float:
-            words = field.description.rstrip(".").replace(":", " ").replace(",", " ").split()
+            words = (
+                field.description.rstrip(".").replace(":", " ").replace(",", " ").replace(";", " ").split()
+            )
             assert {"m", "rad", "kg", "N", "Nm", "N/m", "Nm/rad"} & set(words), field_name
 
 
