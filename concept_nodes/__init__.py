@@ -25,6 +25,7 @@ from bt_tasksim.concept_nodes.open_drawer import OpenDrawer
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
 from bt_tasksim.concept_nodes.pour import Pour
+from bt_tasksim.concept_nodes.press_button import PressButton
 from bt_tasksim.concept_nodes.pull import Pull
 from bt_tasksim.concept_nodes.push import Push
 from bt_tasksim.concept_nodes.release import Release
@@ -41,6 +42,7 @@ from bt_tasksim.core.registry import parts
 one_module(__name__)
 
 __all__ = [
+    "PressButton",
     "TurnKnob",
     "CloseDoor",
     "AdjustDoor",

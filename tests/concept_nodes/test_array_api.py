@@ -49,6 +49,7 @@ from bt_tasksim.concept_nodes import (
     Pick,
     Place,
     Pour,
+    PressButton,
     Pull,
     Push,
     Release,
@@ -97,6 +98,7 @@ OWN = {
     "adjust a door": DRAWER,
     "close a door": DRAWER,
     "turn a knob": DRAWER,
+    "press a button": ("press_button", ("button", "table")),
 }
 """Concepts that begin in no such scene: a scenario of their own, with its target and its place."""
 KINDS = ("cube", "box", "cup", "cylinder", "oval", "diamond", "superellipsoid")
@@ -134,6 +136,7 @@ def concepts(target="target", place="goal"):
         "open a door wholly": OpenDoor.value(target),
         "adjust a door": AdjustDoor.value(target, angle=0.1),
         "close a door": CloseDoor.value(target),
+        "press a button": PressButton.value(target),
         "turn a knob": TurnKnob.value(target, angle=0.1),
         # What is there already needs no plan, which takes a second in each world.
         "push": Push.value(target, direction=(1.0, 0.0, 0.0), distance=0.01),

@@ -15,6 +15,7 @@ from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene
 from bt_tasksim.trees import same_tree, sequence, tidy, tree_from_xml, tree_to_xml
+from bt_tasksim.trees.load import load_source
 
 CUP = {"cup": ObjectSpec(kinds=("cup",), on="table", centre=(-0.1, -0.25), area=(0.0, 0.0))}
 
@@ -84,3 +85,11 @@ def test_goals_of_parts_become_trees_of_what_moves_them():
     said = tree_to_xml(tree)
     assert all(f"<{name} " in said for name in ("Slides", "OpenDrawer", "Turns", "CloseDoor", "IsShut"))
     assert same_tree(tree, tree_from_xml(said))
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize("name", ["turn_knob", "press_button"])
+def test_controls_are_worked(name):
+    source = load_source(name)
+    (result,) = successes(Runner(source.build(), source.scene, EngineOptions()).run, range(3, 6), n=1)
+    assert result.status == Status.SUCCESS and result.verdict.penetration < 0.002
