@@ -20,6 +20,7 @@ from bt_tasksim.concept_nodes.in_contact import InContact
 from bt_tasksim.concept_nodes.insert import Insert
 from bt_tasksim.concept_nodes.inserted import Inserted
 from bt_tasksim.concept_nodes.joint_conditions import IsOpen, IsShut, JointAt, Slides, Turns
+from bt_tasksim.concept_nodes.lay_down import LayDown
 from bt_tasksim.concept_nodes.open_door import OpenDoor
 from bt_tasksim.concept_nodes.open_drawer import OpenDrawer
 from bt_tasksim.concept_nodes.pick import Pick
@@ -33,8 +34,9 @@ from bt_tasksim.concept_nodes.settle import Settle
 from bt_tasksim.concept_nodes.slide import Slide
 from bt_tasksim.concept_nodes.slide_off import SlideOff
 from bt_tasksim.concept_nodes.slide_to_stop import SlideToStop
+from bt_tasksim.concept_nodes.tip_up import TipUp
 from bt_tasksim.concept_nodes.turn_knob import TurnKnob
-from bt_tasksim.concept_nodes.turned_conditions import Emptied
+from bt_tasksim.concept_nodes.turned_conditions import Emptied, Lying, OnEnd
 from bt_tasksim.concept_nodes.wait import Wait
 from bt_tasksim.concept_nodes.withdraw import Withdraw
 from bt_tasksim.core.registry import parts
@@ -69,7 +71,10 @@ __all__ = [
     "Insert",
     "Inserted",
     "Inside",
+    "LayDown",
     "Lifted",
+    "Lying",
+    "OnEnd",
     "Over",
     "OverBeside",
     "Pick",
@@ -84,6 +89,7 @@ __all__ = [
     "SlideToStop",
     "StandsOn",
     "TimePassed",
+    "TipUp",
     "Upright",
     "Wait",
     "Withdraw",

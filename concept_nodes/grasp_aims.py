@@ -76,7 +76,9 @@ class Served:
 
     def __init__(self, around: Around, aim: Aim, aside: bool, higher: bool) -> None:
         self._around, self._aim = around, aim
-        ends = aim.aside if aside and aim.aside is not None and len(aim.aside) else aim.poses
+        ends = aim.poses
+        if aside and aim.aside is not None and len(aim.aside):
+            ends, self._aim = aim.aside, aim._replace(onwards=None)
         falls = (0.0, *HIGHER) if higher and not aim.on_the_way and aim.onwards is None else (0.0,)
         self._poses = np.concatenate([poses.shifted(ends, np.array([0.0, 0.0, above])) for above in falls])
         self.words = aim.words

@@ -14,6 +14,8 @@ from bt_tasksim.planning.ways import WayFinder
 
 STEP = 0.1
 """Radians between two poses on the way, at most."""
+FINE, JUMP = 0.08, 0.3
+"""Radians between two postures of a motion of the elbow, and by which no joint may turn more there."""
 POSTURES = 4
 """Postures from which it is tried whether the arm can go on."""
 
@@ -69,3 +71,39 @@ def led(finder: WayFinder, tool: Array, onwards: Array, leans: float = LEANS) ->
         if found is not None:
             return found
     return None
+
+
+def followed_anyhow(finder: WayFinder, tools: Array, leans: float = LEANS) -> Array | None:
+    """Joints ``(n, n_arm)`` from where the arm is through tool poses ``(k, 7)``, as `followed_from`.
+
+    Where the arm cannot follow in its present posture, it first takes another one while its tool stays.
+    """
+    found = followed_from(finder, finder.start, tools, leans)
+    if found is not None:
+        return found
+    now = finder.arm.tool(finder.start)
+    other = led(finder, now, tools, leans)
+    if other is None:
+        return None
+    moved = elbow_moved(finder, other[0], now)
+    return None if moved is None else np.concatenate([moved, other[1:]])
+
+
+def elbow_moved(finder: WayFinder, end: Array, tool: Array) -> Array | None:
+    """Joints ``(n, n_arm)`` from where the arm is to a posture ``(n_arm,)`` at the same tool pose ``(7,)``.
+
+    Returns:
+        None where the arm has no way to move between them with its tool at rest, clear of everything.
+    """
+    way = end - finder.start
+    count = max(2, math.ceil(float(np.abs(way).max()) / FINE))
+    found = [finder.start]
+    for share in np.arange(1, count + 1) / count:
+        joints = finder.arm.joints(tool, finder.start + share * way)
+        if joints is None or float(np.abs(joints - found[-1]).max()) > JUMP:
+            return None
+        found.append(joints)
+    if float(np.abs(found[-1] - end).max()) > JUMP:
+        return None
+    postures = np.array([*found, end])
+    return postures if finder.clear(postures) else None

@@ -16,6 +16,8 @@ ALIKE = {
     "Inside": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Inserted": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Lifted": "the goal relation, as physics tells it; the condition, as a robot sees it",
+    "Lying": "the goal relation, as physics tells it; the condition, as a robot sees it",
+    "OnEnd": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Policy": "what decides in a leaf; what a limit of a robot does, in its file",
     "World": "the same of two simulators",
 }

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.fact_arrays import take_rows
 from bt_tasksim.core.poses import Array, array_namespace, constant
 
 IN_ONE_ANOTHER = 0.002
@@ -256,6 +257,21 @@ def leaning(rotation: Array, cubic: Array) -> Array:
     x, y, z = (poses.rotate(rotation, constant(axis, rotation))[:, 2] for axis in _AXES)
     faces = xp.maximum(abs(z), xp.maximum(abs(x), abs(y)))
     return xp.acos(poses.clip(xp.where(cubic, faces, z), -1.0, 1.0))
+
+
+def rise_of_long_axis(rotation: Array, extent: Array) -> Array:
+    """Angle ``(N,)`` in radians between the longest axis of things and the level, from 0 to a right angle.
+
+    Of what is hardly longer than wide or high it is the axis that is longest nevertheless.
+
+    Args:
+        rotation: Rotations ``(N, 4)``.
+        extent: Full sizes ``(N, 3)`` of their bounding boxes, metres.
+    """
+    xp = array_namespace(rotation)
+    longest = xp.argmax(extent, axis=-1)
+    up = xp.stack([poses.rotate(rotation, constant(axis, rotation))[:, 2] for axis in _AXES], axis=-1)
+    return xp.asin(poses.clip(abs(take_rows(up, longest)), 0.0, 1.0))
 
 
 def beyond_edges(frame: Array, centre: Array, half: Array, now: Array) -> Array:

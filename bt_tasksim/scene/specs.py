@@ -299,7 +299,8 @@ class Goal:
             with its heading up to the object's symmetry; or on the middle of an object's top), ``anywhere``
             (upright anywhere on a place or an object), ``inside`` (within a container, below its rim, or
             within an object), ``beside`` (at the same level, ``distance`` away at most), ``lifted`` (held in
-            the hand alone, ``height`` above where it stood, and as upright), or one of your own.
+            the hand alone, ``height`` above where it stood, and as upright), ``on_end`` and ``lying``
+            (it rests with its longest axis upright, or level), or one of your own.
         position_tolerance: Metres.
         angle_tolerance: Radians; pi for any heading and any way up.
         height: Metres, for ``lifted``.

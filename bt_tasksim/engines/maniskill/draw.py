@@ -15,7 +15,7 @@ from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.engines.maniskill.environment import Environment
 from bt_tasksim.engines.maniskill.openings import BoxHole, opening
 from bt_tasksim.engines.maniskill.schema import TargetEntry
-from bt_tasksim.engines.maniskill.shapes import CollisionSolid, boxes, solid
+from bt_tasksim.engines.maniskill.shapes import CollisionSolid, boxes, set_upright, solid
 from bt_tasksim.engines.physics.sapien_world import array
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 from bt_tasksim.scene.fixtures import Fixture
@@ -61,7 +61,8 @@ def things(environment: Environment) -> dict[str, DrawnActor]:
     for name, entry in environment.file.object_entries.items():
         called = entry.actor or name
         body = body_of(environment.actor(called))
-        found[name] = DrawnActor(body, solid(body.get_collision_shapes(), entry.kind, f"actor '{called}'"))
+        made = solid(body.get_collision_shapes(), entry.kind, f"actor '{called}'")
+        found[name] = DrawnActor(body, set_upright(made, array(body.entity_pose)))
     return found
 
 

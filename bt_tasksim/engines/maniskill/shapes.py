@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from bt_tasksim.scene.shapes import shape_kind
 
 EQUAL = 1e-6
 """Metres by which the sides of a cube may differ."""
+ASLANT = 0.7
+"""Least height of the end of a unit vector that points up rather than aside."""
 LARGEST = 20.0
 """Metres: what is larger is a floor, and nothing to keep clear of."""
 _UPRIGHT = np.array([math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0])
@@ -74,6 +77,35 @@ def solid(shapes: Sequence[Any], kind: str | None, owner: str) -> CollisionSolid
         f"{owner} is made of {len(shapes)} collision shapes or of one that is no box, ball or cylinder: say "
         "with 'kind' what its bounding box is taken for"
     )
+
+
+def set_upright(found: CollisionSolid, actor: Array) -> CollisionSolid:
+    """A box with its frame turned so that z is up with its actor at a pose ``(7,)``; others as they are.
+
+    A peg may be turned a quarter about its own axis in its simulation; here z is up in what stands or lies.
+    """
+    rotation = poses.multiply(actor, found.frame)[3:]
+    if found.kind != "box" or abs(float(poses.z_axis(rotation)[2])) > ASLANT:
+        return found
+    now = poses.to_matrix(rotation)
+    turns = [turn for turn in _turns() if (now @ turn)[2, 2] > ASLANT]
+    if not turns:  # on an edge
+        return found
+    turn = max(turns, key=lambda each: float(np.trace(each)))
+    x, y, z = (np.abs(turn.T) @ np.array(found.size)).tolist()
+    frame = poses.multiply(found.frame, poses.pose(np.zeros(3), poses.from_matrix(turn)))
+    return CollisionSolid(found.kind, (x, y, z), frame)
+
+
+def _turns() -> list[Array]:
+    """The 24 rotations ``(3, 3)`` of a cube onto itself."""
+    found = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            turn = np.eye(3)[list(order)] * np.array(signs)
+            if np.linalg.det(turn) > 0.0:
+                found.append(turn)
+    return found
 
 
 def boxes(shapes: Sequence[Any], colour: tuple[float, float, float]) -> tuple[Box, ...]:
