@@ -5,10 +5,12 @@ bt-tasksim evaluate examples/maniskill/lift_peg_upright.py --engines maniskill:L
 
 from py_trees.behaviour import Behaviour
 
-from concept_nodes import Grasp, Release, TipUp
-from trees import sequence
+from concept_nodes import Grasp, OnEnd, Release, TipUp, Withdraw
+from trees import fallback, retry, sequence
 
 
 def build() -> Behaviour:
-    """The tree."""
-    return sequence("lift peg upright", Grasp("peg"), TipUp("peg"), Release("peg"))
+    """The tree: where the peg has slipped out of the hand, or the arm came to its end, once more."""
+    upright = sequence("tip it up", Grasp("peg"), TipUp("peg"), Release("peg"))
+    anew = fallback("or let go", upright, sequence("let go", Withdraw(), OnEnd("peg")))
+    return retry(3, anew)
