@@ -25,7 +25,7 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
-from bt_tasksim.concept_nodes.insertion import PLACES
+from bt_tasksim.concept_nodes.insertion import places_to_try
 from bt_tasksim.concept_nodes.insertion_way import ROWS, STANDOFF, WayIn, ends_in, sides_of, way_in
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
@@ -154,7 +154,7 @@ class Insert(ConceptModel[InsertMemory]):
         sayings=("I push it into the {}", "insert it into the {}", "it goes into the {}"),
         says_destination=True,
     )
-    default_timeout = 60.0
+    default_timeout = 90.0
     default_tolerance = 0.003
 
     @classmethod
@@ -260,7 +260,7 @@ class Insert(ConceptModel[InsertMemory]):
         jams = feeds & (stuck > STUCK) & (come < memory.full - NEAR)
         tried = xp.where(jams, memory.tried + 1.0, memory.tried)
         back = xp.where(jams, xp.maximum(come - BACK, 0.0 * come), memory.back)
-        offset, there = self._aside(force - weight, come, tried, memory, period)
+        offset, there = self._aside(force - weight, come, tried, memory, period, places_to_try(seen.robot))
         # As it is told to be, it is deeper than it can be where it jams.
         retreat = xp.maximum(memory.way - QUICKLY * period, back)
         drawn = there & (retreat <= back)
@@ -302,15 +302,15 @@ class Insert(ConceptModel[InsertMemory]):
         return poses.relative(poses.shifted(now, behind), poses.multiply(told, memory.grip))
 
     def _aside(
-        self, force: Array, come: Array, tried: Array, memory: InsertMemory, period: float
+        self, force: Array, come: Array, tried: Array, memory: InsertMemory, period: float, places: Array
     ) -> tuple[Array, Array]:
         """Offsets ``(N, 3)`` for the next tick, and where they are those of the place that is tried.
 
         On its way from place to place it has to be free; in the hole it yields to forces from aside.
         """
         xp = array_namespace(force)
-        index = xp.astype(poses.clip(tried, 0.0, len(PLACES) - 1.0), xp.int64)
-        table = constant(PLACES, force)
+        index = xp.astype(poses.clip(tried, 0.0, len(places) - 1.0), xp.int64)
+        table = constant(places, force)
         goal = xp.stack([xp.take(table[:, k], index) for k in (0, 1)], axis=-1)
         wanted = goal[:, :1] * memory.sides[:, 0, :] + goal[:, 1:] * memory.sides[:, 1, :]
         step, most = wanted - memory.offset, ASIDE * period
@@ -346,7 +346,7 @@ class Insert(ConceptModel[InsertMemory]):
         names = {"object": self.target, "place": self.into}
         return (
             strain(seen, self.force_limit),
-            Limit(JAMMED, memory.tried, float(len(PLACES)), names),
+            Limit(JAMMED, memory.tried, float(len(places_to_try(seen.robot))), names),
         )
 
     def done(self, seen: Seen, memory: InsertMemory) -> Array:

@@ -11,6 +11,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import HOLE, PlaceModel
+from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.hand import standing_side
 
 FLUSH = 0.35
@@ -22,6 +23,8 @@ TIGHT = 5e-4
 PITCH, UNSURE, SURE = 0.001, 0.008, 0.002
 """Metres from one place to the next of a spiral about the mouth, and its half axes: along the faces of
 fingers it is not known well how something lies in a hand, across them it is."""
+AROUND = (0.006, 0.006, 0.0015)
+"""Half axes and pitch of the same for hands that do not close flat."""
 
 
 def hole_of(view: WorldView, name: str) -> PlaceModel:
@@ -77,13 +80,18 @@ def fitting_poses(view: WorldView, target: str, hole: PlaceModel, leading: Array
     return ordered
 
 
+def closes_flat(robot: RobotDescription) -> bool:
+    """A hand of two fingers that close evenly: it knows what is between them across their faces."""
+    return not robot.many_fingers and standing_side(robot) is None
+
+
 def in_fingers(view: WorldView, target: str) -> Array:
     """Pose ``(7,)`` of a held object: as it is seen, but flat between the fingers and midway between them.
 
     Of two fingers that close evenly on flat faces the hand knows that better than any camera does.
     """
     seen, robot, model = view.objects[target], view.robot, view.model(target)
-    if robot.many_fingers or standing_side(robot) is not None or model.symmetry == 0:
+    if not closes_flat(robot) or model.symmetry == 0:
         return seen
     closing = poses.to_matrix(view.tool[3:])[:, 1]
     axes = poses.to_matrix(seen[3:]).T
@@ -128,15 +136,27 @@ def _nearest_heading(now: Array, up: Array) -> Array:
     return found
 
 
-def spiral() -> Array:
-    """Places ``(k, 2)`` about the mouth in the order in which they are tried, metres, the middle first."""
-    steps = [np.arange(-int(half / PITCH), int(half / PITCH) + 1) * PITCH for half in (UNSURE, SURE)]
+def spiral(long: float, wide: float, pitch: float) -> Array:
+    """Places ``(k, 2)`` in an ellipse in the order in which they are tried, metres, the middle first.
+
+    Args:
+        long: Its half axis along x.
+        wide: Its half axis along y.
+        pitch: From one place to the next.
+    """
+    steps = [np.arange(-int(half / pitch), int(half / pitch) + 1) * pitch for half in (long, wide)]
     grid = np.array(list(itertools.product(*steps)))
-    far = np.hypot(grid[:, 0] / UNSURE, grid[:, 1] / SURE)
+    far = np.hypot(grid[:, 0] / long, grid[:, 1] / wide)
     grid, far = grid[far <= 1.0 + 1e-9], far[far <= 1.0 + 1e-9]
     order = np.lexsort((np.arctan2(grid[:, 1], grid[:, 0]), np.round(far, 1)))
     found: Array = grid[order]
     return found
 
 
-PLACES = spiral()
+PLACES = spiral(UNSURE, SURE, PITCH)
+ROUND = spiral(*AROUND)
+
+
+def places_to_try(robot: RobotDescription) -> Array:
+    """Places ``(k, 2)`` about the mouth that a hand tries one after the other, metres."""
+    return PLACES if closes_flat(robot) else ROUND
