@@ -9,7 +9,7 @@ from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.own_files import own_file
 from bt_tasksim.core.plain import shown
 from bt_tasksim.core.registry import part
-from bt_tasksim.core.resources import is_file
+from bt_tasksim.core.resources import FURNITURE, is_file
 
 T = TypeVar("T")
 
@@ -25,7 +25,7 @@ def named_data(kind: str, name: str, value: type[T]) -> Path | T:
     Raises:
         InputError: No such part, or no such file.
     """
-    if not is_file(name):
+    if not is_file(name, FURNITURE if kind == "fixture" else ()):
         found: Path | T = part(kind, name)
         return found
     path = own_file(name)

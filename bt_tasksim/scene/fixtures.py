@@ -19,6 +19,7 @@ from bt_tasksim.core.named_data import named_data
 from bt_tasksim.core.names import check_name
 from bt_tasksim.core.plain import Plain, shown
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.resources import FURNITURE
 from bt_tasksim.core.world import PlaceModel, is_container
 from bt_tasksim.scene.box import Box
 from bt_tasksim.scene.grips import GivenGrip
@@ -308,6 +309,10 @@ def _load(path: Path, version: tuple[int, ...]) -> Fixture:
     from bt_tasksim.core.typed_file import load_typed
     from bt_tasksim.scene.fixture_schema import FixtureFile
 
+    if path.suffix in FURNITURE:
+        from bt_tasksim.scene.articulated import articulated
+
+        return Fixture.from_data(articulated(path))
     return Fixture.from_file(load_typed(FixtureFile, path, "fixture file")[0])
 
 

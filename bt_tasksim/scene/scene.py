@@ -13,7 +13,7 @@ from bt_tasksim.core.names import TOOL, check_name
 from bt_tasksim.core.own_files import own_file
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.renamed import renamed_arguments, renamed_fields
-from bt_tasksim.core.resources import is_file
+from bt_tasksim.core.resources import FURNITURE, is_file
 from bt_tasksim.core.world import HOLE
 from bt_tasksim.scene import sampling
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor, check_seed, generator
@@ -423,12 +423,12 @@ def _fixtures(said: Sequence[str | FixtureSpec]) -> tuple[str | FixtureSpec, ...
             check_parameters(entry)
             load_fixture(entry)
         if isinstance(entry, FixtureSpec):
-            if is_file(entry.fixture):
+            if is_file(entry.fixture, FURNITURE):
                 entry = dataclasses.replace(entry, fixture=str(own_file(entry.fixture)))
             if entry.fixture == "table" and not entry.name and out[0] == "table":
                 out[0] = entry
                 continue
-        elif is_file(entry):
+        elif is_file(entry, FURNITURE):
             entry = str(own_file(entry))
         if isinstance(entry, FixtureSpec) or entry not in out:
             out.append(entry)

@@ -9,7 +9,7 @@ from bt_tasksim.core.beside import beside
 from bt_tasksim.core.document import located
 from bt_tasksim.core.errors import FieldError, within
 from bt_tasksim.core.plain import Where
-from bt_tasksim.core.resources import is_file
+from bt_tasksim.core.resources import FURNITURE, is_file
 from bt_tasksim.core.typed_file import load_typed
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.fixtures import load_fixture
@@ -83,16 +83,16 @@ def _scene(content: SceneFile, file: Path) -> Scene:
     return scene
 
 
-def _named(name: str, file: Path, what: str) -> str:
-    return str(beside(file.parent, name, what)) if is_file(name) else name
+def _named(name: str, file: Path, what: str, also: tuple[str, ...] = ()) -> str:
+    return str(beside(file.parent, name, what)) if is_file(name, also) else name
 
 
 def _fixture(entry: str | FixturePlacement, file: Path) -> str | FixtureSpec:
     if isinstance(entry, str):
-        return _named(entry, file, "a fixture file")
+        return _named(entry, file, "a fixture file", FURNITURE)
     at = None if entry.at is None else (entry.at[0], entry.at[1], *entry.at[2:3])
     return FixtureSpec(
-        _named(entry.fixture, file, "a fixture file"),
+        _named(entry.fixture, file, "a fixture file", FURNITURE),
         at,
         entry.yaw,
         entry.name or "",

@@ -1,0 +1,200 @@
+"""Fixtures from URDF and MJCF files: links on one joint each become parts, and all others stand still.
+
+MuJoCo reads what is in the text alone; nothing that a file names is opened.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, ParseError, tostring
+
+import numpy as np
+
+from bt_tasksim.core import poses
+from bt_tasksim.core.bounded_text import read_text
+from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.names import name_fault
+from bt_tasksim.core.plain import Plain, shown
+from bt_tasksim.core.poses import Array
+
+HANDLES = ("handle", "knob", "grip")
+"""What the name of a link or of a shape contains by which two fingers may hold the part."""
+WIDEST = 0.07
+"""Metres up to which two fingers are taken to hold something."""
+_UNLIMITED = math.pi
+_FILES = {"file", "filename", "meshdir", "texturedir", "assetdir"}
+
+
+def articulated(path: Path) -> dict[str, Plain]:
+    """What a fixture's file would say of the furniture in a URDF or MJCF file.
+
+    Raises:
+        InputError: It is none, or has in it what a fixture cannot have; one sentence says what.
+        MachineError: MuJoCo is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise MachineError(
+            "a fixture from URDF or MJCF needs the package mujoco: install bt-tasksim with 'sim'"
+        ) from None
+    root = _root(path)
+    try:
+        model = mujoco.MjSpec.from_string(tostring(root, encoding="unicode")).compile()
+    except (ValueError, RuntimeError) as error:
+        raise InputError(f"fixture file '{path}': {' '.join(str(error).split())}") from None
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return _Reader(mujoco, model, data, path).fixture()
+
+
+def _root(path: Path) -> Element:
+    """The file's XML without what is only seen, and with nothing in it that names another file."""
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    try:
+        root: Element = fromstring(read_text(path, "fixture file"))
+    except (ParseError, DefusedXmlException, ValueError) as error:
+        raise InputError(f"fixture file '{path}' is no XML that can be read: {error}") from None
+    if root.tag not in ("robot", "mujoco"):
+        raise InputError(f"fixture file '{path}' is neither URDF nor MJCF: its root is '{shown(root.tag)}'")
+    for parent in root.iter():
+        for child in [c for c in parent if c.tag == "visual" and root.tag == "robot"]:
+            parent.remove(child)
+    for element in root.iter():
+        if element.tag in ("include", "model", "plugin") or _FILES & element.attrib.keys():
+            raise InputError(
+                f"fixture file '{path}': '{shown(element.tag)}' names another file, and a fixture's shapes "
+                f"are boxes and cylinders: put these in place of meshes"
+            )
+    for limit in root.iter("limit"):
+        if _number(limit.get("lower")) > _number(limit.get("upper")):
+            raise InputError(f"fixture file '{path}': a joint's 'lower' limit is above its 'upper' one")
+    if root.tag == "robot":  # links that are fixed to others keep their names
+        own = Element("mujoco")
+        own.append(Element("compiler", {"fusestatic": "false", "discardvisual": "true"}))
+        root.append(own)
+    return root
+
+
+def _number(text: str | None) -> float:
+    """What an attribute says; 0 where it is not given or no number, which MuJoCo then refuses."""
+    try:
+        return float(text or 0.0)
+    except ValueError:
+        return 0.0
+
+
+class _Reader:
+    def __init__(self, mujoco: Any, model: Any, data: Any, path: Path) -> None:
+        self.mujoco, self.model, self.data, self.path = mujoco, model, data, path
+
+    def fixture(self) -> dict[str, Plain]:
+        """All of it."""
+        parts = {
+            body: self._part(body) for body in range(1, self.model.nbody) if self.model.body_jntnum[body]
+        }
+        still: list[Plain] = []
+        for geom in range(self.model.ngeom):
+            body = self._carrier(int(self.model.geom_bodyid[geom]))
+            boxes = self._boxes(geom)
+            if body == 0:
+                still += boxes
+            else:
+                parts[body]["boxes"] += boxes
+                parts[body]["grasps"] += self._grasps(geom)
+        masses = np.zeros(self.model.nbody)
+        for body in range(1, self.model.nbody):
+            masses[self._carrier(body)] += self.model.body_mass[body]
+        for body, part in parts.items():
+            if masses[body] > 0.0:
+                part["mass"] = float(masses[body])
+        listed: list[Plain] = list(parts.values())
+        return {"name": self.path.stem, "boxes": still, "places": [], "parts": listed}
+
+    def _carrier(self, body: int) -> int:
+        """The body on a joint that a body is fixed to, or 0 where it stands still."""
+        while body and not self.model.body_jntnum[body]:
+            body = int(self.model.body_parentid[body])
+        return body
+
+    def _part(self, body: int) -> dict[str, Any]:
+        model, mujoco = self.model, self.mujoco
+        name, joint = model.body(body).name, int(model.body_jntadr[body])
+        if fault := name_fault(name):
+            raise self._error(f"the name of link '{shown(name)}' {fault}")
+        if model.body_jntnum[body] > 1 or self._carrier(int(model.body_parentid[body])):
+            raise self._error(
+                f"'{name}' moves by more than one joint, and a part has one, on what stands still"
+            )
+        kinds = {mujoco.mjtJoint.mjJNT_HINGE: "hinge", mujoco.mjtJoint.mjJNT_SLIDE: "slide"}
+        kind = kinds.get(mujoco.mjtJoint(int(model.jnt_type[joint])))
+        if kind is None:
+            raise self._error(f"the joint of '{name}' neither slides nor turns about one axis")
+        if not model.jnt_limited[joint] and kind == "slide":
+            raise self._error(f"the joint of '{name}' slides without limits: give it some")
+        qpos, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+        zero = float(model.qpos0[qpos])
+        limits = [float(v) - zero for v in model.jnt_range[joint]]
+        return {
+            "name": name,
+            "joint": kind,
+            "axis": self.data.xaxis[joint].tolist(),
+            "origin": self.data.xanchor[joint].tolist(),
+            "limits": limits if model.jnt_limited[joint] else [-_UNLIMITED, _UNLIMITED],
+            "friction": float(model.dof_frictionloss[dof]),
+            "damping": float(np.ravel(model.dof_damping[dof])[0]),
+            "stiffness": float(np.ravel(model.jnt_stiffness[joint])[0]),
+            "rest": float(model.qpos_spring[qpos]) - zero,
+            "value": min(max(0.0, limits[0]), limits[1]) if model.jnt_limited[joint] else 0.0,
+            "boxes": [],
+            "grasps": [],
+        }
+
+    def _placed(self, geom: int) -> Array:
+        turn = poses.from_matrix(self.data.geom_xmat[geom].reshape(3, 3))
+        found: Array = poses.pose(self.data.geom_xpos[geom], turn)
+        return found
+
+    def _boxes(self, geom: int) -> list[Plain]:
+        """A shape as boxes: itself, or an octagon for a cylinder."""
+        kinds, kind = self.mujoco.mjtGeom, int(self.model.geom_type[geom])
+        size, at = self.model.geom_size[geom], self._placed(geom)
+        colour: list[Plain] = [float(v) for v in np.clip(self.model.geom_rgba[geom][:3], 0.0, 1.0)]
+        if kind == kinds.mjGEOM_PLANE:
+            return []
+        if kind == kinds.mjGEOM_BOX:
+            placed = [(at, 2 * size)]
+        elif kind == kinds.mjGEOM_CYLINDER:
+            side = 2 * size[0] * math.tan(math.pi / 8)
+            turns = [poses.pose(np.zeros(3), poses.yaw(k * math.pi / 4)) for k in range(4)]
+            placed = [
+                (poses.multiply(at, turn), np.array([2 * size[0], side, 2 * size[1]])) for turn in turns
+            ]
+        else:
+            said = self.mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
+            raise self._error(f"a {said} is among its shapes, and these are boxes and cylinders")
+        return [{"pose": pose.tolist(), "size": full.tolist(), "colour": colour} for pose, full in placed]
+
+    def _grasps(self, geom: int) -> list[Plain]:
+        """Where two fingers may hold a handle: across each of its narrow sides but along its longest."""
+        body = int(self.model.geom_bodyid[geom])
+        names = f"{self.model.geom(geom).name} {self.model.body(body).name}".lower()
+        if not any(word in names for word in HANDLES):
+            return []
+        at, size = self._placed(geom), np.array(self.model.geom_size[geom], float)
+        if int(self.model.geom_type[geom]) == self.mujoco.mjtGeom.mjGEOM_CYLINDER:
+            size = np.array([size[0], size[0], size[1]])
+        found: list[Plain] = []
+        for k in np.argsort(size, kind="stable")[:2].tolist():
+            if 2 * size[k] <= WIDEST:
+                closing = poses.rotate(at[3:], np.eye(3)[k]).tolist()
+                found.append({"point": at[:3].tolist(), "closing": closing, "width": float(2 * size[k])})
+        return found
+
+    def _error(self, said: str) -> InputError:
+        return InputError(f"fixture file '{self.path}': {said}")
