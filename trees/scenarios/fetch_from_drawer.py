@@ -11,10 +11,20 @@ from bt_tasksim.trees import sequence
 
 def scene(robot: str = "panda") -> Scene:
     """A chest, a cube in the front part of its drawer, and a spot for it on the table."""
-    stands = {"x": (0.66, 0.70), "y": (-0.12, -0.06), "heading": (-0.1, 0.1), "base": 0.10, "opens": 0.24}
     return Scene(
         robot,
-        fixtures=[FixtureSpec("drawer", parameters=stands)],
+        fixtures=[
+            FixtureSpec(
+                "drawer",
+                parameters={
+                    "x": (0.66, 0.70),
+                    "y": (-0.12, -0.06),
+                    "heading": (-0.1, 0.1),
+                    "base": 0.10,
+                    "opens": 0.24,
+                },
+            )
+        ],
         objects={
             "cube": ObjectSpec(
                 kinds=("cube",),

@@ -11,17 +11,21 @@ from bt_tasksim.trees import sequence
 
 def scene(robot: str = "panda") -> Scene:
     """A cabinet whose door is shut, beside the middle, and a cup on the table."""
-    stands = {
-        "x": (0.66, 0.70),
-        "y": (0.08, 0.14),
-        "heading": (0.0, 0.2),
-        "side": "left",
-        "radius": (0.25, 0.28),
-        "height": 0.36,
-    }
     return Scene(
         robot,
-        fixtures=[FixtureSpec("door", parameters=stands)],
+        fixtures=[
+            FixtureSpec(
+                "door",
+                parameters={
+                    "x": (0.66, 0.70),
+                    "y": (0.08, 0.14),
+                    "heading": (0.0, 0.2),
+                    "side": "left",
+                    "radius": (0.25, 0.28),
+                    "height": 0.36,
+                },
+            )
+        ],
         objects={
             "cup": ObjectSpec(
                 kinds=("cup",), on="table", centre=(-0.08, -0.30), area=(0.04, 0.04), mass=(0.08, 0.2)
