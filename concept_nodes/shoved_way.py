@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -34,8 +36,9 @@ APART = 0.02
 """Metres between places on a thing's way at which it is looked at."""
 FINE = 0.005
 """The same where it is asked where it meets something."""
-SAME = 0.6
-"""Radians within which the arm comes to the posture in which it was looked at as it pushes."""
+RAISED, SEARCHED = 0.05, 2
+"""Metres by which a way over things goes higher than its ends; and to how many stances a way is searched for
+where none comes there straight."""
 
 
 class ShovedWay(NamedTuple):
@@ -73,13 +76,41 @@ def shoved_way(view: WorldView, target: str, goal: Array, held: str | None, slac
     length = float(np.linalg.norm(way))
     along = np.round(way / max(length, 1e-9), 9)
     check_clear(view, target, goal, held)
+    approaches = (
+        _Approach(view, target, stance, along, held) for stance in stances(view, target, along, held)
+    )
+    found = _first(approaches, length, slack)
+    if found is None:
+        raise NoWayError(f"there is nothing of {target} for {held or 'the hand'} to stand behind")
+    return found
+
+
+def _first(approaches: Iterable[_Approach], length: float, slack: float) -> ShovedWay | None:
+    """The first one that serves; where none is reached by straight ways, one is searched for to few of them.
+
+    Raises:
+        NoWayError: None serves; says why not the best.
+    """
     reason: NoWayError | None = None
-    for stance in stances(view, target, along, held):
+    hidden = list[_Approach]()
+    for approach in approaches:
         try:
-            return _Approach(view, target, stance, along, held).way(length, slack)
+            return approach.way(length, slack, approach.straight())
+        except NotStraightError as error:
+            reason = reason or error.with_traceback(None)
+            hidden.append(approach)
         except NoWayError as error:
             reason = reason or error.with_traceback(None)
-    raise reason or NoWayError(f"there is nothing of {target} for {held or 'the hand'} to stand behind")
+    for approach in hidden[:SEARCHED]:
+        with suppress(NoWayError):
+            return approach.way(length, slack, approach.searched())
+    if reason is not None:
+        raise reason
+    return None
+
+
+class NotStraightError(NoWayError):
+    """The arm can be there, and does not come there by straight ways."""
 
 
 def touching_now(view: WorldView, target: str) -> frozenset[str]:
@@ -145,14 +176,13 @@ def pressed_way(view: WorldView, target: str, goal: Array, slack: float) -> Shov
     length = float(np.linalg.norm(way))
     along = np.round(way / max(length, 1e-9), 9)
     check_clear(view, target, goal, None)
-    reason: NoWayError | None = None
-    for stance in tops(view, target, along):
-        approach = _Approach(view, target, stance, along, None, above=True)
-        try:
-            return approach.way(length, slack)
-        except NoWayError as error:
-            reason = reason or error.with_traceback(None)
-    raise reason or NoWayError(f"{target} is too tall to be drawn along by its top")
+    approaches = (
+        _Approach(view, target, stance, along, None, above=True) for stance in tops(view, target, along)
+    )
+    found = _first(approaches, length, slack)
+    if found is None:
+        raise NoWayError(f"{target} is too tall to be drawn along by its top")
+    return found
 
 
 class _Approach:
@@ -172,33 +202,53 @@ class _Approach:
         self._above = above
         self._start = poses.shifted(stance.tool, GAP * UP if above else -GAP * along)
 
-    def way(self, length: float, slack: float) -> ShovedWay:
-        """The whole of it.
+    def straight(self) -> Route:
+        """The way to where it begins by straight lines: from above, or over what is around.
+
+        Raises:
+            NoWayError: The arm cannot be there; or it does not come there so.
+        """
+        finder, tool = self._finder(self._view, (), CLOSER), self._view.tool
+        if not finder.ends(self._start[None], leans=finder.leanings[-1]).free[0]:
+            raise NoWayError(finder.no_end(self._start[None]))
+        above = poses.shifted(self._start, ABOVE * UP)
+        high = max(float(tool[2]), float(above[2])) + RAISED
+        up, over = (np.concatenate([pose[:2], [high], pose[3:]]) for pose in (tool, self._start))
+        for way in ([tool, above, self._start], [tool, up, over, self._start], [tool, self._start]):
+            found = finder.straight(way, leans=finder.leanings[-1])
+            if found is not None:
+                return followed(finder.arm, np.concatenate([finder.start[None], found]), COMING)
+        raise NotStraightError(f"the hand does not come straight behind {self._target}: make room")
+
+    def searched(self) -> Route:
+        """The way to where it begins as a search finds it.
 
         Raises:
             NoWayError: There is none.
         """
-        passing = self._finder(self._view, (self._target,), CLOSER)
-        beginnings = passing.ends(self._start[None])
-        if not beginnings.free[0]:
-            raise NoWayError(passing.no_end(self._start[None]))
-        begun, end, short, pushed = self._pushed(passing, length, slack, beginnings.joints[0])
+        return self._finder(self._view, (), CLOSER).search(self._start[None], COMING)
+
+    def way(self, length: float, slack: float, coming: Route) -> ShovedWay:
+        """The whole of it, for a way to where it begins.
+
+        Raises:
+            NoWayError: There is none.
+        """
+        end, short, pushed = self._pushed(length, slack, coming.joints[-1])
         away = self._away(end, length - short, pushed[-1])
         if away is None:
             raise NoWayError(f"there is no room to draw back from {self._target}")
-        return ShovedWay(self._stance, self._coming(begun), short, away, self._above)
+        return ShovedWay(self._stance, coming, short, away, self._above)
 
-    def _pushed(
-        self, passing: WayFinder, length: float, slack: float, begun: Array
-    ) -> tuple[Array, Array, float, Array]:
+    def _pushed(self, length: float, slack: float, begun: Array) -> tuple[Array, float, Array]:
+        passing = self._finder(self._view, (self._target,), CLOSER)
         for share in SHORT:
             short = min(share * slack, length)
             end = poses.shifted(self._stance.tool, (length - short) * self._along)
             joints = passing.straight([self._start, end], start=begun, leans=passing.leanings[-1])
             if joints is not None:
-                return begun, end, short, joints
-        ends = passing.ends(end[None])
-        if not ends.free[0]:
+                return end, short, joints
+        if not passing.ends(end[None]).free[0]:
             raise NoWayError(passing.no_end(end[None]))
         raise NoWayError(f"the arm cannot follow {self._target} to its goal")
 
@@ -215,21 +265,6 @@ class _Approach:
             if back == up == 0.0 or finder.straight([end, behind, above], start=begun) is not None:
                 return back, up
         return None
-
-    def _coming(self, joints: Array) -> Route:
-        """The way to a posture ``(n_arm,)`` behind the thing.
-
-        Raises:
-            NoWayError: There is none.
-        """
-        finder = self._finder(self._view, (), CLOSER)
-        tool = self._view.tool
-        above = poses.shifted(self._start, ABOVE * UP)
-        for way in ([tool, above, self._start], [tool, self._start]):
-            found = finder.straight(way) if finder.goes_straight else None
-            if found is not None and float(np.abs(found[-1] - joints).max()) < SAME:
-                return followed(finder.arm, np.concatenate([finder.start[None], found]), COMING)
-        return finder.search_posture(joints[None], COMING)
 
     def _finder(
         self, view: WorldView, without: tuple[str, ...], closer: float, leave: Leave | None = None

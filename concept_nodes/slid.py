@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -58,6 +59,9 @@ DEEPER = 0.03
 """Metres below where the support should be felt down to which it is looked for."""
 LIGHT = 0.3
 """Share of its force with which it has to press to go on."""
+YIELDED = 0.006
+"""Metres below where the support should be to which it goes on pressing: what slips in the hand is not followed
+any farther, since fingers would come down on the support."""
 HIGH = 0.15
 """Metres above its support from which something may come down on it to slide."""
 
@@ -68,8 +72,9 @@ class SlidMemory(NamedTuple):
     Attributes:
         path: The tool's path as if nothing had to come down.
         along: Unit vectors ``(N, 3)`` of the last piece of the way.
-        baseline: Force at the wrist ``(N, 3)`` at the begin, robot base frame, N.
+        baseline: Weight ``(N, 3)`` that hung in the hand at the begin, robot base frame, N.
         drop: Metres ``(N,)`` above its support at the begin.
+        clear: Metres ``(N,)`` of the way up to which nothing is known to be in it.
         progress: Seconds ``(N,)`` of the path that have been commanded.
         lowered: Metres ``(N,)`` that the tool has been told to go down.
         pressed: Newtons ``(N,)`` with which it presses, smoothed.
@@ -82,6 +87,7 @@ class SlidMemory(NamedTuple):
     along: Array
     baseline: Array
     drop: Array
+    clear: Array
     progress: Array
     lowered: Array
     pressed: Array
@@ -128,15 +134,18 @@ class Slid(ConceptModel[SlidMemory]):
         along = way / xp.where(length > 1e-9, length, xp.ones_like(length))[:, None]
         (ranks,) = fetched([found.place.rank])
         drops, *ends = host_numbers([drop, *points])
-        for k, view in enumerate(views(seen)):
+        clear = [
             self._check(view, int(ranks[k]), float(drops[k]), [end[k] for end in ends])
+            for k, view in enumerate(views(seen))
+        ]
         path = plan([seen.tool, *points], self.speed, blend=0.03, samples=65)
         nothing = xp.zeros_like(drop)
         return SlidMemory(
             path=path,
             along=along,
-            baseline=self._force(seen),
+            baseline=xp.minimum(self._force(seen), nothing[:, None]) * constant([0.0, 0.0, 1.0], seen.tool),
             drop=drop,
+            clear=constant(np.array(clear), drop),
             progress=nothing,
             lowered=nothing,
             pressed=nothing,
@@ -145,8 +154,8 @@ class Slid(ConceptModel[SlidMemory]):
             ticks=xp.astype(nothing, xp.int64),
         )
 
-    def _check(self, view: WorldView, rank: int, drop: float, way: Sequence[Array]) -> None:
-        """The way is clear, seen where the object touches its support.
+    def _check(self, view: WorldView, rank: int, drop: float, way: Sequence[Array]) -> float:
+        """The way is clear, seen where the object touches its support, and for so many metres.
 
         Raises:
             NoWayError: It is not.
@@ -156,11 +165,13 @@ class Slid(ConceptModel[SlidMemory]):
         leave = Leave(held=supports | touching_now(view, self.target) | self._touches(view))
         finder = view.finder([self.target], held=view.held(self.target), leave=leave, closer=TOUCHING)
         down = np.array([0.0, 0.0, -drop])
-        low = [poses.shifted(tool, down) for tool in (view.tool, *self._until(view, drop, way))]
+        goes = self._until(view, drop, way)
+        low = [poses.shifted(tool, down) for tool in (view.tool, *goes)]
         if finder.straight([view.tool, *low], leans=finder.leanings[-1]) is None:
             touches = [touch for tool in low for touch in finder.touched(tool)][:1]
             why = f"{touches[0][0]} would touch {touches[0][1]}" if touches else "the arm cannot follow"
             raise NoWayError(f"{self.target} cannot slide there: {why}")
+        return float(sum(np.linalg.norm(b[:3] - a[:3]) for a, b in itertools.pairwise(low)))
 
     def _until(self, view: WorldView, drop: float, way: Sequence[Array]) -> Sequence[Array]:
         """The part of the way ``(7,)`` that it is going to go, as far as is known."""
@@ -189,13 +200,20 @@ class Slid(ConceptModel[SlidMemory]):
         nearing = SLOWLY + (DOWN - SLOWLY) * poses.clip(left / NEAR, 0.0, 1.0)
         more = poses.clip(YIELDS * (self.press - pressed), -SLOWLY, SLOWLY)
         lowered = memory.lowered + period * xp.where(found, more, nearing)
+        deepest = xp.maximum(memory.drop + YIELDED, memory.lowered)
+        lowered = xp.where(found, xp.minimum(lowered, deepest), lowered)
         goes = found & (pressed >= LIGHT * self.press) & self._goes(xp.maximum(against, resisted))
-        progress = memory.progress + period * xp.astype(goes, memory.progress.dtype)
+        pace = xp.where(goes, self._pace(seen, memory), xp.zeros_like(pressed))
+        progress = memory.progress + period * pace
         memory = memory._replace(
             progress=progress, lowered=lowered, pressed=pressed, resisted=resisted, found=found
         )
         ended = self._ended(seen, memory)
         return memory._replace(ticks=xp.where(ended, memory.ticks + 1, xp.zeros_like(memory.ticks)))
+
+    def _pace(self, seen: Seen, memory: SlidMemory) -> Array:
+        """Share ``(N,)`` of its path's speed at which it goes on."""
+        return array_namespace(seen.tool).ones_like(memory.progress)
 
     def _goes(self, resisted: Array) -> Array:
         """Booleans ``(N,)``: it may go on along its way."""

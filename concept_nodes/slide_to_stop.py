@@ -23,6 +23,7 @@ from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import SECONDS
+from bt_tasksim.planning.reference_motion import position
 
 NO_STOP = register_reason(
     "no_stop",
@@ -93,6 +94,15 @@ class SlideToStop(Slid):
             return frozenset({self.against}) | supports_of(view, self.against)
         return frozenset({*view.objects, *(box.fixture or "furniture" for box in view.world.obstacles)})
 
+    def _pace(self, seen: Seen, memory: SlidMemory) -> Array:
+        """Slowly from a little before where it is known to meet something; what is met fast presses hard."""
+        xp, period = array_namespace(seen.tool), seen.world.control_period
+        here, ahead = (position(memory.path, memory.progress + later) for later in (0.0, period))
+        speed = poses.norm(ahead - here) / period
+        gone = poses.norm(here - memory.path.table[:, 0, :3])
+        slow = CREEPS / xp.maximum(speed, xp.full_like(speed, CREEPS))
+        return xp.where(gone >= memory.clear - BEFORE, slow, xp.ones_like(slow))
+
     def _goes(self, resisted: Array) -> Array:
         return resisted < self.resistance
 
@@ -107,5 +117,7 @@ class SlideToStop(Slid):
 
 ABOVE = 0.003
 """Metres above its support at which it is looked at where it meets something."""
+BEFORE, CREEPS = 0.025, 0.012
+"""Metres before where it is known to meet something from which on it goes so slowly, m/s."""
 LATE = 0.5
 """Seconds after its way's end until which it may still be held up."""

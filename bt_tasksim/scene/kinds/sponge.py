@@ -10,4 +10,4 @@ from bt_tasksim.scene.kinds.box import BoxKind
 class SpongeKind(BoxKind):
     """A flat box that a hand takes across its narrow side."""
 
-    size_range = ((0.085, 0.050, 0.032), (0.110, 0.065, 0.045))
+    size_range = ((0.085, 0.050, 0.045), (0.110, 0.065, 0.060))
