@@ -60,8 +60,8 @@ DEEPER = 0.03
 LIGHT = 0.3
 """Share of its force with which it has to press to go on."""
 YIELDED = 0.006
-"""Metres below where the support should be to which it goes on pressing: what slips in the hand is not followed
-any farther, since fingers would come down on the support."""
+"""Metres below where the support should be to which it presses on: what slips in the hand is not followed any
+farther, since fingers would come down on the support."""
 HIGH = 0.15
 """Metres above its support from which something may come down on it to slide."""
 
