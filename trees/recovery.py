@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 
+from py_trees import composites
 from py_trees.behaviour import Behaviour
-from py_trees.composites import Sequence
 
 from bt_tasksim.concept_nodes import HandEmpty, Holding, Place, Release, Settle, Withdraw
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.plain import short
-from bt_tasksim.trees.backchain import asked_by, condition_leaf
+from bt_tasksim.trees.backchain import Wanted, asked_by, condition_leaf
 from bt_tasksim.trees.nodes.any_order import AnyOrder, any_order
 from bt_tasksim.trees.nodes.fallback import fallback
 from bt_tasksim.trees.nodes.retry import Retry
@@ -26,6 +26,7 @@ from bt_tasksim.trees.stages import (
     is_in_hand,
     is_sequence,
     opened,
+    passing,
     same,
     taken_by,
 )
@@ -37,10 +38,11 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
 
     The sequence is cut into stages, one for each time that something is held, by the goals that its concepts
     ``reaches`` and ``ends``. A stage is guarded by what it ``establishes``: where that holds it is skipped,
-    and it is asked again after the stage, and at the end of all. Whatever fails begins another attempt. In
-    it the hand first puts down what it holds, opens and draws back, unless it is free or all is done and what
-    it holds is to be held, and waits until nothing moves; then the first stage that is not done has its turn.
-    Each attempt plans anew, from what is seen then.
+    and it is asked again after the stage, and at the end of all; what a later stage undoes on purpose, as who
+    shuts a drawer again, is done where what stands between the two is. Whatever fails begins another attempt.
+    In it the hand first puts down what it holds, opens and draws back, unless it is free or all is done and
+    what it holds is to be held, and waits until nothing moves; then the first stage that is not done has its
+    turn. Each attempt plans anew, from what is seen then.
 
     A stage that cannot begin, such as one for which no grasp is found, waits until others have acted, those
     behind it that name nothing that it names, and any others of what `tidy` gives
@@ -83,8 +85,9 @@ def recovering(tree: Behaviour, *, attempts: int = 3, name: str | None = None) -
     limit = -1 if rounds < 0 else rounds + (attempts - 1) * len(stages)
     called = name or tree.name
     free = hand_is_free(*_held_as_wanted(stages), taken=taken_by(n for stage in stages for n in stage.nodes))
-    made = [node for step in steps for node in _joined(step, called)]
-    work = sequence(called, free, *made, *_checks(row))
+    served = dict(zip(map(id, row), passing(row), strict=True))
+    made = [node for step in steps for node in _joined(step, called, served)]
+    work = sequence(called, free, *made, *_checks([stage for stage in row if not served[id(stage)]]))
     return retry_while_acting(limit, work, name=f"{called}, recovering")
 
 
@@ -127,7 +130,7 @@ def _children(body: Behaviour) -> list[Behaviour]:
         return opened(body.children)
     if isinstance(body, AnyOrder) or asks_itself(body) is not None:
         return [body]
-    if isinstance(body, Sequence) and not body.children:
+    if isinstance(body, composites.Sequence) and not body.children:
         raise InputError(
             f"'{body.name}' is empty: nothing was put into it, or it was made anew by recovering before"
         )
@@ -152,17 +155,22 @@ def _steps(children: list[Behaviour]) -> list[Step]:
     return steps
 
 
-def _joined(step: Step, called: str) -> list[Behaviour]:
+def _joined(step: Step, called: str, served: Mapping[int, tuple[Wanted, ...]]) -> list[Behaviour]:
     """The nodes that stand for a step in the new tree."""
-    made = [[_made(stage) for stage in block] for block in step]
+    made = [[_made(stage, served[id(stage)]) for stage in block] for block in step]
     if len(made) == 1:
         return made[0]
     blocks = [b[0] if len(b) == 1 else sequence(", then ".join(n.name for n in b), *b) for b in made]
     return [any_order(f"{called} in any order", *blocks)]
 
 
-def _made(stage: Stage) -> Behaviour:
-    """The node that stands for a stage in the new tree."""
+def _made(stage: Stage, served: Sequence[Wanted]) -> Behaviour:
+    """The node that stands for a stage in the new tree.
+
+    Args:
+        stage: The stage.
+        served: Conditions with which it has served its purpose, see `passing`.
+    """
     if not stage.guards or stage.own:
         return stage.nodes[0]
     actors = actors_of(stage.nodes)
@@ -175,6 +183,9 @@ def _made(stage: Stage) -> Behaviour:
     guards = [condition_leaf(guard) for guard in stage.guards]
     is_so, is_done = ("is so", "is done") if len(actors) == 1 else ("are so", "are done")
     guard = guards[0] if len(guards) == 1 else sequence(f"{called} {is_so}", *guards)
+    if served:
+        purpose = sequence("it has served", *map(condition_leaf, served))
+        guard = fallback(f"{called} {is_so}, or has served", guard, purpose)
     return fallback(f"{called} {is_done}", guard, work)
 
 

@@ -177,6 +177,38 @@ def _end(nodes: Sequence[Behaviour]) -> int:
     return 1 + max(k for k, node in enumerate(nodes) if any(acting(node)))
 
 
+def passing(row: Sequence[Stage]) -> list[tuple[Wanted, ...]]:
+    """What stands for each stage that a later one undoes on purpose; nothing for all others.
+
+    A drawer that is opened and shut at last is open only in between, and what is moved on does not stay where
+    it was put first. Such a stage has served where those between it and the one that undoes it are done;
+    where there are none, where the latter is.
+
+    Args:
+        row: The stages, in order.
+    """
+    found: list[tuple[Wanted, ...]] = []
+    for i, stage in enumerate(row):
+        later = next((j for j in range(i + 1, len(row)) if _undoes(row[j], stage)), None)
+        if later is None:
+            found.append(())
+            continue
+        between = [guard for other in row[i + 1 : later] for guard in other.guards]
+        found.append(tuple(each_once(between or row[later].guards)))
+    return found
+
+
+def _undoes(later: Stage, stage: Stage) -> bool:
+    """A later stage acts on what this one acts on, and leaves it otherwise."""
+    for actor in set(actors_of(stage.nodes)) & set(actors_of(later.nodes)):
+        mine, others = (
+            [guard for guard in each.guards if actor in guard.arguments.values()] for each in (stage, later)
+        )
+        if mine and others and not any(same(a, b) for a in mine for b in others):
+            return True
+    return False
+
+
 def each_once(asked: Iterable[Wanted]) -> list[Wanted]:
     """Conditions in order, without those that ask what one before them does."""
     found: list[Wanted] = []

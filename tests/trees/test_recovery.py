@@ -14,10 +14,12 @@ from bt_tasksim import Goal
 from bt_tasksim.concept_nodes import (
     AtPose,
     Bring,
+    CloseDrawer,
     Grasp,
     HandEmpty,
     Inside,
     Lifted,
+    OpenDrawer,
     Over,
     Pick,
     Place,
@@ -381,3 +383,43 @@ def test_what_is_no_tree_or_empty_is_said_to_be():
         recovering(None)
     with pytest.raises(InputError, match="'nobody' is empty"):
         recovering(sequence("nobody"))
+
+
+# ---- what is undone on purpose --------------------------------------------------------------------------
+
+
+def carried(name, to):
+    return [Grasp(name), Pick(name), Bring(name, to=to), Place(name, on=to), Release(name)]
+
+
+def guards_of(tree):
+    """The conditions that are asked at the end of all, and the first child of each stage."""
+    work = tree.decorated
+    ends = [type(node.model).__name__ for node in work.children if not node.children]
+    return ends, [stage.children[0] for stage in work.children[1:] if stage.children]
+
+
+def test_a_drawer_that_is_shut_again_need_not_be_open_at_the_end():
+    work = [
+        *(Grasp("drawer"), OpenDrawer("drawer"), Release("drawer")),
+        *carried("cup", "goal"),
+        *(Grasp("drawer"), CloseDrawer("drawer"), Release("drawer")),
+    ]
+    ends, (opens, carries, shuts) = guards_of(recovering(sequence("fetch", *work)))
+    assert ends == ["AtPose", "IsShut"]
+    asked = [type(leaf.model).__name__ for leaf in opens.iterate() if not leaf.children]
+    assert asked == ["IsOpen", "AtPose"], "it has served where the cup is at its goal"
+    assert not carries.children and not shuts.children
+
+
+def test_what_is_moved_on_need_not_be_where_it_was_first():
+    work = [*carried("cup", "first"), *carried("cup", "second")]
+    ends, (one, two) = guards_of(recovering(sequence("on and on", *work)))
+    assert ends == [], "the last stage has just asked"
+    assert [leaf.model.on for leaf in one.iterate() if not leaf.children] == ["first", "second"]
+    assert two.model.on == "second"
+
+
+def test_what_two_stages_do_to_unlike_things_is_asked_of_both():
+    ends, _ = guards_of(recovering(sequence("both", *carried("cup", "first"), *carried("box", "second"))))
+    assert ends == ["AtPose", "AtPose"]

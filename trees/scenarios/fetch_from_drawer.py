@@ -6,7 +6,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept_nodes import Bring, CloseDrawer, Grasp, OpenDrawer, Pick, Place, Release
 from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene, SpotSpec
-from bt_tasksim.trees import sequence
+from bt_tasksim.trees import recovering, sequence
 
 
 def scene(robot: str = "panda") -> Scene:
@@ -41,18 +41,20 @@ def scene(robot: str = "panda") -> Scene:
 
 
 def build() -> Behaviour:
-    """The tree."""
-    return sequence(
-        "fetch the cube",
-        Grasp("drawer"),
-        OpenDrawer("drawer", distance=0.20),
-        Release("drawer"),
-        Grasp("cube"),
-        Pick("cube", distance=0.15),
-        Bring("cube", to="spot"),
-        Place("cube", on="spot"),
-        Release("cube"),
-        Grasp("drawer", name="take the drawer again"),
-        CloseDrawer("drawer"),
-        Release("drawer", name="let go of the drawer again"),
+    """The tree; what goes wrong is put right."""
+    return recovering(
+        sequence(
+            "fetch the cube",
+            Grasp("drawer"),
+            OpenDrawer("drawer", distance=0.20),
+            Release("drawer"),
+            Grasp("cube"),
+            Pick("cube", distance=0.15),
+            Bring("cube", to="spot"),
+            Place("cube", on="spot"),
+            Release("cube"),
+            Grasp("drawer", name="take the drawer again"),
+            CloseDrawer("drawer"),
+            Release("drawer", name="let go of the drawer again"),
+        )
     )

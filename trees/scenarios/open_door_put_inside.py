@@ -6,7 +6,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept_nodes import Bring, Grasp, OpenDoor, Pick, Place, Release
 from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene
-from bt_tasksim.trees import sequence
+from bt_tasksim.trees import recovering, sequence
 
 
 def scene(robot: str = "panda") -> Scene:
@@ -37,15 +37,17 @@ def scene(robot: str = "panda") -> Scene:
 
 
 def build() -> Behaviour:
-    """The tree."""
-    return sequence(
-        "put the cup into the cabinet",
-        Grasp("door"),
-        OpenDoor("door", angle=1.4),
-        Release("door"),
-        Grasp("cup"),
-        Pick("cup", distance=0.10),
-        Bring("cup", to="cabinet", anywhere=True),
-        Place("cup", on="cabinet", anywhere=True),
-        Release("cup"),
+    """The tree; what goes wrong is put right."""
+    return recovering(
+        sequence(
+            "put the cup into the cabinet",
+            Grasp("door"),
+            OpenDoor("door", angle=1.4),
+            Release("door"),
+            Grasp("cup"),
+            Pick("cup", distance=0.10),
+            Bring("cup", to="cabinet", anywhere=True),
+            Place("cup", on="cabinet", anywhere=True),
+            Release("cup"),
+        )
     )
