@@ -34,9 +34,10 @@ from bt_tasksim.concept_nodes.settle import Settle
 from bt_tasksim.concept_nodes.slide import Slide
 from bt_tasksim.concept_nodes.slide_off import SlideOff
 from bt_tasksim.concept_nodes.slide_to_stop import SlideToStop
+from bt_tasksim.concept_nodes.spin import Spin
 from bt_tasksim.concept_nodes.tip_up import TipUp
 from bt_tasksim.concept_nodes.turn_knob import TurnKnob
-from bt_tasksim.concept_nodes.turned_conditions import Emptied, Lying, OnEnd
+from bt_tasksim.concept_nodes.turned_conditions import Emptied, Lying, OnEnd, TurnedLike
 from bt_tasksim.concept_nodes.wait import Wait
 from bt_tasksim.concept_nodes.withdraw import Withdraw
 from bt_tasksim.core.registry import parts
@@ -89,7 +90,9 @@ __all__ = [
     "SlideToStop",
     "StandsOn",
     "TimePassed",
+    "Spin",
     "TipUp",
+    "TurnedLike",
     "Upright",
     "Wait",
     "Withdraw",

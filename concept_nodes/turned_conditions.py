@@ -9,6 +9,7 @@ from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.parameters import ObjectName, PlaceName, Radians
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.contents import seen_within
+from bt_tasksim.concept_nodes.spin import turned_off
 from bt_tasksim.concept_nodes.whereabouts import Estimates
 from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.poses import Array, array_namespace, host
@@ -18,6 +19,7 @@ from bt_tasksim.scene.spatial_laws import BORNE, is_borne, is_on, rise_of_long_a
 from bt_tasksim.scene.specs import Goal
 
 LEANS = Form("the long axis of {object} is {angle:.0f} from level{borne}", {"angle": RADIANS})
+OTHERWISE = Form("{object} is turned by {angle:.0f} from {like}", {"angle": RADIANS})
 AIR = ", and nothing is below it"
 LEFT = Form("{count} things are in {object}", {"count": COUNT})
 
@@ -119,3 +121,26 @@ class Lying(_LongAxis):
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
         return (self._rise(seen) < self.angle) & self._rests(seen)
+
+
+@register("concept")
+class TurnedLike(Condition):
+    """Does the object have the heading of a place or of another object, up to its symmetry?
+
+    Args:
+        target: The object.
+        like: The place, or the other object.
+        angle: How far it may be turned or tilted from that.
+    """
+
+    target: ObjectName
+    like: PlaceName
+    angle: Radians = 0.15
+
+    def holds(self, seen: Seen) -> Array:
+        """See `Condition.holds`."""
+        return turned_off(seen, self.target, self.like) < self.angle
+
+    def explain(self, seen: Seen) -> Statement:
+        """How far it is turned from that."""
+        return OTHERWISE(object=self.target, angle=turned_off(seen, self.target, self.like), like=self.like)

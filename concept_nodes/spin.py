@@ -1,0 +1,156 @@
+"""Spin: turn a held thing about the vertical on what it stands on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bt_tasksim.concept.aim import Aim
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
+from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, PlaceName
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes.carry import Carry, MoveMemory, miss
+from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING, VERY_CLOSE, with_room
+from bt_tasksim.concept_nodes.destination import destination, standing_pose
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.concept_nodes.standing import headings, reference_frame
+from bt_tasksim.concept_nodes.tipping import support_of
+from bt_tasksim.concept_nodes.turning import followed_anyhow, swung
+from bt_tasksim.concept_nodes.view import WorldView, views
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.fact_making import rotations
+from bt_tasksim.core.poses import Array
+from bt_tasksim.core.registry import register
+from bt_tasksim.planning.reference_motion import plan
+from bt_tasksim.planning.route import Pace, Route, followed
+from bt_tasksim.planning.routes import SAMPLES, with_routes
+from bt_tasksim.planning.things import Leave
+
+ROOMS = (CLOSER, VERY_CLOSE, TOUCHING)
+"""How much closer than usual one may come to things, tried one after the other."""
+TURN, TURNED = 0.8, 0.03
+"""Radians a second at which it is turned, and radians from the end within which the tool has come there."""
+OFF = math.radians(6.0)
+"""Radians from the heading that are tolerable."""
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@register("concept")
+class Spin(Carry):
+    """Turn a held thing on what it stands on, about the vertical, to a heading (keeps TR of rotation).
+
+    It is not lifted. It ends with the heading of a place, up to its symmetry, either way round, whichever the
+    arm can do with the grasp that it has; the grasp is chosen for that.
+
+    Args:
+        target: The held object.
+        like: The place, or the object, whose heading it gets.
+        speed: Peak speed of the tool.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    like: PlaceName
+    speed: MetresPerSecond = 0.15
+    force_limit: Newtons = FORCE_LIMIT
+
+    establishes = (ConditionOf("TurnedLike", target="target", like="like"),)
+    contact = ContactChange(ContactState.TR, ContactState.TR, motion="rotation")
+    presentation = Presentation(
+        colour="#3f6fb0",
+        spoken=r"spin|turn .* (?:round|around|to face)|rotat",
+        sayings=("I turn the {} round", "spin it a little"),
+    )
+    default_timeout = 15.0
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """Like what."""
+        return f"like {parameters['like']}" if "like" in parameters else ""
+
+    def begin(self, seen: Seen) -> MoveMemory:
+        """Find a way round.
+
+        Raises:
+            NoWayError: The wrist cannot turn so far in one of the worlds.
+        """
+        found = [self._found(view) for view in views(seen)]
+        path = plan([seen.tool], self.speed, samples=SAMPLES)  # there is a route in each world
+        routes = {k: [route] for k, route in enumerate(found)}
+        return MoveMemory(with_routes(path, routes, len(seen.robot.arm_joints)))
+
+    def _found(self, view: WorldView) -> Route:
+        grip = poses.relative(view.objects[self.target], view.tool)
+        ways = self._ways(view)
+
+        def find(closer: float) -> Route:
+            leave = Leave(held=frozenset(support_of(view, self.target)[0]))
+            finder = view.finder([self.target], held=view.held(self.target), leave=leave, closer=closer)
+            for way in ways:
+                joints = followed_anyhow(finder, poses.multiply(way, grip[None]))
+                if joints is not None:
+                    return followed(finder.arm, joints, Pace(self.speed, turn=TURN))
+            raise NoWayError(
+                f"the arm cannot turn {self.target} like {self.like} as it holds it: let it go, and grasp it "
+                f"anew for that"
+            )
+
+        return with_room(ROOMS, find)
+
+    def _ways(self, view: WorldView) -> list[Array]:
+        """Poses ``(n, 7)`` on each way round, the shortest first."""
+        now, model = view.objects[self.target], view.model(self.target)
+        frame, _ = reference_frame(view, self.like)
+        turns = headings() if model.symmetry == 0 else rotations(model)
+        goals = poses.quat_multiply(frame[None, 3:], turns)
+        ahead = poses.rotate(poses.quat_multiply(goals, poses.quat_conjugate(now[None, 3:])), np.eye(3)[:1])
+        angles = np.arctan2(ahead[:, 1], ahead[:, 0])
+        every = np.concatenate([angles, angles - 2 * np.pi * np.sign(angles)])
+        if model.symmetry == 0:
+            every = np.zeros(1)
+        return [
+            swung(now, _UP, now[:3], float(angle))
+            for angle in every[np.argsort(np.round(np.abs(every), 6), kind="stable")]
+        ]
+
+    def aim(self, view: WorldView) -> Aim | None:
+        """From where it is all the way round."""
+        ways = self._ways(view)
+        most = max(len(way) for way in ways)
+        onwards = np.array([np.concatenate([way, np.tile(way[-1:], (most - len(way), 1))]) for way in ways])
+        now = np.tile(view.objects[self.target], (len(ways), 1))
+        supports = frozenset(support_of(view, self.target)[0])
+        return Aim(now, f"be turned like {self.like}", supports, True, onwards=onwards)
+
+    def done(self, seen: Seen, memory: MoveMemory) -> Array:
+        """The tool has come round."""
+        turned = poses.angle_between(seen.tool[:, 3:], memory.path.table[:, -1, 3:]) < TURNED
+        there = miss(seen, memory.path) < max(self.tolerance, 0.005)
+        return (seen.elapsed >= memory.path.duration) & turned & there
+
+    def necessary_cost(self, seen: Seen, memory: MoveMemory) -> Array:
+        """Angle of the tool from the end of its way, radians."""
+        return poses.angle_between(seen.tool[:, 3:], memory.path.table[:, -1, 3:])
+
+    def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
+        """How far the object is from the heading, over what is tolerable."""
+        now, model = known.object(self.target), known.world.object(self.target)
+        if self.like in known.world.place_columns:
+            frame = known.place(self.like).pose
+        else:
+            frame = known.object(self.like)
+        goal = standing_pose(frame, now, model)
+        return poses.angle_between(now[:, 3:], goal[:, 3:]) / OFF
+
+
+def turned_off(seen: Seen, target: str, like: str) -> Array:
+    """Angle ``(N,)`` of things from the heading of others, up to their symmetry, radians."""
+    now = seen.object(target)
+    goal = standing_pose(destination(seen, like)[0], now, seen.model(target))
+    return poses.angle_between(now[:, 3:], goal[:, 3:])
