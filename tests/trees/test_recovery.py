@@ -235,9 +235,25 @@ def test_what_is_asked_already_is_not_asked_twice():
     assert len(asked) == 3 and two.attempts == 2 + 2 * 2
 
 
+NOT_RECOVERED = {
+    **dict.fromkeys(("pull", "push"), "takes a sequence"),
+    "press_button": "holds nothing that takes an object",
+    **dict.fromkeys(
+        ("hold", "slide", "slide_to_stop", "push_with_tool", "pull_with_tool"), "nothing tells whether"
+    ),
+}
+"""Scenarios whose trees cannot be recovered by themselves, and why: what is slid or used as a tool is put
+down anywhere."""
+
+
 @pytest.mark.parametrize("name", scenarios())
 def test_it_is_a_tree_like_any_other(name):
-    tree = recovering(load_source(name).build())
+    tree = load_source(name).build()
+    if name in NOT_RECOVERED:
+        with pytest.raises(InputError, match=NOT_RECOVERED[name]):
+            recovering(tree)
+        return
+    tree = recovering(tree)
     assert same_tree(tree_from_xml(tree_to_xml(tree)), tree)
 
 
