@@ -26,18 +26,21 @@ SLOW = {"pour"}
 """Scenarios of many contacts, of which one draw has to do."""
 
 
+OFTEN = {"pick_and_place": 3, "shelf_to_shelf": 3, "pick_and_throw": 3, "pick_and_place_recovering": 2}
+"""How many successes are asked for; one of all others, how often they succeed is a benchmark's to say."""
+
+
 @pytest.mark.parametrize("name", scenarios())
 def test_it_runs_to_success(name):
-    count = 1 if name in SLOW else 2 if name.startswith("grasp") else 3
-    results = successes(runner_of(name).run, range(7, 12), n=count)
+    results = successes(runner_of(name).run, range(7, 12), n=OFTEN.get(name, 1))
     for result in results:
         assert result.status == Status.SUCCESS
         verdict = result.verdict
         assert verdict.penetration < 0.002
         if result.configuration.goal.relation == "stands":
             assert verdict.position_error < 0.03 and verdict.angle_error < np.deg2rad(10)
-    if count > 1:
-        assert results[0].verdict.position_error != results[1].verdict.position_error
+    errors = [result.verdict.position_error for result in results]
+    assert len(set(errors)) == len(errors)
 
 
 @pytest.mark.parametrize("name", ["pick_and_place"])
