@@ -22,10 +22,6 @@ def runner_of(name, robot=None, scene=None, tree=None, **options):
     return Runner(tree or source.build(), scene or source.scene, EngineOptions(**options))
 
 
-SLOW = {"pour"}
-"""Scenarios of many contacts, of which one draw has to do."""
-
-
 OFTEN = {"pick_and_place": 3, "shelf_to_shelf": 3, "pick_and_throw": 3, "pick_and_place_recovering": 2}
 """How many successes are asked for; one of all others, how often they succeed is a benchmark's to say."""
 
