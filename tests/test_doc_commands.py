@@ -40,7 +40,7 @@ PARSED = {
     r"--real-time": "takes as long as it says",
     r"\b[A-Z]{2,}(_[A-Z]+)*\b": "has a placeholder",
     r"--urdf|my_robot\.yaml|so100\.yaml|--plugin|wipe\.xml": "needs a file that its reader writes",
-    r"push=policies/push": "needs a policy that its reader trains",
+    r"nudge=policies/nudge": "needs a policy that its reader trains",
     r"tables --decomposition": "writes into the documentation; benchmarks.decomposition measures the same",
     r"experiments . --train|experiments [AB]$|experiments B --quick": "takes minutes even when quick",
 }
@@ -186,7 +186,7 @@ def prepared(tmp_path_factory):
         patch.chdir(folder)
         assert main(["decompose", log, "--xml", "kitchen.xml"]) == 0
         assert main(["run", "kitchen.xml", "--seed", "11", "--out", "runs/kitchen"]) in (0, 1)
-        assert main(["new", "concept", "push"]) == 0
+        assert main(["new", "concept", "nudge"]) == 0
         assert main(["new", "scene", "kitchen"]) == 0
         assert main(["new", "object", "watering_can"]) == 0
         assert main(["new", "tree", "mine"]) == 0

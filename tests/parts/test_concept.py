@@ -51,41 +51,41 @@ def poured(tmp_path):
 
 
 def test_it_is_listed_written_read_and_shown(plugin, tmp_path):
-    pour = plugin("concept").Pour
-    assert catalogue()["Pour"] is pour
-    tree = trees.sequence("out with it", Grasp("cup"), Pick("cup"), pour("cup", angle=1.2))
-    trees.save_tree(tree, tmp_path / "pour.xml")
-    assert trees.same_tree(trees.load_tree(tmp_path / "pour.xml"), tree)
-    assert "◒ Pour cup  (angle 1.2 rad)" in tree_text(tree)
-    assert "by 60 degrees" in pour.describe_task({"angle": np.radians(60.0)})
+    decant = plugin("concept").Decant
+    assert catalogue()["Decant"] is decant
+    tree = trees.sequence("out with it", Grasp("cup"), Pick("cup"), decant("cup", angle=1.2))
+    trees.save_tree(tree, tmp_path / "decant.xml")
+    assert trees.same_tree(trees.load_tree(tmp_path / "decant.xml"), tree)
+    assert "◒ Decant cup  (angle 1.2 rad)" in tree_text(tree)
+    assert "by 60 degrees" in decant.describe_task({"angle": np.radians(60.0)})
 
 
 def test_without_the_plugin_its_tree_is_refused(tmp_path):
-    file = tmp_path / "pour.xml"
-    file.write_text('<root BTCPP_format="4"><BehaviorTree>\n<Pour target="cup"/></BehaviorTree></root>')
+    file = tmp_path / "decant.xml"
+    file.write_text('<root BTCPP_format="4"><BehaviorTree>\n<Decant target="cup"/></BehaviorTree></root>')
     with pytest.raises(InputError, match="line 2"):
         trees.load_tree(file)
 
 
 def test_it_runs(plugin):
-    pour = plugin("concept").Pour
+    decant = plugin("concept").Decant
     scene = load_source("pick_and_place").scene
-    tree = trees.sequence("out", Grasp("target"), Pick("target", distance=0.2), pour("target", angle=0.5))
+    tree = trees.sequence("out", Grasp("target"), Pick("target", distance=0.2), decant("target", angle=0.5))
     runner = Runner(tree, scene)
     assert sum(runner.run(seed).status == Status.SUCCESS for seed in (1, 2, 3)) >= 2
 
 
 def test_it_is_recognised_in_a_log_and_becomes_a_leaf(plugin, poured):
-    pour = plugin("concept").Pour
+    decant = plugin("concept").Decant
     found = decompose_log(open_log(poured))
-    assert "pour" in [task.concept for task in found.tasks]
+    assert "decant" in [task.concept for task in found.tasks]
     assert "by 60 degrees" in text_table(found.tasks)
     assert "#2a7f9e" in picture(found.graph)
-    assert spoken_concepts("now I pour the cup out") == {"pour"}
+    assert spoken_concepts("now I decant the cup") == {"decant"}
     (leaf,) = [
         leaf
         for leaf in tree_from_graph(found.graph).iterate()
-        if isinstance(getattr(leaf, "model", None), pour)
+        if isinstance(getattr(leaf, "model", None), decant)
     ]
     assert leaf.model.angle == pytest.approx(np.radians(60.0), abs=0.1)
     assert abs(leaf.model.axis[0]) == pytest.approx(1.0, abs=0.05)
@@ -94,14 +94,16 @@ def test_it_is_recognised_in_a_log_and_becomes_a_leaf(plugin, poured):
 def test_the_command_line_takes_it(plugin, poured, tmp_path, capsys):
     xml = str(tmp_path / "tree.xml")
     assert main(["decompose", str(poured), "--xml", xml, "--plugin", FILE]) == 0
-    assert "pour" in capsys.readouterr().out
+    assert "decant" in capsys.readouterr().out
     assert main(["show", xml, "--plugin", FILE]) == 0
-    assert "◒ Pour" in capsys.readouterr().out
+    assert "◒ Decant" in capsys.readouterr().out
 
 
 def test_an_old_file_that_announces_nothing_is_announced(plugin, tmp_path):
     old = tmp_path / "old.py"
-    text = (FOLDER / "concept.py").read_text().replace('@register("concept")\n', "").replace("Pour", "Spill")
+    text = (
+        (FOLDER / "concept.py").read_text().replace('@register("concept")\n', "").replace("Decant", "Spill")
+    )
     old.write_text(text)
     load_parts(str(old))
     assert catalogue()["Spill"].__name__ == "Spill"

@@ -93,7 +93,7 @@ def test_each_scenario_builds_a_fresh_tree_every_time(name):
     a, b = source.build(), source.build()
     assert source.name == source.scene.name == name
     assert {id(n) for n in a.iterate()}.isdisjoint(id(n) for n in b.iterate())
-    assert names_in(a)[0] <= set(source.scene.objects)
+    assert names_in(a)[0] <= set(source.scene.object_names)
 
 
 def test_the_scenarios_of_the_design_are_there():

@@ -19,6 +19,7 @@ from bt_tasksim import ConceptModel, Scene
 from bt_tasksim.concept.parameters import ObjectName
 from bt_tasksim.core.world import Command
 from bt_tasksim.trees import sequence
+from bt_tasksim.trees.load import load_source
 
 class Nudge(ConceptModel):
     """Hold still at the target."""
@@ -111,7 +112,9 @@ def test_which_tree_is_taken(tmp_path, monkeypatch):
     command.check(ROOT / "concept_nodes" / "grasp.py")
     command.check(ROOT / "concept_nodes" / "place.py")
     assert asked[:2] == [str(own), str(tmp_path / "train_nudge.py")]
-    assert asked[2].startswith("grasp_") and "place" in asked[3]
+    for name, concept in zip(asked[2:], ("Grasp", "Place"), strict=True):
+        leaves = [getattr(node, "model", None) for node in load_source(name).build().iterate()]
+        assert concept in [type(model).__name__ for model in leaves]
 
 
 @pytest.mark.parametrize("name", ["grasp", "place"])

@@ -102,7 +102,7 @@ def test_logs_keep_what_was_given():
     ("text", "words"),
     [
         ("mass: 0.2\n", "should name a 'mesh' or a 'kind'"),
-        ("kind: bocks\n", "unknown kind of object 'bocks'; known: box"),
+        ("kind: bocks\n", "unknown kind of object 'bocks'; did you mean 'book'"),
         ("kind: box\ncolor: red\n", "line 2: unknown field 'color'; did you mean 'colour'"),
         ("kind: box\ncolour: rde\n", "unknown colour 'rde'; did you mean 'red'"),
         ("kind: box\ncolour: [1, 2, 3]\n", "3 numbers from 0 to 1"),

@@ -18,7 +18,7 @@ from concept_nodes.carry import Carry, MoveMemory
 
 
 @register("concept")
-class Pour(Carry):
+class Decant(Carry):
     """Tilt a held object about a horizontal axis through the tool, and set it upright again (keeps NC).
 
     Args:
@@ -36,7 +36,7 @@ class Pour(Carry):
     force_limit: Newtons = 60.0
 
     presentation = Presentation(
-        colour="#2a7f9e", symbol="◒", spoken=r"\bpour|\bempt", sayings=("I pour the {} out",)
+        colour="#2a7f9e", symbol="◒", spoken=r"\bdecant", sayings=("I decant the {}",)
     )
     contact = ContactChange(ContactState.NC, ContactState.NC, motion="rotation")
 
@@ -66,7 +66,7 @@ class Pour(Carry):
             over = shown.time[span][tilt > 0.1]
             values = {"axis": axis / np.linalg.norm(axis), "angle": float(tilt[top])}
             parameters = {"target": task.parameters["target"], **values}
-            found.append(Task("pour", float(over[0]), float(over[-1]), task.confidence, parameters))
+            found.append(Task("decant", float(over[0]), float(over[-1]), task.confidence, parameters))
         return sorted([*tasks, *found], key=lambda task: task.start)
 
     @classmethod

@@ -17,7 +17,7 @@ from bt_tasksim.cli.main import main
 from bt_tasksim.core import files
 from bt_tasksim.core.errors import InputError, MachineError
 
-FILES = ["push.py", "test_push.py", "train_push.py"]
+FILES = ["nudge.py", "test_nudge.py", "train_nudge.py"]
 
 
 @pytest.fixture(autouse=True)
@@ -30,10 +30,10 @@ def here():
 
 
 def test_it_says_what_it_wrote_and_what_to_do_next(capsys):
-    assert main(["new", "concept", "push"]) == 0
+    assert main(["new", "concept", "nudge"]) == 0
     assert here() == FILES
     out = capsys.readouterr().out
-    assert out.startswith("wrote push.py, train_push.py, test_push.py\nnext: bt-tasksim check push.py; ")
+    assert out.startswith("wrote nudge.py, train_nudge.py, test_nudge.py\nnext: bt-tasksim check nudge.py; ")
     for name in FILES:
         assert not re.search("@(name|Class|words)@", Path(name).read_text()), name
 
@@ -86,21 +86,21 @@ def test_bad_names(name, words, capsys):
 
 
 def test_a_missing_folder_is_made(capsys):
-    assert main(["new", "concept", "push", "--out", "some/where"]) == 0
+    assert main(["new", "concept", "nudge", "--out", "some/where"]) == 0
     assert sorted(os.listdir("some/where")) == FILES
     assert main(["new", "concept", "lambda", "--out", "other/where"]) == 2
     Path("file").touch()
     for out in ("file", "file/in"):
-        assert main(["new", "concept", "push", "--out", out]) == 2
+        assert main(["new", "concept", "nudge", "--out", out]) == 2
         assert "'file' is a file" in capsys.readouterr().err
     assert here() == ["file", "some"]
 
 
 def test_files_that_are_there():
-    Path("test_push.py").touch()
-    with pytest.raises(InputError, match=r"'test_push\.py' is there already"):
-        new_concept.write_concept("push")
-    assert here() == ["test_push.py"] and Path("test_push.py").read_text() == ""
+    Path("test_nudge.py").touch()
+    with pytest.raises(InputError, match=r"'test_nudge\.py' is there already"):
+        new_concept.write_concept("nudge")
+    assert here() == ["test_nudge.py"] and Path("test_nudge.py").read_text() == ""
 
 
 def test_nothing_stays_half_written(monkeypatch):
@@ -113,7 +113,7 @@ def test_nothing_stays_half_written(monkeypatch):
 
     monkeypatch.setattr(files.os, "fsync", full)
     with pytest.raises(MachineError, match="No space left"):
-        new_concept.write_concept("push", "some/where")
+        new_concept.write_concept("nudge", "some/where")
     assert len(count) == 3 and here() == []
 
 
