@@ -1,8 +1,9 @@
 """The table of docs/taxonomy.md: classes, tasks, their nodes, an example each, and what was measured.
 
 Classes, tasks and nodes come from `bt_tasksim.concept_nodes.contact_tasks`, examples from the ready-made
-scenarios: of those in whose tree a node stands the one with the fewest leaves. Measured successes are what
-`benchmarks.concepts` found on the last block, ``concept-<scenario>-<robot>-<engine>.json``.
+scenarios: the one that is called like the node, else of those in whose tree it stands the one with the
+fewest leaves. Measured successes are what `benchmarks.concepts` found on the last block,
+``concept-<scenario>-<robot>-<engine>.json``.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ def taxonomy(results: dict[str, Any]) -> str:
         example = _example(each.node) if each.node else ""
         cells = [_said(results.get(f"concept-{example}-{column}")) for column in COLUMNS]
         change = f"{each.before.name} to {each.after.name}"
-        task = f"{each.change.value}: {each.name.replace('_', ' ')}"
+        task = f"{each.change.value}: {(_snake(each.node) or each.name).replace('_', ' ')}"
         lines.append(
             f"| {each.motion} | {each.state.name} | {task} | {change} "
             f"| {_code(each.node)} | {_code(example)} | {' | '.join(cells)} |"
@@ -48,10 +49,18 @@ def _code(name: str) -> str:
     return f"`{name}`" if name else ""
 
 
+def _snake(node: str) -> str:
+    return "".join(f"_{c.lower()}" if c.isupper() else c for c in node).strip("_")
+
+
 def _example(node: str) -> str:
-    """The scenario with the fewest leaves in which a concept has one; empty where there is none."""
-    fitting = [(len(leaves), name) for name, leaves in _leaves().items() if node in leaves]
-    return min(fitting, default=(0, ""))[1]
+    """The scenario that shows a concept best; empty where there is none."""
+    fitting = [
+        (not name.startswith(_snake(node)), len(leaves), name)
+        for name, leaves in _leaves().items()
+        if node in leaves
+    ]
+    return min(fitting, default=(True, 0, ""))[-1]
 
 
 @lru_cache(maxsize=1)
