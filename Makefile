@@ -8,7 +8,8 @@ SHELL := /bin/bash
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
 EXTRAS := sim,train,report,ros,remote,mujoco,warp,cluster,docs,dev
-PYTEST_FLAGS ?= -n logical --maxprocesses 4
+# A file's tests in one process: what they share is made once.
+PYTEST_FLAGS ?= -n logical --maxprocesses 4 --dist loadfile
 
 TWIN := .twin
 
@@ -32,16 +33,18 @@ test-twin: setup twin-environment
 
 # The tests that stand on physics again, since it rounds differently on another processor: drive targets nudged
 # (rad), worlds drawn with other seeds. PARTS=3: each perturbation has another third of the tests, the first one that
-# of the number PART.
+# of the number PART. ONE=2: the last perturbation alone.
 PARTS ?= 1
 PART ?= 0
+ONE ?=
 PHYSICAL = $(shell grep -rl --include='test_*.py' 'mark\.physical' tests)
 PERTURBED ?= "--nudge=-1e-6" "--nudge=2e-7 --shift-seeds=1000" "--nudge=1e-6 --shift-seeds=2000"
 
 test-perturbed: setup
 	@failed=0; k=0; \
 	for how in $(PERTURBED); do \
-	  how="$$how --part=$$(((k + $(PART)) % $(PARTS)))/$(PARTS)"; k=$$((k + 1)); \
+	  this=$$k; k=$$((k + 1)); [ "$(or $(ONE),all)" = all ] || [ "$(ONE)" = $$this ] || continue; \
+	  how="$$how --part=$$(((this + $(PART)) % $(PARTS)))/$(PARTS)"; \
 	  echo "Physical tests, $$how"; \
 	  $(VENV)/bin/python -m pytest -q $(PYTEST_FLAGS) -m physical $(PHYSICAL) $$how || failed=1; \
 	done; exit $$failed

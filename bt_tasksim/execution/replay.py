@@ -66,6 +66,7 @@ def replay(
     policies: Sequence[tuple[str, str]] = (),
     objects: str | Path | None = None,
     nodes: Leaves | None = None,
+    until: float | None = None,
 ) -> ReplayResult:
     """Run a recorded run again with everything as it was, and compare.
 
@@ -79,6 +80,7 @@ def replay(
         policies: Concepts and their policies, where those are not bundled ones.
         objects: Folder of its mesh files, where those are not bundled ones.
         nodes: Concepts and conditions of one's own by name, for a tree from the log.
+        until: Seconds from the beginning that are run again and compared; None for all.
 
     Raises:
         InputError: There is no such log, it is none of a run in simulation, its tree cannot be built, or it
@@ -87,6 +89,8 @@ def replay(
     """
     path = Path(run) / "run.h5" if Path(run).is_dir() else Path(run)
     where, given = f"'{path}'", Given(robot, policies, objects, nodes or {})
+    if until is not None and not until > 0:
+        raise InputError(f"a replay of the first {until:g} s has nothing to compare: give a positive number")
     log = read_log(path)
     if log.source != "simulation" and "run/about" in log.demonstrations[0].extra:
         raise InputError(f"{where} was recorded on a robot; only runs in simulation can be replayed")
@@ -96,7 +100,8 @@ def replay(
     take_policies(root, recorded, given, where, trusted=tree is not None)
     own, robot = recorded.options.own_world(), recorded.configuration.robot
     scene = Scene(robot) if own is None else own.with_robot(robot)
-    runner = Runner(root, scene, recorded.options, longest=recorded.longest)
+    longest = recorded.longest if until is None else min(until, recorded.longest)
+    runner = Runner(root, scene, recorded.options, longest=longest)
     recorder = RunRecorder(runner, recorded.scenario)
     try:
         world = runner.reset(recorded.configuration)
@@ -111,7 +116,7 @@ def replay(
         for name in sorted({*before, *now})
         if before.get(name) != now.get(name)
     }
-    return _compared(recorded.demonstration, compared, repeated, result, changed)
+    return _compared(recorded.demonstration, compared, repeated, result, changed, until)
 
 
 def _tree(text: str, given: Given, where: str) -> Behaviour:
@@ -128,8 +133,12 @@ def _compared(
     repeated: Demonstration,
     result: Result,
     changed: dict[str, tuple[str, str]],
+    until: float | None,
 ) -> ReplayResult:
-    count = min(len(recorded.time), len(repeated.time))
+    lengths = [len(run.time) for run in (recorded, repeated)]
+    if until is not None:  # what comes after it, and how it is judged there, is the shorter run's own
+        lengths = [int(np.searchsorted(run.time, until)) for run in (recorded, repeated)]
+    count = min(lengths)
     first, differences = count, {}
     for name in COMPARED:
         if name not in compared and name not in repeated.extra:
@@ -141,16 +150,17 @@ def _compared(
         if (gap > 0).any():
             first = min(first, int(np.argmax(gap > 0)))
             differences[name] = float(gap.max())
-    same_length = len(recorded.time) == len(repeated.time)
+    same_length = lengths[0] == lengths[1]
     if not differences and same_length:
-        why = f"identical bit for bit over {count} ticks: {result.why}"
+        said = result.why if until is None else f"the first {until:g} s"
+        why = f"identical bit for bit over {count} ticks: {said}"
         return ReplayResult(True, why, None, {}, changed, result)
     time = float(recorded.time[min(first, count - 1)])
     if differences:
         sizes = ", ".join(_size(name, size) for name, size in differences.items())
         what = f"different from {time:.2f} s on, at most by: {sizes}"
     else:
-        longer = "recorded" if len(recorded.time) > len(repeated.time) else "repeated"
+        longer = "recorded" if lengths[0] > lengths[1] else "repeated"
         what = f"the same up to {time:.2f} s, where the {longer} run goes on and the other ends"
     said = ", ".join(f"{name} {old}, now {new}" for name, (old, new) in changed.items())
     return ReplayResult(

@@ -84,6 +84,8 @@ SEEDS = (1, 2)
 """Draws of which the objects differ in kind and size."""
 EACH = 1
 """Situations of each concept in each draw."""
+PLANNED = 6
+"""Of these, so many are asked to begin again and again: a plan takes seconds where there is hardly a way."""
 CLOSE = 1e-7
 """The square root of a difference that rounds off may be as much."""
 SCENES = {
@@ -211,10 +213,16 @@ class Asking:
         self.batch = together(self.single)
         self._alone = {}
 
+    def rows(self, name):
+        """The worlds that a question is about."""
+        n = len(self.single)
+        few = name == "begin" and n > PLANNED
+        return np.linspace(0, n - 1, PLANNED).astype(int) if few else np.arange(n)
+
     def alone(self, name):
-        """What each world is answered by itself; asked once, since one that begins may plan for seconds."""
+        """What each of these worlds is answered by itself; asked once."""
         if name not in self._alone:
-            self._alone[name] = [self.ask(name, s) for s in self.single]
+            self._alone[name] = [self.ask(name, self.single[k]) for k in self.rows(name)]
         return self._alone[name]
 
     def begun(self, situation, rng):
@@ -307,15 +315,14 @@ def functions(model):
 )
 def test_a_world_gets_the_same_in_every_batch_to_the_last_bit(asking, scenario, concept):
     at, rng = asking(scenario, concept), np.random.default_rng(2)
-    n = len(at.single)
-    two, many_of_them = rng.integers(0, n, 2), rng.integers(0, n, 64)
-    planned = [two, np.arange(n)[::-1]]  # a plan takes seconds where there is hardly a way
     for name in functions(at.model):
-        one = at.alone(name)
-        for order in (
-            planned if name == "begin" else [*planned, np.arange(n), rng.permutation(n), many_of_them]
-        ):
-            many = at.ask(name, at.batch.at(order))
+        one, rows = at.alone(name), at.rows(name)
+        n = len(rows)
+        orders = [rng.integers(0, n, 2), np.arange(n)[::-1]]
+        if name != "begin":
+            orders += [np.arange(n), rng.permutation(n), rng.integers(0, n, 64)]
+        for order in orders:
+            many = at.ask(name, at.batch.at(rows[order]))
             assert not different(name, [one[k] for k in order.tolist()], many, tolerance=0.0)
 
 
@@ -335,20 +342,16 @@ def test_a_condition_answers_the_same_in_every_batch(worlds, scenario, condition
         assert not different(
             condition, [one[k] for k in order.tolist()], holds(batch.at(order)), tolerance=0.0
         )
-    for change in (array_api_strict.asarray, elsewhere):
-        assert not different(condition, one, holds(batch.map(change)), CLOSE)
+    assert not different(condition, one, holds(batch.map(elsewhere)), CLOSE)
 
 
 def elsewhere(values):
-    """An array on a device that no constant is on which nobody put there."""
+    """A strict array on a device that no constant is on which nobody put there."""
     return array_api_strict.asarray(values, device=array_api_strict.Device("device1"))
 
 
 def libraries():
-    found = {
-        "array_api_strict": (array_api_strict.asarray, type(array_api_strict.asarray(0))),
-        "another device": (elsewhere, type(array_api_strict.asarray(0))),
-    }
+    found = {"array_api_strict": (elsewhere, type(array_api_strict.asarray(0)))}
     if importlib.util.find_spec("torch"):
         import torch
 
@@ -360,9 +363,8 @@ def libraries():
 @pytest.mark.parametrize("concept", concepts())
 def test_every_library_gives_the_same(asking, concept, library):
     at, (change, kind) = asking(scenarios_of(concept)[0], concept), libraries()[library]
-    batch = at.batch.map(change)
     for name in functions(at.model):
-        one = at.alone(name)
+        one, batch = at.alone(name), at.batch.at(at.rows(name)).map(change)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # torch's words about read-only constants
             found = at.ask(name, batch)
@@ -376,10 +378,10 @@ def single(values):
 @pytest.mark.parametrize("concept", concepts())
 def test_single_precision_stays_so_and_a_world_gets_the_same_in_every_batch(asking, concept):
     at = asking(scenarios_of(concept)[0], concept)
-    batch = at.batch.map(single)
-    ones = [s.map(single) for s in at.single]
     for name in functions(at.model):
-        many = at.ask(name, batch)
-        assert not different(name, [at.ask(name, s) for s in ones], many, tolerance=0.0)
+        rows = at.rows(name)
+        many = at.ask(name, at.batch.at(rows).map(single))
+        ones = [at.ask(name, at.single[k].map(single)) for k in rows]
+        assert not different(name, ones, many, tolerance=0.0)
         if not QUESTIONS[name].words:
             mapped(lambda v, name=name: pytest.fail(name) if numbers(v).dtype == np.float64 else v, many)

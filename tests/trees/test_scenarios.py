@@ -1,4 +1,4 @@
-"""The ready-made scenarios run to success, and success is what the physics says, not what the tree says."""
+"""Success of ready-made scenarios is what the physics says, not what the tree says; and another robot's."""
 
 import dataclasses
 
@@ -12,7 +12,7 @@ from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.scene.specs import Goal, SpotSpec
 from bt_tasksim.trees import sequence
-from bt_tasksim.trees.load import load_source, scenarios
+from bt_tasksim.trees.load import load_source
 
 pytestmark = pytest.mark.physical
 
@@ -20,23 +20,6 @@ pytestmark = pytest.mark.physical
 def runner_of(name, robot=None, scene=None, tree=None, **options):
     source = load_source(name, robot)
     return Runner(tree or source.build(), scene or source.scene, EngineOptions(**options))
-
-
-OFTEN = {"pick_and_place": 3, "shelf_to_shelf": 3, "pick_and_throw": 3, "pick_and_place_recovering": 2}
-"""How many successes are asked for; one of all others, how often they succeed is a benchmark's to say."""
-
-
-@pytest.mark.parametrize("name", scenarios())
-def test_it_runs_to_success(name):
-    results = successes(runner_of(name).run, range(7, 12), n=OFTEN.get(name, 1))
-    for result in results:
-        assert result.status == Status.SUCCESS
-        verdict = result.verdict
-        assert verdict.penetration < 0.002
-        if result.configuration.goal.relation == "stands":
-            assert verdict.position_error < 0.03 and verdict.angle_error < np.deg2rad(10)
-    errors = [result.verdict.position_error for result in results]
-    assert len(set(errors)) == len(errors)
 
 
 @pytest.mark.parametrize("name", ["pick_and_place"])

@@ -65,6 +65,16 @@ def test_the_first_difference_is_found(folder, tampered):
     )
 
 
+def test_the_first_seconds_alone(folder, tampered):
+    found = replay(folder, until=1.5)
+    assert found.identical and found.why == "identical bit for bit over 30 ticks: the first 1.5 s"
+    values = read_log(folder / "run.h5").demonstrations[0].extra["state/joint_position"].copy()
+    values[20, 2] += 1e-3
+    assert replay(tampered(**{"state/joint_position": values}), until=1.5).time == pytest.approx(1.0)
+    with pytest.raises(InputError, match="the first 0 s has nothing to compare"):
+        replay(folder, until=0.0)
+
+
 def test_another_version_is_named(folder, tampered):
     extra = read_log(folder / "run.h5").demonstrations[0].extra
     about = json.loads(read_text(extra["run/about"]))
