@@ -16,6 +16,7 @@ from bt_tasksim.concept_nodes.extract import Extract
 from bt_tasksim.concept_nodes.grasp import Grasp
 from bt_tasksim.concept_nodes.hand_conditions import HandEmpty, Lifted, Over, OverBeside
 from bt_tasksim.concept_nodes.hold import Hold
+from bt_tasksim.concept_nodes.hold_turned import HoldTurned
 from bt_tasksim.concept_nodes.in_contact import InContact
 from bt_tasksim.concept_nodes.insert import Insert
 from bt_tasksim.concept_nodes.inserted import Inserted
@@ -67,6 +68,7 @@ __all__ = [
     "Grasp",
     "HandEmpty",
     "Hold",
+    "HoldTurned",
     "Holding",
     "InContact",
     "Insert",

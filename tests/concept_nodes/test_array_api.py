@@ -34,6 +34,7 @@ from bt_tasksim.concept_nodes import (
     HandEmpty,
     Hold,
     Holding,
+    HoldTurned,
     InContact,
     Insert,
     Inserted,
@@ -106,6 +107,7 @@ OWN = {
     "adjust a door": DRAWER,
     "close a door": DRAWER,
     "turn a knob": DRAWER,
+    "hold turned": DRAWER,
     "press a button": ("press_button", ("button", "table")),
 }
 """Concepts that begin in no such scene: a scenario of their own, with its target and its place."""
@@ -149,6 +151,7 @@ def concepts(target="target", place="goal"):
         "close a door": CloseDoor.value(target),
         "press a button": PressButton.value(target),
         "turn a knob": TurnKnob.value(target, angle=0.1),
+        "hold turned": HoldTurned.value(target),
         # What is there already needs no plan, which takes a second in each world.
         "push": Push.value(target, direction=(1.0, 0.0, 0.0), distance=0.01),
         "pull": Pull.value(target, direction=(-1.0, 0.0, 0.0), distance=0.01),

@@ -40,6 +40,8 @@ class Lever(ControlMaker):
     """What it takes to turn it, Nm; on a front it has to bear its weight."""
     damping: Annotated[Number, usually(0.02, 0.06, ge=0.0, le=20.0)]
     """Nm for each rad a second."""
+    spring: Annotated[Number, usually(0.0, ge=0.0, le=50.0)]
+    """Of the spring that turns it back, Nm/rad."""
 
     def make(self, name: str) -> Fixture:
         """See `FixtureMaker.make`."""
@@ -66,6 +68,7 @@ class Lever(ControlMaker):
             mass=self.mass,
             friction=self.friction,
             damping=self.damping,
+            stiffness=self.spring,
             value=(self.value, self.value),
             grasps=tuple(
                 held(mount, point, closing, PEG, (0.0, 0.0, -1.0))

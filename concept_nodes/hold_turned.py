@@ -1,0 +1,193 @@
+"""HoldTurned: press a lever, a door or a knob against the stop of its hinge for a while."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.limit import Limit
+from bt_tasksim.concept.model import ConceptModel
+from bt_tasksim.concept.parameters import Newtons, ObjectName, Seconds
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
+from bt_tasksim.concept_nodes.hold import GIVES_WAY, PRESSED, QUICKEST, SMOOTH, YIELDS
+from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
+from bt_tasksim.core import poses
+from bt_tasksim.core.outcomes import Possible, Statement, register_reason
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import RADIANS
+from bt_tasksim.core.world import Command
+
+AT_STOP = math.radians(4.0)
+"""Radians from a stop within which a part may seem to be where it stands at it."""
+NO_STOP = register_reason(
+    "not_at_stop",
+    "{object} stands {value} from the nearer stop of its hinge, more than {limit}: turn it there",
+    value=RADIANS,
+    limit=RADIANS,
+)
+
+
+class HoldTurnedMemory(NamedTuple):
+    """What is remembered in ``N`` worlds.
+
+    Attributes:
+        value: Radians ``(N,)`` to which the part was turned at the begin.
+        way: Sign ``(N,)`` of the turn onto the stop.
+        grip: Pose ``(N, 7)`` of the part in the tool frame.
+        reach: Metres ``(N,)`` that the tool goes for each radian.
+        pushed: Metres ``(N,)`` that the tool is told to go beyond the stop.
+        pressed: Newtons ``(N,)`` with which it presses, smoothed.
+        held: Seconds ``(N,)`` for which that has been between its limits.
+    """
+
+    value: Array
+    way: Array
+    grip: Array
+    reach: Array
+    pushed: Array
+    pressed: Array
+    held: Array
+
+
+@register("concept")
+class HoldTurned(ConceptModel[HoldTurnedMemory]):
+    """Press a lever, or anything on a hinge, against the stop at which it stands (keeps FT, rotation).
+
+    The force is led to the middle of its limits, along the way of the hand about the hinge; the time counts
+    for which it stays between them.
+
+    Args:
+        target: What turns; the hand holds it, and it stands at one of its stops.
+        duration: For how long, without a break.
+        least: Force with which the hand presses at least.
+        most: Force with which it presses at most.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    duration: Seconds = 2.0
+    least: Newtons = 4.0
+    most: Newtons = 20.0
+    force_limit: Newtons = FORCE_LIMIT
+
+    maintains = (HOLDING,)
+    contact = ContactChange(ContactState.FT, ContactState.FT, "rotation")
+    presentation = Presentation(
+        colour="#57489b",
+        spoken=r"(?:keep|hold) .* (?:turned|down|shut)",
+        sayings=("keep the {} turned", "I hold the {} down"),
+    )
+    default_timeout = 15.0
+    default_tolerance = 0.03
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """For how long."""
+        return f"for {float(parameters['duration']):.1f} s" if "duration" in parameters else ""
+
+    def contradiction(self) -> str:
+        """Limits in their order."""
+        return "" if self.least < self.most else "'least' should be less than 'most'"
+
+    def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
+        """It must be on a hinge, in the hand, and at a stop."""
+        model, away = seen.model(self.target), off_handle(seen, self.target)
+        off = abs(self._stop(seen)[0] - self._value(seen))
+        turns = model.jointed & model.joint_turns
+        return (
+            NO_PART.where(~model.jointed, object=self.target),
+            OTHER_PART[True].where(model.jointed & ~model.joint_turns, object=self.target),
+            NOT_HELD.where(~at_handle(seen, self.target), object=self.target, distance=away),
+            NO_STOP.where(turns & (off > AT_STOP), object=self.target, value=off, limit=AT_STOP),
+        )
+
+    def begin(self, seen: Seen) -> HoldTurnedMemory:
+        """Where the hand is about the hinge, and what is felt."""
+        value, (_, way) = self._value(seen), self._stop(seen)
+        nothing = array_namespace(value).zeros_like(value)
+        grip = poses.relative(seen.tool, seen.object(self.target))
+        start = HoldTurnedMemory(value, way, grip, nothing, nothing, nothing, nothing)
+        small = 0.01
+        there, here = self._tool(seen, start, small), self._tool(seen, start, 0.0)
+        reach = poses.clip(poses.norm(there[:, :3] - here[:, :3]) / small, 1e-3, math.inf)
+        start = start._replace(reach=reach)
+        return start._replace(pressed=self._against(seen, start))
+
+    def command(self, action: Array, seen: Seen, memory: HoldTurnedMemory) -> Command:
+        """A little beyond the stop."""
+        after = self.advance(action, seen, memory)
+        return Command(tool=self._tool(seen, after, after.pushed / after.reach))
+
+    def advance(self, action: Array, seen: Seen, memory: HoldTurnedMemory) -> HoldTurnedMemory:
+        """Lead the force to the middle of its limits, and count the time."""
+        xp, period = array_namespace(seen.tool), seen.world.control_period
+        pressed = memory.pressed + SMOOTH * (self._against(seen, memory) - memory.pressed)
+        middle = (self.least + self.most) / 2
+        speed = poses.clip(YIELDS * (middle - pressed), -QUICKEST, QUICKEST)
+        within = (pressed >= self.least) & (pressed <= self.most)
+        held = xp.where(within, memory.held + period, xp.zeros_like(memory.held))
+        return memory._replace(pushed=memory.pushed + period * speed, pressed=pressed, held=held)
+
+    def done(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """It has been pressed for long enough."""
+        return memory.held >= self.duration
+
+    def limits(self, seen: Seen, memory: HoldTurnedMemory) -> tuple[Limit, ...]:
+        """The force at the wrist; and there is a stop."""
+        here = self._tool(seen, memory, 0.0)
+        gone = poses.dot(seen.tool[:, :3] - here[:, :3], self._along(seen, memory))
+        return strain(seen, self.force_limit), Limit(GIVES_WAY, gone, self.tolerance, {"object": self.target})
+
+    def maintained(self, goal: str, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """The handle may still be in the hand."""
+        return at_handle(seen, self.target)
+
+    def necessary_cost(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """Seconds that are left."""
+        return poses.clip(self.duration - memory.held, 0.0, self.duration)
+
+    def sufficient_cost(self, known: Known, memory: HoldTurnedMemory) -> Array:
+        """How far the part truly is from its stop, over what counts as there."""
+        law = known.world.object(self.target).joints
+        stop = self._end(law.limits, memory.way)
+        return abs(law.value(known.object(self.target)) - stop) / AT_STOP
+
+    def explain(self, seen: Seen, memory: HoldTurnedMemory) -> Statement:
+        """What is felt, and for how long it has been so."""
+        return PRESSED(object=self.target, force=memory.pressed, held=memory.held, duration=self.duration)
+
+    def _value(self, seen: Seen) -> Array:
+        return seen.model(self.target).joints.value(seen.object(self.target))
+
+    def _stop(self, seen: Seen) -> tuple[Array, Array]:
+        """The nearer stop ``(N,)``, radians, and the sign ``(N,)`` of the turn onto it."""
+        now, limits = self._value(seen), seen.model(self.target).joints.limits
+        xp = array_namespace(now)
+        way = xp.where(2.0 * now > limits[:, 0] + limits[:, 1], xp.ones_like(now), -xp.ones_like(now))
+        return self._end(limits, way), way
+
+    @staticmethod
+    def _end(limits: Array, way: Array) -> Array:
+        return array_namespace(way).where(way > 0.0, limits[:, 1], limits[:, 0])
+
+    def _tool(self, seen: Seen, memory: HoldTurnedMemory, beyond: Array | float) -> Array:
+        """Tool poses ``(N, 7)`` so many radians beyond where it began."""
+        part = seen.model(self.target).joints.pose(memory.value + memory.way * beyond)
+        return poses.multiply(part, poses.inverse(memory.grip))
+
+    def _along(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """Unit vectors ``(N, 3)`` of the hand's way onto the stop, robot base frame."""
+        small = 0.01
+        moved = (self._tool(seen, memory, small) - self._tool(seen, memory, -small))[:, :3]
+        return moved / poses.clip(poses.norm(moved), 1e-9, math.inf)[:, None]
+
+    def _against(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """Force ``(N,)`` at the wrist against that way, N."""
+        force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+        return -poses.dot(force, self._along(seen, memory))

@@ -1,0 +1,51 @@
+"""Pressing what turns against the stop of its hinge."""
+
+import pytest
+from draws import successes
+from py_trees.common import Status
+
+from bt_tasksim.concept_nodes import Grasp, HoldTurned, TurnKnob
+from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
+from bt_tasksim.concept_nodes.hold_turned import NO_STOP
+from bt_tasksim.concept_nodes.holding import NOT_HELD
+from bt_tasksim.execution.pipelines import EngineOptions
+from bt_tasksim.execution.runner import Runner
+from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene
+from bt_tasksim.trees import sequence
+
+LEVER = FixtureSpec("lever", parameters={"turns": 1.3, "facing": "up", "spring": 0.6})
+CUP = {"cup": ObjectSpec(kinds=("cup",), on="table", centre=(-0.1, -0.25), area=(0.0, 0.0))}
+
+
+def ran(*leaves, seed=3, goal=1.3, fixture=LEVER):
+    goals = [] if goal is None else [Goal("lever", relation="set", value=goal, angle_tolerance=0.06)]
+    made = Scene(fixtures=[fixture], objects=CUP, goals=goals, name="lever")
+    return Runner(sequence("the tree", *leaves), made, EngineOptions()).run(seed)
+
+
+@pytest.mark.physical
+def test_a_lever_with_a_spring_is_held_on_its_stop():
+    def run(seed):
+        moved = TurnKnob("lever", angle=1.3), HoldTurned("lever", duration=1.0)
+        return ran(Grasp("lever"), *moved, seed=seed)
+
+    (result,) = successes(run, range(3, 6), n=1)
+    assert result.status == Status.SUCCESS
+
+
+@pytest.mark.parametrize(
+    ("leaves", "reason"),
+    [
+        ([HoldTurned("lever")], NOT_HELD),
+        ([HoldTurned("cup")], NO_PART),
+        ([Grasp("lever"), TurnKnob("lever", angle=0.6), HoldTurned("lever")], NO_STOP),
+    ],
+)
+def test_what_cannot_be_held_on_a_stop_is_refused(leaves, reason):
+    result = ran(*leaves, goal=None)
+    assert result.status == Status.FAILURE and result.outcome.is_a(reason)
+
+
+def test_what_slides_is_refused():
+    result = ran(HoldTurned("drawer"), fixture=FixtureSpec("chest"), goal=None)
+    assert result.status == Status.FAILURE and result.outcome.is_a(OTHER_PART[True])

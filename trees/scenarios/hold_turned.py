@@ -1,0 +1,32 @@
+"""Turn a lever with a spring onto its stop, and hold it there for two seconds."""
+
+from __future__ import annotations
+
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept_nodes import Grasp, HoldTurned, TurnKnob
+from bt_tasksim.scene import FixtureSpec, Goal, Scene
+from bt_tasksim.trees import sequence
+
+TURNS = 1.3
+
+
+def scene(robot: str = "panda") -> Scene:
+    """A lever that its spring turns back, on a console or on its front; sizes and place are drawn."""
+    lever = {"heading": (-0.2, 0.2), "turns": TURNS, "friction": 0.3, "spring": (0.5, 0.8)}
+    return Scene(
+        robot,
+        fixtures=[FixtureSpec("lever", parameters=lever)],
+        goal=Goal("lever", relation="set", value=TURNS, angle_tolerance=0.06),
+        name="hold_turned",
+    )
+
+
+def build() -> Behaviour:
+    """The tree."""
+    return sequence(
+        "hold the lever on its stop",
+        Grasp("lever"),
+        TurnKnob("lever", angle=TURNS),
+        HoldTurned("lever", duration=2.0),
+    )
