@@ -13,7 +13,12 @@ TURNS = 1.3
 
 def scene(robot: str = "panda") -> Scene:
     """A lever that its spring turns back, on a console or on its front; sizes and place are drawn."""
-    lever = {"heading": (-0.2, 0.2), "turns": TURNS, "friction": 0.3, "spring": (0.5, 0.8)}
+    lever: dict[str, float | tuple[float, float]] = {
+        "heading": (-0.2, 0.2),
+        "turns": TURNS,
+        "friction": 0.3,
+        "spring": (0.5, 0.8),
+    }
     return Scene(
         robot,
         fixtures=[FixtureSpec("lever", parameters=lever)],
