@@ -24,6 +24,7 @@ from bt_tasksim.concept_nodes.joint_conditions import IsOpen, IsShut, JointAt, S
 from bt_tasksim.concept_nodes.lay_down import LayDown
 from bt_tasksim.concept_nodes.open_door import OpenDoor
 from bt_tasksim.concept_nodes.open_drawer import OpenDrawer
+from bt_tasksim.concept_nodes.orientation import Oriented, PointingUp
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
 from bt_tasksim.concept_nodes.pour import Pour
@@ -37,6 +38,7 @@ from bt_tasksim.concept_nodes.slide_off import SlideOff
 from bt_tasksim.concept_nodes.slide_to_stop import SlideToStop
 from bt_tasksim.concept_nodes.spin import Spin
 from bt_tasksim.concept_nodes.tip_up import TipUp
+from bt_tasksim.concept_nodes.turn import Turn
 from bt_tasksim.concept_nodes.turn_knob import TurnKnob
 from bt_tasksim.concept_nodes.turned_conditions import Emptied, Lying, OnEnd, TurnedLike
 from bt_tasksim.concept_nodes.wait import Wait
@@ -78,10 +80,12 @@ __all__ = [
     "Lifted",
     "Lying",
     "OnEnd",
+    "Oriented",
     "Over",
     "OverBeside",
     "Pick",
     "Place",
+    "PointingUp",
     "Pour",
     "Pull",
     "Push",
@@ -94,6 +98,7 @@ __all__ = [
     "TimePassed",
     "Spin",
     "TipUp",
+    "Turn",
     "TurnedLike",
     "Upright",
     "Wait",

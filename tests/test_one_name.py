@@ -18,6 +18,8 @@ ALIKE = {
     "Lifted": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Lying": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "OnEnd": "the goal relation, as physics tells it; the condition, as a robot sees it",
+    "Oriented": "the goal relation, as physics tells it; the condition, as a robot sees it",
+    "PointingUp": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Policy": "what decides in a leaf; what a limit of a robot does, in its file",
     "World": "the same of two simulators",
 }

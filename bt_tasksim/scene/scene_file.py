@@ -157,6 +157,7 @@ def _goal(entry: GoalEntry) -> Goal:
         entry.when,
         entry.distance,
         entry.value,
+        entry.axis,
         on=entry.on or "",
         inside=entry.inside or "",
         beside=entry.beside or "",

@@ -10,6 +10,7 @@ from pydantic import Discriminator, Field, Tag
 
 from bt_tasksim.core.registry import OWN, parts
 from bt_tasksim.core.typed_file import (
+    Direction,
     Extent2,
     Model,
     Name,
@@ -143,7 +144,10 @@ class GoalEntry(Model):
     distance: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.10
     """Of `beside`: between the two outlines from above, at most, m."""
     value: Annotated[Number, Field(ge=-100.0, le=100.0)] | None = None
-    """Of `open`, at least, and `set`: how far a part of a fixture should be open, m or rad."""
+    """Of `open`, at least, and `set`: how far a part of a fixture should be open, m or rad; of `turned` and
+    `oriented` an angle, rad."""
+    axis: Direction | None = None
+    """Of `turned`, `oriented` and `pointing_up`: a direction, x y z."""
 
 
 class SceneFile(Model):

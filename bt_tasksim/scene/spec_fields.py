@@ -9,6 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Inst
 
 from bt_tasksim.core.typed_file import (
     Coordinate,
+    Direction,
     Extent2,
     Model,
     Name,
@@ -181,6 +182,7 @@ class GoalFields(Model):
     when: str
     distance: AboveZero
     value: Number | None
+    axis: Direction | None
     on: Reference
     inside: Reference
     beside: Reference

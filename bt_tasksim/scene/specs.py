@@ -300,14 +300,18 @@ class Goal:
             (upright anywhere on a place or an object), ``inside`` (within a container, below its rim, or
             within an object), ``beside`` (at the same level, ``distance`` away at most), ``lifted`` (held in
             the hand alone, ``height`` above where it stood, and as upright), ``on_end`` and ``lying``
-            (it rests with its longest axis upright, or level), or one of your own.
+            (it rests with its longest axis upright, or level), ``turned``, ``oriented`` and ``pointing_up``
+            (it hangs in the hand, turned by ``value`` about ``axis`` from how it stood or from how a place or
+            another object is turned, or with its own ``axis`` upwards), or one of your own.
         position_tolerance: Metres.
         angle_tolerance: Radians; pi for any heading and any way up.
         height: Metres, for ``lifted``.
         when: ``end``: true at the end of the run. ``once``: true at some moment of it.
         distance: Metres between the two outlines at most, for ``beside``.
         value: How far a part of a fixture should be open, for ``open`` (at least) and ``set``: metres or
-            radians; None for the relation's own.
+            radians; None for the relation's own. Of ``turned`` and ``oriented`` an angle, radians.
+        axis: Of ``turned`` (robot base frame), ``oriented`` (the place's) and ``pointing_up`` (the object's):
+            a direction ``(3,)``; None for that of z.
 
     Raises:
         FieldError: A field is no good, or the reference is missing or named twice.
@@ -322,6 +326,7 @@ class Goal:
     when: str = "end"
     distance: float = 0.10
     value: float | None = None
+    axis: tuple[float, float, float] | None = None
 
     def __init__(
         self,
@@ -334,6 +339,7 @@ class Goal:
         when: str = "end",
         distance: float = 0.10,
         value: float | None = None,
+        axis: tuple[float, float, float] | None = None,
         *,
         on: str = "",
         inside: str = "",
@@ -345,6 +351,7 @@ class Goal:
             "height": height,
             "distance": distance,
             "value": value,
+            "axis": axis,
         }
         words = {"place": place, "on": on, "inside": inside, "beside": beside}
         words = {name: "" if word is None else word for name, word in words.items()}
