@@ -19,7 +19,7 @@ from bt_tasksim.concept_nodes.hold import Hold
 from bt_tasksim.concept_nodes.hold_turned import HoldTurned
 from bt_tasksim.concept_nodes.in_contact import InContact
 from bt_tasksim.concept_nodes.insert import Insert
-from bt_tasksim.concept_nodes.inserted import Inserted
+from bt_tasksim.concept_nodes.inserted import Inserted, OutOf
 from bt_tasksim.concept_nodes.joint_conditions import IsOpen, IsShut, JointAt, Slides, Turns
 from bt_tasksim.concept_nodes.lay_down import LayDown
 from bt_tasksim.concept_nodes.open_door import OpenDoor
@@ -81,6 +81,7 @@ __all__ = [
     "Lying",
     "OnEnd",
     "Oriented",
+    "OutOf",
     "Over",
     "OverBeside",
     "Pick",

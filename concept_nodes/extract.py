@@ -98,7 +98,7 @@ class Extract(ConceptModel[ExtractMemory]):
     force_limit: Newtons = FORCE_LIMIT
 
     maintains = (HOLDING,)
-    requires = (ConditionOf("Inserted", target="target", hole="out_of"),)
+    establishes = (ConditionOf("OutOf", target="target", hole="out_of"),)
     contact = ContactChange(ContactState.OP, ContactState.NC)
     presentation = Presentation(
         colour="#5b8c5a",

@@ -19,6 +19,7 @@ ALIKE = {
     "Lying": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "OnEnd": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Oriented": "the goal relation, as physics tells it; the condition, as a robot sees it",
+    "OutOf": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "PointingUp": "the goal relation, as physics tells it; the condition, as a robot sees it",
     "Policy": "what decides in a leaf; what a limit of a robot does, in its file",
     "World": "the same of two simulators",

@@ -32,8 +32,11 @@ SHOWN = {
     "valve": {"facing": "front", "wheel": "wheel"},
     "lever": {"facing": "front", "side": "left"},
     "button": {"facing": "up"},
+    "socket": {"facing": "up"},
 }
 """Of each fixture, what is not left to the draw."""
+OTHERWISE = {"socket": {"facing": "front"}}
+"""The same of the second picture of one that has no parts to be opened."""
 SEED, SIZE, COLUMNS = 1, (200, 160), 4
 CAMERA = CameraSpec((0.05, 0.5, 0.6), (0.58, 0.0, 0.16), SIZE)
 BEGIN, END = "<!-- made by tools/fixtures_page.py -->", "<!-- end -->"
@@ -82,14 +85,14 @@ def picture() -> np.ndarray:
     posture[0] = ASIDE
     pairs = []
     for name, parameters in SHOWN.items():
-        world = Scene(fixtures=[FixtureSpec(name, parameters=parameters)]).sample(SEED)
-        engine.reset(world)
-        joint = world.objects[0].joint
-        assert joint is not None
-        for share in (0.0, 0.6):
-            value = np.array([joint.limits[0] + share * (joint.limits[1] - joint.limits[0])])
-            state = SimpleNamespace(joint_position=posture, objects=Joints.of([joint]).pose(value))
+        for share, given in ((0.0, parameters), (0.6, OTHERWISE.get(name, parameters))):
+            world = Scene(fixtures=[FixtureSpec(name, parameters=given)]).sample(SEED)
+            engine.reset(world)
+            joints = Joints.of([actor.joint for actor in world.objects if actor.joint is not None])
+            value = joints.limits @ np.array([1.0 - share, share])
+            state = SimpleNamespace(joint_position=posture, objects=joints.pose(value))
             pairs.append(engine.render(cast("WorldState", state), "near").colour)
+    pairs += [np.full_like(pairs[0], 255)] * (-len(pairs) % COLUMNS)
     rows = [np.concatenate(pairs[k : k + COLUMNS], axis=1) for k in range(0, len(pairs), COLUMNS)]
     return np.concatenate(rows)
 

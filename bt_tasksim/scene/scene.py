@@ -229,11 +229,11 @@ class Scene:
                 _require("goal", goal.object, {*specs, *moving}, (*where, "object"))
                 if goal.place:
                     _require("goal", goal.place, {*places, *specs, *moving}, (*where, "place"))
-                if goal.relation == "inserted" and goal.place not in holes:
+                if goal.relation in ("inserted", "out_of") and goal.place not in holes:
                     said = f"such as {', '.join(holes)}" if holes else "such as that of a peg_block"
                     raise FieldError(
-                        f"the goal of '{goal.object}' is inserted in '{goal.place}', which is no hole: name "
-                        f"one, {said}",
+                        f"the goal of '{goal.object}' is {goal.relation.replace('_', ' ')} '{goal.place}', "
+                        f"which is no hole: name one, {said}",
                         *where,
                         "place",
                     )

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.scene.hole_laws import in_hole
+from bt_tasksim.scene.hole_laws import beyond_hole, in_hole
 from bt_tasksim.scene.relations.inserted import IS_INSERTED, NOT_INSERTED
+from bt_tasksim.scene.relations.out_of import IS_OUT, STILL_IN
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject
 from bt_tasksim.scene.specs import Goal, ObjectSpec
@@ -94,3 +95,30 @@ def test_only_a_hole_may_be_turned(tmp_path):
     (hole,) = [place for place in scene.sample(1).places if place.name == "odd"]
     assert poses.z_axis(hole.pose[3:]) == pytest.approx([0.0, -1.0, 0.0], abs=1e-6)
     assert not hole.carries and not hole.container
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    way=st.sampled_from([(1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]),
+    far=st.floats(0.0, 0.3),
+)
+def test_it_is_out_as_soon_as_nothing_of_it_is_between_the_walls(seed, way, far):
+    """Whichever way the hole points, and out of its mouth, aside of it, or behind it."""
+    rng = np.random.default_rng(seed)
+    frame = poses.pose(rng.normal(size=3), poses.from_rotation_vector(rng.normal(size=3)))
+    pose = poses.multiply(frame, poses.pose(np.array([0.0, 0.0, 0.06]) + far * np.array(way)))
+    gap = float(beyond_hole(Turned(frame, pose), "peg", "hole")[0])
+    needed = {0: 0.018 + 0.015, 1: 0.018 + 0.015, 2: 0.05 if way[2] > 0 else 0.12}
+    assert gap == pytest.approx(max(0.0, far - needed[int(np.abs(way).argmax())]), abs=1e-9)
+
+
+def test_out_of_is_judged_by_the_state_and_names_a_hole():
+    goal = Goal("peg", "hole", relation="out_of")
+    scene = Scene(fixtures=SCENE.fixtures, objects=SCENE.objects, goal=goal)
+    configuration, world = drawn(scene)
+    for up, reason in ((0.03, STILL_IN), (0.06, IS_OUT)):
+        hidden = state(configuration, {"peg": at(world.place("hole"), up=up)})
+        assert evaluate_success(configuration, world, hidden).outcome.cause.reason is reason
+    with pytest.raises(InputError, match="is out of 'table', which is no hole"):
+        Scene(objects=SCENE.objects, goal=Goal("peg", "table", relation="out_of"))
