@@ -5,12 +5,12 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept_nodes import Bring, Extract, Grasp, Place, Release
-from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene
+from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene, SpotSpec
 from bt_tasksim.trees import sequence
 
 
 def scene(robot: str = "panda") -> Scene:
-    """A peg in a hole in the front or in a side of a block, with 1.5 to 3 mm of room around it."""
+    """A peg in a hole in the front or in a side of a block, 3 to 6 mm wider, and a spot for it."""
     block = FixtureSpec(
         "socket", area=(0.03, 0.03), yaw=(-0.3, 0.3), parameters={"facing": ("front", "left", "right")}
     )
@@ -19,7 +19,8 @@ def scene(robot: str = "panda") -> Scene:
         robot,
         fixtures=[block],
         objects={"peg": peg},
-        goals=[Goal("peg", "hole", relation="out_of"), Goal("peg", on="table", relation="anywhere")],
+        spots=[SpotSpec("spot", on="table", centre=(0.0, -0.16), area=(0.06, 0.06), yaw=0.5)],
+        goal=Goal("peg", "spot"),
         name="extract_sideways",
     )
 
@@ -30,7 +31,7 @@ def build() -> Behaviour:
         "extract sideways",
         Grasp("peg"),
         Extract("peg", out_of="hole"),
-        Bring("peg", to="table", anywhere=True),
-        Place("peg", on="table", anywhere=True),
+        Bring("peg", to="spot"),
+        Place("peg", on="spot"),
         Release("peg"),
     )
