@@ -137,7 +137,6 @@ def concepts(target="target", place="goal"):
         "extract": Extract.value(target, out_of=place),
         "insert": Insert.value(target, into=place),
         "turn": Turn.value(target, angle=0.5, axis=(0.0, 1.0, 0.0)),
-        "turn like": Turn.value(target, like=place),
         "turn over": Turn.value(target, up=(1.0, 0.0, 0.0)),
         "spin": Spin.value(target, like=place),
         "tip up": TipUp.value(target),
