@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -24,11 +26,13 @@ from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS
 from bt_tasksim.core.world import Command
-from bt_tasksim.planning.hand_collision import beyond
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.hand_collision import beyond, hand_pieces
 from bt_tasksim.planning.reference_motion import Path, at_times, plan, position, searched_for
 from bt_tasksim.planning.route import Pace, Route, followed
 from bt_tasksim.planning.routes import SAMPLES, with_routes
 from bt_tasksim.planning.things import Leave
+from bt_tasksim.robot.description import RobotDescription
 
 NO_STOP = register_reason(
     "no_stop_felt",
@@ -43,8 +47,13 @@ AROUND = 12
 """Turns of the hand about the way of the button that are tried."""
 DEEPER = 0.012
 """Metres beyond the stop to which the hand goes unless it feels it before."""
-TOUCHES, GENTLY = 1.5, 0.006
-"""Newtons from which on the fist is at the button, and metres per second that it goes on then."""
+TOUCHES, NEAR, GENTLY = 1.5, 0.006, 0.006
+"""Newtons from which on the fist is at the button, metres before that from which on it is near, and metres a
+second at which it goes on then."""
+LEANS = (0.35, 0.7)
+"""Radians by which the hand may lean from the button's way where the arm does not reach it straight."""
+LEVEL = 0.002
+"""Metres from the foremost point of a fist that leans within which others are at its front, too."""
 HARD = 1.1
 """Times `press` from which a force counts as the stop's at once; a softer one is felt twice."""
 SHUTS, FIST = 1.0, 0.96
@@ -137,9 +146,9 @@ class PressButton(ConceptModel[PressMemory]):
         own = np.array(model.joint.axis)
         axis = poses.rotate(np.array(model.joint.zero)[3:], own)
         low, high = model.joint.limits
-        top = pose[:3] - axis * (float(np.abs(own) @ np.array(model.extent)) / 2 + beyond(view.robot))
+        top = pose[:3] - axis * float(np.abs(own) @ np.array(model.extent)) / 2
         hand = view.robot.hand_position(np.array([FIST]))
-        tools = [np.concatenate([top, turn]) for turn in _turns(axis)]
+        tools = [np.concatenate([top - ahead, turn]) for turn, ahead in _fists(view.robot, hand, axis)]
 
         def find(closer: float) -> tuple[Route, Route]:
             leave = Leave(hand={self.target})
@@ -178,9 +187,10 @@ class PressButton(ConceptModel[PressMemory]):
     def command(self, action: Array, seen: Seen, memory: PressMemory) -> Command:
         """Make a fist and come, press, and draw back."""
         xp, begun = array_namespace(seen.tool), seen.elapsed >= memory.come.duration
+        after = self.advance(action, seen, memory)
         (first, arm), (then, joints) = (
             at_times(memory.come, seen.elapsed),
-            at_times(memory.down, memory.progress),
+            at_times(memory.down, after.progress),
         )
         tool = xp.where(begun[:, None], then, first)
         posture = None if arm is None or joints is None else xp.where(begun[:, None], joints, arm)
@@ -191,24 +201,23 @@ class PressButton(ConceptModel[PressMemory]):
     def advance(self, action: Array, seen: Seen, memory: PressMemory) -> PressMemory:
         """Go on, gently once the fist touches; draw back when the stop is felt."""
         xp, period = array_namespace(seen.tool), seen.world.control_period
-        begun, pressed = seen.elapsed >= memory.come.duration, memory.felt >= 2
-        against = self._against(seen, memory)
+        begun, before = seen.elapsed >= memory.come.duration, memory.felt >= 2
+        against, one = self._against(seen, memory), xp.ones_like(memory.felt)
+        more = xp.where(against > HARD * self.press, 2 * one, xp.where(against > self.press, one, 0 * one))
+        felt = xp.where(before, memory.felt, xp.where(more > 0, memory.felt + more, 0 * one))
+        felt = xp.where(begun, felt, 0 * one)
         here, ahead = (position(memory.down, memory.progress + dt) for dt in (0.0, period))
         far = poses.clip(poses.norm(ahead - here), 1e-9, math.inf)
         gently = poses.clip(GENTLY * period / far, 0.0, 1.0)
-        share = xp.where(against > TOUCHES, gently, xp.ones_like(gently))
-        share = xp.where(memory.felt > 0, xp.zeros_like(share), share)
-        share = xp.where(pressed, xp.full_like(share, -BACK), share)
+        near = poses.norm(here - memory.down.table[:, 0, :3]) > self.standoff - NEAR
+        share = xp.where(near | (against > TOUCHES), gently, xp.ones_like(gently))
+        share = xp.where(felt > 0, xp.zeros_like(share), share)
+        share = xp.where(felt >= 2, xp.full_like(share, -BACK), share)
         progress = memory.progress + xp.where(begun, share, xp.zeros_like(share)) * period
         progress = poses.clip(xp.minimum(progress, memory.down.duration), 0.0, math.inf)
-        one = xp.ones_like(memory.felt)
-        more = xp.where(against > HARD * self.press, 2 * one, xp.where(against > self.press, one, 0 * one))
-        felt = xp.where(pressed, memory.felt, xp.where(more > 0, memory.felt + more, 0 * one))
         baseline = xp.where(begun, memory.baseline, memory.baseline + against)
         deepest = xp.maximum(memory.deepest, progress / memory.down.duration)
-        return memory._replace(
-            progress=progress, felt=xp.where(begun, felt, 0 * one), baseline=baseline, deepest=deepest
-        )
+        return memory._replace(progress=progress, felt=felt, baseline=baseline, deepest=deepest)
 
     def planned(self, memory: PressMemory) -> Array | float:
         """How long the ways take."""
@@ -238,6 +247,20 @@ class PressButton(ConceptModel[PressMemory]):
     def explain(self, seen: Seen, memory: PressMemory) -> Statement:
         """How deep it is pressed, and the force at the wrist."""
         return PRESSING(object=self.target, value=self._depth(seen), force=force_at_wrist(seen))
+
+
+def _fists(robot: RobotDescription, hand: Array, axis: Array) -> Iterator[tuple[Array, Array]]:
+    """Tool orientations ``(4,)`` to press along a direction ``(3,)``, straight ones first.
+
+    And where the front of the fist, with its joints ``(n_hand,)``, is from the tool then ``(3,)``, metres.
+    """
+    yield from ((turn, beyond(robot) * axis) for turn in _turns(axis))
+    corners = np.concatenate(hand_pieces(bodies_of(robot), hand))
+    for lean, side, turn in itertools.product(LEANS, np.eye(3)[:2], _turns(axis)):
+        rotation = poses.quat_multiply(turn, poses.from_rotation_vector(lean * side))
+        there = poses.rotate(rotation, corners)
+        ahead = there @ axis
+        yield rotation, there[ahead >= ahead.max() - LEVEL].mean(axis=0)
 
 
 def _turns(axis: Array) -> list[Array]:
