@@ -37,6 +37,7 @@ from bt_tasksim.concept_nodes.slide import Slide
 from bt_tasksim.concept_nodes.slide_off import SlideOff
 from bt_tasksim.concept_nodes.slide_to_stop import SlideToStop
 from bt_tasksim.concept_nodes.spin import Spin
+from bt_tasksim.concept_nodes.stop_conditions import Against, ClearOf, HeldAgainst, PressedOn
 from bt_tasksim.concept_nodes.tip_up import TipUp
 from bt_tasksim.concept_nodes.turn import Turn
 from bt_tasksim.concept_nodes.turn_knob import TurnKnob
@@ -48,6 +49,10 @@ from bt_tasksim.core.registry import parts
 one_module(__name__)
 
 __all__ = [
+    "Against",
+    "ClearOf",
+    "HeldAgainst",
+    "PressedOn",
     "PressButton",
     "TurnKnob",
     "CloseDoor",

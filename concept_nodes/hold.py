@@ -8,13 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
-from bt_tasksim.concept.parameters import Direction, Newtons, ObjectName, Seconds
+from bt_tasksim.concept.parameters import Direction, Newtons, ObjectName, PlaceName, Seconds
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
+from bt_tasksim.concept_nodes.stops import no_way_named, ways_in
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
@@ -42,12 +44,14 @@ class HoldMemory(NamedTuple):
 
     Attributes:
         start: Tool pose ``(N, 7)`` at the begin.
+        along: Unit vectors ``(N, 3)`` in which it is pressed.
         pushed: Metres ``(N,)`` that the tool is told to go beyond there.
         pressed: Newtons ``(N,)`` with which it presses, smoothed.
         held: Seconds ``(N,)`` for which that has been between its limits.
     """
 
     start: Array
+    along: Array
     pushed: Array
     pressed: Array
     held: Array
@@ -61,21 +65,27 @@ class Hold(ConceptModel[HoldMemory]):
 
     Args:
         target: The held object.
-        direction: Which way it is pressed, robot base frame.
+        direction: Which way it is pressed, robot base frame; by default to the nearest wall of ``against``.
         duration: For how long, without a break.
         least: Force with which it presses at least.
         most: Force with which it presses at most.
+        against: The place or the object against which it is pressed.
         force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
-    direction: Direction
+    direction: Direction | None = None
     duration: Seconds = 2.0
     least: Newtons = 5.0
     most: Newtons = 25.0
+    against: PlaceName | None = None
     force_limit: Newtons = FORCE_LIMIT
 
     maintains = (HOLDING,)
+    establishes = (
+        ConditionOf("HeldAgainst", target="target", other="against", sometimes=True),
+        ConditionOf("Against", target="target", other="against", sometimes=True),
+    )
     contact = ContactChange(ContactState.FT, ContactState.FT)
     presentation = Presentation(
         colour="#6b4f9b",
@@ -91,29 +101,38 @@ class Hold(ConceptModel[HoldMemory]):
         return f"for {float(parameters['duration']):.1f} s" if "duration" in parameters else ""
 
     def contradiction(self) -> str:
-        """Limits in their order."""
-        return "" if self.least < self.most else "'least' should be less than 'most'"
+        """Limits in their order, and something that says which way."""
+        if self.least >= self.most:
+            return "'least' should be less than 'most'"
+        return no_way_named(self.direction, self.against, "against")
 
     def initial_state(self, seen: Seen) -> Possible:
         """The object must be in the hand."""
         return not_held(seen, self.target)
 
     def begin(self, seen: Seen) -> HoldMemory:
-        """Where the tool is, and what is felt."""
-        nothing = array_namespace(seen.tool).zeros_like(seen.tool[:, 0])
-        felt = self._against(seen)
-        return HoldMemory(seen.tool, nothing, felt, nothing)
+        """Where the tool is, what is felt, and which way it is pressed.
+
+        Raises:
+            NoWayError: Nothing says that in one of the worlds.
+        """
+        nothing = array_namespace(seen.tool).zeros_like(seen.tool[:, :3])
+        if self.direction is None:
+            along = ways_in(seen, self.target, None, self.against, self.tolerance)
+        else:
+            along = constant(np.array(self.direction), seen.tool) + nothing
+        felt = _force_against(seen, along)
+        return HoldMemory(seen.tool, along, nothing[:, 0], felt, nothing[:, 0])
 
     def command(self, action: Array, seen: Seen, memory: HoldMemory) -> Command:
         """A little beyond where it began."""
         after = self.advance(action, seen, memory)
-        along = constant(np.array(self.direction), seen.tool)
-        return Command(tool=poses.shifted(memory.start, after.pushed[:, None] * along))
+        return Command(tool=poses.shifted(memory.start, after.pushed[:, None] * memory.along))
 
     def advance(self, action: Array, seen: Seen, memory: HoldMemory) -> HoldMemory:
         """Lead the force to the middle of its limits, and count the time."""
         xp, period = array_namespace(seen.tool), seen.world.control_period
-        pressed = memory.pressed + SMOOTH * (self._against(seen) - memory.pressed)
+        pressed = memory.pressed + SMOOTH * (_force_against(seen, memory.along) - memory.pressed)
         middle = (self.least + self.most) / 2
         speed = poses.clip(YIELDS * (middle - pressed), -QUICKEST, QUICKEST)
         within = (pressed >= self.least) & (pressed <= self.most)
@@ -126,9 +145,7 @@ class Hold(ConceptModel[HoldMemory]):
 
     def limits(self, seen: Seen, memory: HoldMemory) -> tuple[Limit, ...]:
         """The force at the wrist; and there is a stop."""
-        gone = poses.dot(
-            seen.tool[:, :3] - memory.start[:, :3], constant(np.array(self.direction), seen.tool)
-        )
+        gone = poses.dot(seen.tool[:, :3] - memory.start[:, :3], memory.along)
         return strain(seen, self.force_limit), Limit(GIVES_WAY, gone, self.tolerance, {"object": self.target})
 
     def maintained(self, goal: str, seen: Seen, memory: HoldMemory) -> Array:
@@ -148,7 +165,7 @@ class Hold(ConceptModel[HoldMemory]):
         """What is felt, and for how long it has been so."""
         return PRESSED(object=self.target, force=memory.pressed, held=memory.held, duration=self.duration)
 
-    def _against(self, seen: Seen) -> Array:
-        """Force ``(N,)`` against the direction, N."""
-        force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
-        return -poses.dot(force, constant(np.array(self.direction), force))
+
+def _force_against(seen: Seen, along: Array) -> Array:
+    """Force ``(N,)`` against directions ``(N, 3)``, N."""
+    return -poses.dot(poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3]), along)

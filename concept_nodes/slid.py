@@ -49,7 +49,7 @@ SLID = Form(
 YIELDS, SMOOTH = 0.0008, 0.3
 """Metres per second that the tool goes down for each newton that is missing; and the share of each reading of
 the force in the smoothed one."""
-SHARPLY = 0.7
+SHARPLY = 0.5
 """The same of the force against the way, which says where a stop is."""
 DOWN, SLOWLY = 0.04, 0.01
 """Metres per second at which it comes down, and with which at last, where the support is near."""
@@ -57,8 +57,8 @@ NEAR = 0.02
 """Metres above the support from which on it comes down slower."""
 DEEPER = 0.03
 """Metres below where the support should be felt down to which it is looked for."""
-LIGHT = 0.3
-"""Share of its force with which it has to press to go on."""
+LIGHT, BARELY = 0.3, 0.1
+"""Shares of its force with which it has to press to go on; and where it may go down no farther."""
 YIELDED = 0.006
 """Metres below where the support should be to which it presses on: what slips in the hand is not followed any
 farther, since fingers would come down on the support."""
@@ -80,6 +80,7 @@ class SlidMemory(NamedTuple):
         pressed: Newtons ``(N,)`` with which it presses, smoothed.
         resisted: Newtons ``(N,)`` against the way, smoothed.
         found: Booleans ``(N,)``: the support has been felt.
+        met: Booleans ``(N,)``: so much force has been against its way once that a stop may be there.
         ticks: Ticks ``(N,)`` in a row for which what ends the task has been so.
     """
 
@@ -93,6 +94,7 @@ class SlidMemory(NamedTuple):
     pressed: Array
     resisted: Array
     found: Array
+    met: Array
     ticks: Array
 
 
@@ -151,6 +153,7 @@ class Slid(ConceptModel[SlidMemory]):
             pressed=nothing,
             resisted=nothing,
             found=booleans(seen.tool, False),
+            met=booleans(seen.tool, False),
             ticks=xp.astype(nothing, xp.int64),
         )
 
@@ -202,11 +205,15 @@ class Slid(ConceptModel[SlidMemory]):
         lowered = memory.lowered + period * xp.where(found, more, nearing)
         deepest = xp.maximum(memory.drop + YIELDED, memory.lowered)
         lowered = xp.where(found, xp.minimum(lowered, deepest), lowered)
-        goes = found & (pressed >= LIGHT * self.press) & self._goes(xp.maximum(against, resisted))
+        least = self.press * xp.where(
+            lowered >= deepest, xp.full_like(left, BARELY), xp.full_like(left, LIGHT)
+        )
+        goes = found & (pressed >= least) & self._goes(xp.maximum(against, resisted))
         pace = xp.where(goes, self._pace(seen, memory), xp.zeros_like(pressed))
         progress = memory.progress + period * pace
+        met = memory.met | ((memory.progress > 0.0) & ~self._goes(against))
         memory = memory._replace(
-            progress=progress, lowered=lowered, pressed=pressed, resisted=resisted, found=found
+            progress=progress, lowered=lowered, pressed=pressed, resisted=resisted, found=found, met=met
         )
         ended = self._ended(seen, memory)
         return memory._replace(ticks=xp.where(ended, memory.ticks + 1, xp.zeros_like(memory.ticks)))

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.demonstrated import position_words, straight_words
 from bt_tasksim.concept.parameters import (
     Direction,
@@ -22,6 +26,9 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.destination import destination
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.slid import Slid, level, not_level
+from bt_tasksim.concept_nodes.standing import reference_frame
+from bt_tasksim.concept_nodes.tipping import support_of
+from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 
@@ -55,6 +62,7 @@ class Slide(Slid):
     speed: MetresPerSecond = 0.12
     force_limit: Newtons = FORCE_LIMIT
 
+    establishes = (ConditionOf("PressedOn", target="target", place="to"),)
     contact = ContactChange(ContactState.TR, ContactState.TR)
     presentation = Presentation(
         colour="#7a8f3a",
@@ -93,3 +101,17 @@ class Slide(Slid):
             end = level(self.direction, self.distance, now) + xp.zeros_like(now)
         points = [*(end + constant(via, now) for via in self.via), end]
         return [xp.concat([point[:, :2], xp.zeros_like(point[:, 2:])], axis=-1) for point in points]
+
+    def aim(self, view: WorldView) -> Aim | None:
+        """To where it ends, where that is said."""
+        if self.to is None and self.position is None:
+            return None
+        now = view.objects[self.target]
+        end = reference_frame(view, self.to)[0] if self.to is not None else np.array(self.position)
+        there = np.concatenate([end[:2], now[2:3] + ABOVE, now[3:]])
+        supports = frozenset(support_of(view, self.target)[0])
+        return Aim(there[None], "be slid there", supports, on_the_way=True)
+
+
+ABOVE = 0.003
+"""Metres above its support at which a grasp is chosen for it."""

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.demonstrated import straight_words
-from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName
+from bt_tasksim.concept.parameters import (
+    Direction,
+    Metres,
+    MetresPerSecond,
+    Newtons,
+    ObjectName,
+    PlaceName,
+)
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
-from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, level, not_level
+from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, not_level
+from bt_tasksim.concept_nodes.stops import nearest_stop, no_way_named, way_in, ways_in
+from bt_tasksim.concept_nodes.tipping import support_of
+from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
 
@@ -23,20 +36,24 @@ class SlideOff(Slid):
 
     Args:
         target: The held object.
-        direction: Which way it goes, away from the stop, robot base frame, level.
+        direction: Which way it goes, away from the stop, robot base frame, level; by default straight away
+            from the nearest wall of ``off``.
         distance: How far it goes.
+        off: The place or the object that it leaves.
         press: Force with which it presses on what it slides on.
         speed: Peak speed of the tool.
         force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
-    direction: Direction
+    direction: Direction | None = None
     distance: Metres = 0.08
+    off: PlaceName | None = None
     press: Newtons = 4.0
     speed: MetresPerSecond = 0.08
     force_limit: Newtons = FORCE_LIMIT
 
+    establishes = (ConditionOf("ClearOf", target="target", other="off"),)
     contact = ContactChange(ContactState.OT, ContactState.TR)
     presentation = Presentation(
         colour="#8f6f3a",
@@ -47,18 +64,34 @@ class SlideOff(Slid):
     @classmethod
     def describe_task(cls, parameters: Mapping[str, Any]) -> str:
         """Which way, and how far."""
-        return straight_words(parameters) if "distance" in parameters else ""
+        return straight_words(parameters) if {"direction", "distance"} <= parameters.keys() else ""
 
     def contradiction(self) -> str:
-        """A way that is level."""
-        return not_level(self.direction)
+        """A way that is level, or what it leaves."""
+        return not_level(self.direction) or no_way_named(self.direction, self.off, "off")
 
     def waypoints(self, seen: Seen) -> Sequence[Array]:
         """See `Slid.waypoints`."""
-        nothing = array_namespace(seen.tool).zeros_like(seen.tool[:, :3])
-        return (level(self.direction, self.distance, seen.tool) + nothing,)
+        if self.direction is not None:
+            return (self.distance * ways_in(seen, self.target, self.direction, None, math.inf),)
+        return (-self.distance * ways_in(seen, self.target, None, self.off, math.inf),)
+
+    def aim(self, view: WorldView) -> Aim | None:
+        """To where it ends, where it stands against something now."""
+        stop = nearest_stop(view, self.target, self.off)
+        if stop is None or stop.gap > NEAR:
+            return None
+        along = way_in(view, self.target, self.direction, None)
+        along = -stop.towards if along is None else along
+        there = poses.shifted(view.objects[self.target], self.distance * along)
+        supports = frozenset(support_of(view, self.target)[0])
+        return Aim(there[None], "be slid off a stop", supports, on_the_way=True)
 
     def _ended(self, seen: Seen, memory: SlidMemory) -> Array:
         """It has come its way, and the tool is there."""
         gone = poses.dot(seen.tool[:, :3] - memory.path.table[:, 0, :3], memory.along)
         return (memory.progress >= memory.path.duration) & (gone >= self.distance - self.tolerance)
+
+
+NEAR = 0.02
+"""Metres from a stop up to which it counts as standing against that when it is grasped."""

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.demonstrated import straight_words
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
@@ -15,8 +17,10 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.shoved_way import free_until
-from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, level, not_level
+from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, not_level
 from bt_tasksim.concept_nodes.standing import supports_of
+from bt_tasksim.concept_nodes.stops import UP, no_way_named, way_in, ways_in
+from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import register_reason
@@ -42,7 +46,7 @@ class SlideToStop(Slid):
 
     Args:
         target: The held object.
-        direction: Which way it goes, robot base frame, level.
+        direction: Which way it goes, robot base frame, level; by default to the nearest wall of ``against``.
         distance: How far it goes at most: the stop should be nearer.
         against: The place or the object that it comes to stand against, which it may touch.
         resistance: Force against the way that counts as the stop: more than friction.
@@ -52,7 +56,7 @@ class SlideToStop(Slid):
     """
 
     target: ObjectName
-    direction: Direction
+    direction: Direction | None = None
     distance: Metres = 0.2
     against: PlaceName | None = None
     resistance: Newtons = 10.0
@@ -60,6 +64,10 @@ class SlideToStop(Slid):
     speed: MetresPerSecond = 0.06
     force_limit: Newtons = FORCE_LIMIT
 
+    establishes = (
+        ConditionOf("HeldAgainst", target="target", other="against"),
+        ConditionOf("Against", target="target", other="against"),
+    )
     contact = ContactChange(ContactState.TR, ContactState.OT)
     presentation = Presentation(
         colour="#3a6f8f",
@@ -70,16 +78,27 @@ class SlideToStop(Slid):
     @classmethod
     def describe_task(cls, parameters: Mapping[str, Any]) -> str:
         """Which way, and how far at most."""
-        return straight_words(parameters) if "distance" in parameters else ""
+        return straight_words(parameters) if {"direction", "distance"} <= parameters.keys() else ""
 
     def contradiction(self) -> str:
-        """A way that is level."""
-        return not_level(self.direction)
+        """A way that is level, or where it ends."""
+        return not_level(self.direction) or no_way_named(self.direction, self.against, "against")
 
     def waypoints(self, seen: Seen) -> Sequence[Array]:
         """See `Slid.waypoints`."""
-        nothing = array_namespace(seen.tool).zeros_like(seen.tool[:, :3])
-        return (level(self.direction, self.distance, seen.tool) + nothing,)
+        return (self.distance * ways_in(seen, self.target, self.direction, self.against, self.distance),)
+
+    def aim(self, view: WorldView) -> Aim | None:
+        """To where it is known to meet something, if it does."""
+        along = way_in(view, self.target, self.direction, self.against)
+        if along is None:
+            return None
+        share = free_until(view, self.target, ABOVE * UP, self.distance * along)
+        if share >= 1.0:
+            return None
+        there = poses.shifted(view.objects[self.target], share * self.distance * along + ABOVE * UP)
+        supports = self._touches(view).union(support_of(view, self.target)[0])
+        return Aim(there[None], "be slid against a stop", supports, on_the_way=True)
 
     def _until(self, view: WorldView, drop: float, way: Sequence[Array]) -> Sequence[Array]:
         """To where it meets something: the hand has to be clear of that."""
@@ -95,13 +114,22 @@ class SlideToStop(Slid):
         return frozenset({*view.objects, *(box.fixture or "furniture" for box in view.world.obstacles)})
 
     def _pace(self, seen: Seen, memory: SlidMemory) -> Array:
-        """Slowly from a little before where it is known to meet something; what is met fast presses hard."""
+        """Slowly from a little before where it is known to meet something, or all the way where nothing is.
+
+        What is met fast presses hard; and what has been felt once is there.
+        """
         xp, period = array_namespace(seen.tool), seen.world.control_period
         here, ahead = (position(memory.path, memory.progress + later) for later in (0.0, period))
         speed = poses.norm(ahead - here) / period
         gone = poses.norm(here - memory.path.table[:, 0, :3])
-        slow = CREEPS / xp.maximum(speed, xp.full_like(speed, CREEPS))
-        return xp.where(gone >= memory.clear - BEFORE, slow, xp.ones_like(slow))
+        near = gone >= _whole(memory) - _slow(memory)
+        creeps, presses = (xp.full_like(speed, most) for most in (CREEPS, PRESSES))
+        most = xp.where(memory.met, presses, xp.where(near, creeps, speed + creeps))
+        return xp.minimum(most / xp.maximum(speed, most), xp.ones_like(speed))
+
+    def planned(self, memory: SlidMemory) -> Array | float:
+        """How long what it goes slowly takes, twice: it waits where it does not press."""
+        return 2.0 * _slow(memory) / CREEPS
 
     def _goes(self, resisted: Array) -> Array:
         return resisted < self.resistance
@@ -115,9 +143,22 @@ class SlideToStop(Slid):
         return (*super().limits(seen, memory), Limit(NO_STOP, late, LATE, {"object": self.target}))
 
 
+def _whole(memory: SlidMemory) -> Array:
+    """Metres ``(N,)`` of the way."""
+    return poses.norm(memory.path.table[:, -1, :3] - memory.path.table[:, 0, :3])
+
+
+def _slow(memory: SlidMemory) -> Array:
+    """Metres ``(N,)`` of the way, its last ones, along which it goes slowly; all where no stop is known."""
+    xp, whole = array_namespace(memory.clear), _whole(memory)
+    left = xp.minimum(whole - memory.clear + BEFORE, whole)
+    return xp.where(memory.clear > whole - BEFORE, whole, left)
+
+
 ABOVE = 0.003
 """Metres above its support at which it is looked at where it meets something."""
-BEFORE, CREEPS = 0.025, 0.012
-"""Metres before where it is known to meet something from which on it goes so slowly, m/s."""
+BEFORE, CREEPS, PRESSES = 0.025, 0.015, 0.005
+"""Metres before where it is known to meet something from which on it goes so slowly, m/s; and how slowly it
+goes on once it has met something."""
 LATE = 0.5
 """Seconds after its way's end until which it may still be held up."""

@@ -11,7 +11,7 @@ import numpy as np
 from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
-from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, PlaceName
+from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, PlaceName, Radians
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.carry import Carry, MoveMemory, miss
@@ -25,8 +25,9 @@ from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.fact_making import rotations
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, constant
 from bt_tasksim.core.registry import register
+from bt_tasksim.core.units import RADIANS
 from bt_tasksim.planning.reference_motion import plan
 from bt_tasksim.planning.route import Pace, Route, followed
 from bt_tasksim.planning.routes import SAMPLES, with_routes
@@ -46,17 +47,19 @@ class Spin(Carry):
     """Turn a held thing on what it stands on, about the vertical, to a heading (keeps TR of rotation).
 
     It is not lifted. It ends with the heading of a place, up to its symmetry, either way round, whichever the
-    arm can do with the grasp that it has; the grasp is chosen for that.
+    arm can do with the grasp that it has; or it is turned by an angle. The grasp is chosen for that.
 
     Args:
         target: The held object.
         like: The place, or the object, whose heading it gets.
+        angle: By how much it is turned, counterclockwise as seen from above.
         speed: Peak speed of the tool.
         force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
-    like: PlaceName
+    like: PlaceName | None = None
+    angle: Radians | None = None
     speed: MetresPerSecond = 0.15
     force_limit: Newtons = FORCE_LIMIT
 
@@ -71,8 +74,14 @@ class Spin(Carry):
 
     @classmethod
     def describe_task(cls, parameters: Mapping[str, Any]) -> str:
-        """Like what."""
-        return f"like {parameters['like']}" if "like" in parameters else ""
+        """Like what, or by how much."""
+        if parameters.get("angle") is not None:
+            return f"by {RADIANS.text(float(parameters['angle']))}"
+        return f"like {parameters['like']}" if parameters.get("like") else ""
+
+    def contradiction(self) -> str:
+        """One goal."""
+        return "" if (self.like is None) != (self.angle is None) else "give either 'like' or 'angle'"
 
     def begin(self, seen: Seen) -> MoveMemory:
         """Find a way round.
@@ -97,15 +106,22 @@ class Spin(Carry):
                 if joints is not None:
                     return followed(finder.arm, joints, Pace(self.speed, turn=TURN))
             raise NoWayError(
-                f"the arm cannot turn {self.target} like {self.like} as it holds it: let it go, and grasp it "
+                f"the arm cannot turn {self.target} {self._words} as it holds it: let it go, and grasp it "
                 f"anew for that"
             )
 
         return with_room(ROOMS, find)
 
+    @property
+    def _words(self) -> str:
+        return f"like {self.like}" if self.angle is None else f"by {RADIANS.text(self.angle)}"
+
     def _ways(self, view: WorldView) -> list[Array]:
         """Poses ``(n, 7)`` on each way round, the shortest first."""
         now, model = view.objects[self.target], view.model(self.target)
+        if self.like is None:
+            assert self.angle is not None, "see `contradiction`"
+            return [swung(now, _UP, now[:3], self.angle)]
         frame, _ = reference_frame(view, self.like)
         turns = headings() if model.symmetry == 0 else rotations(model)
         goals = poses.quat_multiply(frame[None, 3:], turns)
@@ -126,7 +142,7 @@ class Spin(Carry):
         onwards = np.array([np.concatenate([way, np.tile(way[-1:], (most - len(way), 1))]) for way in ways])
         now = np.tile(view.objects[self.target], (len(ways), 1))
         supports = frozenset(support_of(view, self.target)[0])
-        return Aim(now, f"be turned like {self.like}", supports, True, onwards=onwards)
+        return Aim(now, f"be turned {self._words}", supports, True, onwards=onwards)
 
     def done(self, seen: Seen, memory: MoveMemory) -> Array:
         """The tool has come round."""
@@ -141,12 +157,25 @@ class Spin(Carry):
     def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
         """How far the object is from the heading, over what is tolerable."""
         now, model = known.object(self.target), known.world.object(self.target)
+        if self.like is None:
+            return self._off_angle(known, now)
         if self.like in known.world.place_columns:
             frame = known.place(self.like).pose
         else:
             frame = known.object(self.like)
         goal = standing_pose(frame, now, model)
         return poses.angle_between(now[:, 3:], goal[:, 3:]) / OFF
+
+    def _off_angle(self, known: Known, now: Array) -> Array:
+        """The same where it is turned by an angle; 0 where nobody knows how it stood."""
+        nothing = now[:, 0] * 0.0
+        if known.began is None:
+            return nothing
+        assert self.angle is not None, "see `contradiction`"
+        before = Known(known.began, known.world).object(self.target)
+        turn = poses.from_rotation_vector(constant([0.0, 0.0, self.angle], now))
+        goal = poses.quat_multiply(turn + 0.0 * before[:, 3:], before[:, 3:])
+        return poses.angle_between(now[:, 3:], goal) / OFF
 
 
 def turned_off(seen: Seen, target: str, like: str) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from py_trees import composites
 from py_trees.behaviour import Behaviour
 
+from bt_tasksim.concept.contact import Change, ContactState
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.trees.backchain import Wanted, act_of, after, asked_by, condition_named, goals_of
@@ -121,23 +122,32 @@ def lasting(leaves: Iterable[ConceptNode], actor: str) -> Wanted | None:
     """The condition that tells that concepts have done their work with an object, and still holds at the end.
 
     It is the strongest one about the object that the last concept establishes which establishes any. What can
-    hold only in the hand ends where the object is let go, and a concept that has the object in the hand
-    afterwards has moved it from where it stood.
+    hold only in the hand ends where the object is let go, and the strongest of the others of that concept is
+    left. A concept that has the object in the hand afterwards, and does not only put it down there or press
+    it, has moved it from where it stood.
 
     Args:
         leaves: The concepts, in order.
         actor: The object.
     """
-    found: Wanted | None = None
+    found: list[Wanted] = []
     held: Held = []
     for leaf in (leaf for leaf in leaves if leaf.model.actor == actor):
         held = held_after(held, [leaf])
         about = [asked for asked in after(act_of(leaf)) if actor in asked.arguments.values()]
-        lasts = [asked for asked in about if held or not is_in_hand(asked)]
-        if found is not None and is_in_hand(found) and not held:
-            found = None
-        found = lasts[0] if lasts else found
-    return found
+        if _moves_on(leaf):
+            found = [asked for asked in found if is_in_hand(asked)]
+        lasts, left = ([one for one in all_ if held or not is_in_hand(one)] for all_ in (about, found))
+        found = lasts or left
+    return found[0] if found else None
+
+
+def _moves_on(leaf: ConceptNode) -> bool:
+    """It moves what is in the hand, and leaves it where it can move on."""
+    change = leaf.model.contact
+    if not leaf.model.maintains or change is None or change.motion == "rotation":
+        return False
+    return change.change is not Change.MAKES and change.after is not ContactState.FT
 
 
 def asks_itself(node: Behaviour) -> Wanted | None:

@@ -102,6 +102,21 @@ def distance(a: Array, b: Array) -> float:
     return min(_to_edges(a, b), _to_edges(b, a))
 
 
+def nearest_way(a: Array, b: Array) -> tuple[float, Array]:
+    """Metres between two convex outlines, and the unit vector ``(2,)`` from the first one to the second.
+
+    It is the shortest way; where they touch, or overlap, that along which they overlap least.
+    """
+    gap = distance(a, b)
+    if gap > TOUCHING:
+        ways = np.concatenate([_from_edges(a, b), -_from_edges(b, a)])
+        lengths = np.linalg.norm(ways, axis=1)
+        return gap, ways[lengths.argmin()] / lengths.min()
+    normals = np.concatenate([_normals(a, np.roll(a, -1, axis=0)), -_normals(b, np.roll(b, -1, axis=0))])
+    apart = np.min(normals @ b.T, axis=1) - np.max(normals @ a.T, axis=1)
+    return gap, normals[apart.argmax()]
+
+
 def holds(outline: Array, points: Array, margin: float = 0.0) -> bool:
     """All points ``(k, 2)`` lie within a convex outline, ``margin`` metres from its edges at least."""
     return bool(np.all(within(outline, points) >= margin))
@@ -171,8 +186,14 @@ def _along_normals(a: Array, b: Array) -> float:
 
 def _to_edges(points: Array, outline: Array) -> float:
     """Metres from the nearest of some points to the nearest edge of an outline."""
+    return float(np.min(np.linalg.norm(_from_edges(points, outline), axis=1)))
+
+
+def _from_edges(points: Array, outline: Array) -> Array:
+    """Vectors ``(k, 2)`` from each of some points to the nearest place on each edge of an outline."""
     along = np.roll(outline, -1, axis=0) - outline
     from_start = points[:, None, :] - outline
     lengths = np.maximum(np.sum(along * along, axis=1), 1e-24)
     share = np.clip(np.sum(from_start * along, axis=2) / lengths, 0.0, 1.0)
-    return float(np.min(np.linalg.norm(from_start - share[..., None] * along, axis=2)))
+    found: Array = (share[..., None] * along - from_start).reshape(-1, 2)
+    return found

@@ -307,7 +307,7 @@ class Goal:
         angle_tolerance: Radians; pi for any heading and any way up.
         height: Metres, for ``lifted``.
         when: ``end``: true at the end of the run. ``once``: true at some moment of it.
-        distance: Metres between the two outlines at most, for ``beside``.
+        distance: Metres between the two outlines: for ``beside`` at most, for ``clear_of`` at least.
         value: How far a part of a fixture should be open, for ``open`` (at least) and ``set``: metres or
             radians; None for the relation's own. Of ``turned`` and ``oriented`` an angle, radians.
         axis: Of ``turned`` (robot base frame), ``oriented`` (the place's) and ``pointing_up`` (the object's):

@@ -5,6 +5,8 @@ It may touch from any side; what is below it is no wall. In the hand it may stil
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES
@@ -22,7 +24,7 @@ NO_WALL = register_reason("no_wall", "{place} has nothing that {object} could be
 
 
 @register("goal relation", "against")
-class Against(GoalRelation):
+class IsAgainst(GoalRelation):
     """See the file."""
 
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
@@ -40,10 +42,14 @@ class Against(GoalRelation):
 def gap_to_walls(goal: Goal, final: FinalState) -> float | None:
     """Metres from a goal's object to the nearest wall of its place; None where that has none."""
     parts = final.parts(goal.object)
+    walls = beside(parts, _walls(goal, final))
+    return min((distance(part.outline, wall.outline) for part in parts for wall in walls), default=None)
+
+
+def beside(parts: Sequence[Slab], around: Sequence[Slab]) -> list[Slab]:
+    """Of what is around a thing, its walls: they are as high as it somewhere, and not what it stands on."""
     foot, head = min(part.low for part in parts), max(part.high for part in parts)
-    walls = [wall for wall in _walls(goal, final) if wall.high > foot + WALL and wall.low < head]
-    gaps = [distance(part.outline, wall.outline) for part in parts for wall in walls]
-    return min(gaps, default=None)
+    return [wall for wall in around if wall.high > foot + WALL and wall.low < head]
 
 
 def _walls(goal: Goal, final: FinalState) -> tuple[Slab, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES
-from bt_tasksim.scene.relations.against import Against
+from bt_tasksim.scene.relations.against import IsAgainst
 from bt_tasksim.scene.relations.base import FinalState, Placement
 from bt_tasksim.scene.specs import Goal
 
@@ -14,7 +14,7 @@ HELD_AGAINST = register_reason("held_against", "{object} is held against {place}
 
 
 @register("goal relation", "held_against")
-class HeldAgainst(Against):
+class IsHeldAgainst(IsAgainst):
     """See the file."""
 
     in_hand = True
