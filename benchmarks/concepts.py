@@ -4,19 +4,23 @@
     python -m benchmarks.concepts --only push slide --engines mujoco     # a look, on development seeds
 
 For every ready-made scenario, with the Panda in SAPIEN and in MuJoCo and with the Ability hand in SAPIEN:
-how many of a hundred draws succeed, judged by the physics state, and why the others do not; and of the first
-ten, run by themselves, the force at the wrist, how the tool is jerked, and the deepest overlap. Writes
-``concept-<scenario>-<robot>-<engine>.json``: of a block to its folder in ``benchmarks/results``, of other
-seeds to ``runs/benchmarks``.
+how many of a hundred draws succeed, judged by the physics state, and why the others do not; and of the same
+runs the force at the wrist, how the tool is jerked, and the deepest overlap, beside the limits that
+docs/concepts.md states. Writes ``concept-<scenario>-<robot>-<engine>.json``: of a block to its folder in
+``benchmarks/results``, of other seeds to ``runs/benchmarks``. What a block has of a row already is left
+alone, so that a call that was broken off goes on where it was.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+import multiprocessing
 import sys
+import time
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,19 +28,26 @@ import numpy as np
 
 from benchmarks import sealed
 from bt_tasksim.core.errors import BtTasksimError
+from bt_tasksim.core.identity import identity
 from bt_tasksim.core.poses import Array
+from bt_tasksim.execution.batch_runner import BatchRunner, BatchStep
 from bt_tasksim.execution.pipelines import EngineOptions
-from bt_tasksim.execution.runner import Runner, Step
-from bt_tasksim.training.evaluation import Job, evaluate
+from bt_tasksim.execution.result import Result
+from bt_tasksim.training.evaluation import of_batch
+from bt_tasksim.training.evaluation_outcomes import Evaluation
 from bt_tasksim.training.named_tree import NamedTree
 from bt_tasksim.trees.load import scenarios
 
 CIRCUMSTANCES = (("panda", "sapien"), ("panda", "mujoco"), ("xarm7_ability", "sapien"))
 """Robots and physics engines."""
-EPISODES, FELT = 100, 10
-"""Draws that are counted, and the first so many that are looked at closely."""
+EPISODES = 100
+"""Draws."""
+WORLDS = 50
+"""That run at once."""
 USUAL = 0.95
-"""Share of the ticks within which a jerk counts as usual."""
+"""Share of the ticks within which a jerk counts as usual, and of the runs that have to keep a limit."""
+LIMITS = {"force": 60.0, "jerk": 40.0, "overlap": 0.002}
+"""What is gentle enough: newtons at the wrist, m/s^3 of the tool, metres of overlap, see docs/concepts.md."""
 
 
 @dataclass(frozen=True)
@@ -54,71 +65,69 @@ class Row:
 
 
 class Feeler:
-    """What a robot felt and did in one run; give it to `Runner.run` as ``record``.
+    """What the robots of a batch felt and did; give it to `BatchRunner.run` as ``record``.
 
     Attributes:
-        force: Largest force at the wrist so far, N.
-        tool: Positions ``(3,)`` of the tool at each tick, metres.
+        force: Largest force at the wrist by seed, N.
+        tool: Positions of the tool at each tick by seed, metres.
     """
 
     def __init__(self) -> None:
-        self.force, self.tool = 0.0, list[Array]()
-        self._time = -1.0
+        self.force: dict[int, float] = {}
+        self.tool: dict[int, list[Array]] = {}
 
-    def __call__(self, step: Step) -> None:
+    def __call__(self, step: BatchStep) -> None:
         """Keep one tick."""
-        seen = step.observation
-        if float(seen.time) <= self._time:
-            self.force, self.tool = 0.0, []  # a new episode
-        self._time = float(seen.time)
-        self.force = max(self.force, float(np.linalg.norm(np.asarray(seen.wrench)[:3])))
-        self.tool.append(np.array(seen.tool_pose[:3]))
+        forces = np.linalg.norm(step.observation.wrench[step.rows, :3], axis=1)
+        places = np.array(step.observation.tool_pose[step.rows, :3])
+        for seed, force, place in zip(step.seeds, forces.tolist(), places, strict=True):
+            self.force[seed] = max(self.force.get(seed, 0.0), force)
+            self.tool.setdefault(seed, []).append(place)
 
-    def jerk(self, period: float) -> float:
+    def jerk(self, seed: int, period: float) -> float:
         """What `USUAL` of the tool's jerks do not exceed, m/s^3, by third differences over ticks."""
-        if len(self.tool) < 4:
+        places = np.array(self.tool.get(seed, []))
+        if len(places) < 4:
             return 0.0
-        jerks = np.linalg.norm(np.diff(np.array(self.tool), n=3, axis=0), axis=1) / period**3
-        return float(np.quantile(jerks, USUAL))
+        return float(np.quantile(np.linalg.norm(np.diff(places, n=3, axis=0), axis=1) / period**3, USUAL))
 
 
-def felt(row: Row, seeds: Sequence[int]) -> dict[str, Any]:
-    """Force, jerk and overlap in runs one by one: median and largest."""
-    options = EngineOptions(engines=row.engines)
-    source = NamedTree(row.scenario, None, row.robot).load(options)
-    runner, feeler = Runner(source.build(), source.scene, options), Feeler()
-    forces, jerks, overlaps = [], [], []
-    try:
-        for seed in seeds:
-            try:
-                result = runner.run(seed, record=feeler)
-            except BtTasksimError:
-                continue
-            forces.append(feeler.force)
-            jerks.append(feeler.jerk(1.0 / result.configuration.control_frequency))
-            overlaps.append(0.0 if result.verdict is None else result.verdict.penetration)
-    finally:
-        runner.close()
-    several = {"force": forces, "jerk": jerks, "overlap": overlaps}
-    return {
-        name: {"median": round(float(np.median(found)), 5), "largest": round(max(found), 5)}
-        for name, found in several.items()
-        if found
-    }
-
-
-def measure(row: Row, seeds: range, workers: int) -> dict[str, Any]:
+def measure(row: Row, seeds: Sequence[int]) -> dict[str, Any]:
     """What is kept of one row."""
-    job = Job(row.scenario, robot=row.robot, options=EngineOptions(engines=row.engines))
-    found = evaluate(job, seeds, workers)
-    kept = {k: v for k, v in found.to_json().items() if k not in ("outcomes", "seconds")}
-    reasons = Counter(f"{o.leaf}: {o.outcome.cause.reason.name}" for o in found.outcomes if not o.success)
-    return {
-        **kept,
-        "first_seed": seeds.start,
-        "reasons": dict(reasons.most_common()),
-        **felt(row, seeds[:FELT]),
+    options, began = EngineOptions(engines=row.engines), time.perf_counter()
+    source, feeler = NamedTree(row.scenario, None, row.robot).load(options), Feeler()
+    ended: dict[int, Result | BtTasksimError] = {}
+    with BatchRunner(source.build, source.scene, options, min(WORLDS, len(seeds))) as runner:
+        ended.update(runner.run(seeds, record=feeler))
+        policies, period = runner.policies, runner.context.world.control_period
+    outcomes = {seed: of_batch(seed, ended[seed]) for seed in seeds}
+    found = Evaluation(
+        scenario=row.scenario,
+        robot=row.robot,
+        engines=row.engines,
+        perception="state",
+        policies=policies,
+        outcomes=tuple(outcomes.values()),
+        seconds=time.perf_counter() - began,
+        asked=len(seeds),
+        versions=identity(),
+    )
+    felt = {
+        "force": list(feeler.force.values()),
+        "jerk": [feeler.jerk(seed, period) for seed in feeler.tool],
+        "overlap": [o.penetration for o in outcomes.values() if not np.isnan(o.penetration)],
     }
+    kept = {k: v for k, v in found.to_json().items() if k not in ("outcomes", "seconds", "sha256", "subject")}
+    reasons = Counter(f"{o.leaf}: {o.reason}" for o in outcomes.values() if not o.success)
+    gentle = {what: _gentle(values, LIMITS[what]) for what, values in felt.items() if values}
+    return {**kept, "first_seed": seeds[0], "reasons": dict(reasons.most_common()), **gentle}
+
+
+def _gentle(values: Sequence[float], limit: float) -> dict[str, Any]:
+    """How large something was in runs, and in how many within its limit."""
+    numbers = np.median(values), np.quantile(values, USUAL), max(values)
+    named = dict(zip(("median", "usual", "largest"), (round(float(n), 5) for n in numbers), strict=True))
+    return {**named, "limit": limit, "within": int(np.sum(np.array(values) <= limit)), "of": len(values)}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -130,31 +139,55 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--robots", nargs="*", default=sorted({r for r, _ in CIRCUMSTANCES}))
     parser.add_argument("--engines", nargs="*", default=sorted({e for _, e in CIRCUMSTANCES}))
     parser.add_argument("--episodes", type=int, default=EPISODES, metavar="N")
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--workers", type=int, default=2, help="rows that are measured side by side")
     options = parser.parse_args(arguments)
+    rows = [
+        Row(scenario, robot, engines)
+        for scenario, (robot, engines) in itertools.product(options.only, CIRCUMSTANCES)
+        if robot in options.robots and engines in options.engines
+    ]
     try:
-        for scenario, (robot, engines) in itertools.product(options.only, CIRCUMSTANCES):
-            if robot in options.robots and engines in options.engines:
-                _one(Row(scenario, robot, engines), options)
+        todo = {row: seeds for row in rows if (seeds := _seeds(row, options)) is not None}
     except BtTasksimError as error:
         print(f"concepts: {error}", file=sys.stderr)
         return 2
-    return 0
+    if options.workers == 1:
+        return max((_kept(row, seeds, options.block) for row, seeds in todo.items()), default=0)
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(options.workers, spawn, max_tasks_per_child=1) as pool:
+        asked = [pool.submit(_kept, row, seeds, options.block) for row, seeds in todo.items()]
+    return max((each.result() for each in asked), default=0)
 
 
-def _one(row: Row, options: argparse.Namespace) -> None:
-    name = f"concepts/{row.name}"
-    seeds = sealed.choose(options.block, options.seed, name, options.episodes)
-    found = measure(row, seeds, options.workers)
-    sealed.keep(options.block, name, found)
+def _measure_of(row: Row) -> str:
+    return f"concepts/{row.name}"
+
+
+def _seeds(row: Row, options: argparse.Namespace) -> range | None:
+    """Draws of a row; None where a block has it already."""
+    if options.block is not None and sealed.result_file(options.block, _measure_of(row)).exists():
+        print(f"{row.name:45} is measured")
+        return None
+    return sealed.choose(options.block, options.seed, _measure_of(row), options.episodes)
+
+
+def _kept(row: Row, seeds: Sequence[int], block: str | None) -> int:
+    """Measure, keep and print a row; the exit code."""
+    try:
+        found = measure(row, seeds)
+        sealed.keep(block, _measure_of(row), found)
+    except BtTasksimError as error:
+        print(f"concepts: {row.name}: {error}", file=sys.stderr, flush=True)
+        return 2
     force, jerk, overlap = (found.get(what, {}) for what in ("force", "jerk", "overlap"))
     print(
         f"{row.name:45} {found['successes']:4d} of {found['episodes']}   "
-        f"wrist {force.get('largest', 0):.0f} N, jerk {jerk.get('largest', 0):.0f} m/s^3, "
-        f"overlap {1000 * overlap.get('largest', 0):.1f} mm  "
+        f"wrist {force.get('usual', 0):.0f} N, jerk {jerk.get('usual', 0):.0f} m/s^3, "
+        f"overlap {1000 * overlap.get('usual', 0):.1f} mm  "
         f"{found['reasons']}",
         flush=True,
     )
+    return 0
 
 
 if __name__ == "__main__":

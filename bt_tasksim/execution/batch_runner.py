@@ -22,7 +22,7 @@ from bt_tasksim.core.errors import BtTasksimError, InputError, NoDrawError, NotT
 from bt_tasksim.core.outcomes import FAILED, TIME_OVER, Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.transfer import Index
-from bt_tasksim.core.world import Hidden, WorldModel
+from bt_tasksim.core.world import Hidden, Observation, WorldModel
 from bt_tasksim.execution.batch import BatchTree
 from bt_tasksim.execution.blackboard import WorldBlackboard
 from bt_tasksim.execution.clear_start import clear_draw
@@ -55,6 +55,21 @@ class _Episode:
     leaf: str = ""
     steps: int = 0
     sim_time: float = 0.0
+
+
+@dataclass(frozen=True)
+class BatchStep:
+    """What is seen before a tick of some worlds, as a recorder gets it.
+
+    Attributes:
+        rows: Which worlds ``(k,)``.
+        seeds: Seeds of their episodes ``(k,)``.
+        observation: What is seen in all worlds ``(N, ...)``; it counts for ``rows`` alone.
+    """
+
+    rows: Array
+    seeds: tuple[int, ...]
+    observation: Observation
 
 
 class BatchRunner(Closing):
@@ -117,6 +132,7 @@ class BatchRunner(Closing):
         self._quiet, self._left = np.zeros(worlds, int), np.zeros(worlds, int)
         self._steps, self._longest = np.zeros(worlds, int), np.zeros(worlds, int)
         self._watches, self._looked = False, np.zeros(worlds, bool)
+        self._record: Callable[[BatchStep], None] | None = None
         self.control_steps = 0
         """Control periods of all worlds so far, those included in which things come to rest."""
 
@@ -127,13 +143,17 @@ class BatchRunner(Closing):
         return {leaf.name: leaf.policy_in_use.name for leaf in leaves}
 
     def run(
-        self, seeds: Iterable[int], stream: str = "evaluation"
+        self,
+        seeds: Iterable[int],
+        stream: str = "evaluation",
+        record: Callable[[BatchStep], None] | None = None,
     ) -> Iterator[tuple[int, Result | BtTasksimError]]:
         """One episode for each seed.
 
         Args:
             seeds: Seeds of the draws.
             stream: Stream of draws.
+            record: Called before every tick.
 
         Yields:
             A seed and what became of it, in the order in which episodes end; an error where there is no
@@ -144,6 +164,7 @@ class BatchRunner(Closing):
         """
         if not isinstance(seeds, Iterable):
             raise InputError(f"run takes seeds, such as range(20) or [7], found {seeds!r}")
+        self._record = record
         return self._run(iter(seeds), stream)
 
     def _run(self, waiting: Iterator[int], stream: str) -> Iterator[tuple[int, Result | BtTasksimError]]:
@@ -226,6 +247,9 @@ class BatchRunner(Closing):
         rows = np.flatnonzero(self._phase == TICKING)
         if not len(rows):
             return
+        if self._record is not None:
+            seeds = tuple(episode.seed for row in rows if (episode := self._episodes[row]) is not None)
+            self._record(BatchStep(rows, seeds, self.context.observation))
         status = self.batch.tick(rows, self.context.times[rows])
         if self.batch.unknown and (status == INVALID).any():
             raise no_status(self.tree)  # alone, that world says which leaf it is

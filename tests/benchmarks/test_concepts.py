@@ -19,6 +19,7 @@ def test_a_row_is_counted_and_felt(tmp_path, monkeypatch, capsys):
     found = json.loads(file.read_text())
     assert found["episodes"] == 1 and found["first_seed"] == 500001
     assert 0.0 < found["force"]["largest"] < 100.0 and found["jerk"]["largest"] > 0.0
+    assert found["force"]["within"] == found["force"]["of"] == 1
 
 
 def test_sealed_seeds_are_refused(capsys):
@@ -28,5 +29,5 @@ def test_sealed_seeds_are_refused(capsys):
 
 def test_the_jerk_of_a_cubic_motion_is_its_third_derivative():
     feeler, period = concepts.Feeler(), 0.05
-    feeler.tool = [np.array([(k * period) ** 3, 0.0, 0.0]) for k in range(12)]
-    assert feeler.jerk(period) == pytest.approx(6.0, rel=1e-6)
+    feeler.tool[7] = [np.array([(k * period) ** 3, 0.0, 0.0]) for k in range(12)]
+    assert feeler.jerk(7, period) == pytest.approx(6.0, rel=1e-6)
