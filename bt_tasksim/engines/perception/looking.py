@@ -2,7 +2,8 @@
 
 Each camera's picture is looked at by itself. Of what several cameras see of one object the fit counts that
 explains all their pictures best: one camera may see the handle that is hidden from the other. Objects of one
-colour are looked for together (`together.py`). Nothing here remembers anything but the generator's state.
+colour are looked for together (`together.py`), parts of furniture along their joints (`part_sight.py`), those
+that are not sensed at the first look alone. Nothing here remembers anything but the generator's state.
 """
 
 from __future__ import annotations
@@ -16,11 +17,13 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.joints import Joints
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel, WorldModel
 from bt_tasksim.engines.images import CameraModel, Image
 from bt_tasksim.engines.perception.camera_errors import CameraErrors, as_calibrated
 from bt_tasksim.engines.perception.fixture_faces import boxes_near
+from bt_tasksim.engines.perception.part_sight import PartView, seen_part
 from bt_tasksim.engines.perception.pose_estimation import Target, estimate_pose, follow, still_held
 from bt_tasksim.engines.perception.registration import DepthView, Fit, judge_fit, sample_surface
 from bt_tasksim.engines.perception.segmentation import (
@@ -128,9 +131,13 @@ class Looker:
         )
         self._model, self._errors = model, errors
         self._colours = [actor.colour for actor in configuration.objects]
-        self._groups = groups_of_colour(self._colours)
+        self._free = [i for i, actor in enumerate(configuration.objects) if actor.joint is None]
+        alike = groups_of_colour([self._colours[i] for i in self._free])
+        self._groups = [[self._free[k] for k in group] for group in alike]
         self._told_apart = partial(told_apart, configuration)
-        fixtures = {box.colour for fixture in configuration.fixtures for box in fixture.boxes}
+        boxes = [box for fixture in configuration.fixtures for box in fixture.boxes]
+        boxes += [box for part in configuration.objects if part.joint is not None for box in part.boxes]
+        fixtures = {box.colour for box in boxes}
         self._neither = np.array([NEUTRAL, *sorted(fixtures)])
         self._rng = configuration.generator("camera")
         self._calibration = {name: errors.calibration(self._rng) for name in cameras}
@@ -143,8 +150,8 @@ class Looker:
         """
         pictures = {name: self._picture(name, image) for name, image in capture.images.items()}
         groups = [self._group(group, pictures) for group in self._groups if len(group) > 1]
-        every = range(len(self.targets))
-        first = not np.isfinite(capture.estimate).all()
+        every = self._free
+        first = not np.isfinite(capture.estimate[every]).all()
         found, sights = self._found(pictures, groups, capture, every, {}, STANDING if first else STAGES)
         known = capture.estimate.copy()
         if first:
@@ -166,8 +173,30 @@ class Looker:
         ]
         unclear = {i for pair in alike for i in pair}
         found = {i: sighting for i, sighting in found.items() if i not in unclear}
-        notes = tuple(self._note(i, pictures, alike) for i in every)
+        found |= self._seen_parts(pictures, capture)
+        notes = tuple(self._note(i, pictures, alike) for i in range(len(self.targets)))
         return Found(found, notes, tuple(alike))
+
+    def sought(self, i: int, first: bool) -> bool:
+        """Whether an object is looked for, at the first look or later: all but parts that are not sensed."""
+        joint = self.targets[i].model.joint
+        return first or joint is None or joint.sensed
+
+    def _seen_parts(self, pictures: Mapping[str, _Picture], capture: Capture) -> dict[int, Sighting]:
+        """Sightings of parts of furniture."""
+        views = {name: PartView(picture.camera, picture.depth) for name, picture in pictures.items()}
+        found = {}
+        for i, target in enumerate(self.targets):
+            joint, first = target.model.joint, not np.isfinite(capture.estimate[i, 0])
+            if joint is None or not self.sought(i, first):
+                continue
+            joints = Joints.of([joint])
+            seen = seen_part(joints, sample_surface(target.shape), views)
+            if seen is not None:
+                pose = joints.pose(np.array([seen.value]))[0]
+                nothing = Segment(np.zeros(views[seen.camera].depth.shape, bool), np.empty((0, 3)))
+                found[i] = Sighting(Fit(pose, 0.0, 0.0), seen.camera, nothing, 0.0)
+        return found
 
     def _found(
         self,
@@ -233,15 +262,21 @@ class Looker:
             raise MachineError(f"camera '{image.camera.name}' gives no depth: poses need an RGB-D camera")
         camera = as_calibrated(image.camera, self._calibration[name])
         depth = self._errors.depth(image.depth, self._rng)
-        masks = classify(image.colour, self._colours, self._neither)
-        segments, others = [], []
-        for i, target in enumerate(self.targets):
+        nothing = np.zeros(depth.shape, bool)
+        masks = [nothing] * len(self.targets)
+        own = classify(image.colour, [self._colours[i] for i in self._free], self._neither)
+        for i, mask in zip(self._free, own, strict=True):
+            masks[i] = mask
+        segments: list[list[Segment]] = [[] for _ in self.targets]
+        others = [nothing] * len(self.targets)
+        for i in self._free:
+            target = self.targets[i]
             alike = next(group for group in self._groups if i in group)
             boxes, size = self._model.obstacles, target.diameter
             found = find_segments(camera, depth, masks[i], boxes, size=size) if len(alike) == 1 else []
-            segments.append(found[:3])
+            segments[i] = found[:3]
             unlike = [mask for k, mask in enumerate(masks) if k not in alike]
-            others.append(np.any(unlike or [0 * masks[i]], axis=0))
+            others[i] = np.any(unlike or [nothing], axis=0)
         return _Picture(camera, depth, tuple(masks), tuple(others), tuple(segments))
 
     def _sightings(
@@ -296,8 +331,8 @@ class Looker:
         """The tops of the other objects that stand, as places."""
         tops: list[PlaceModel] = []
         table = next(iter(self._model.places.values()), None)
-        for k, target in enumerate(self.targets):
-            pose = estimate[k]
+        for k in self._free:
+            target, pose = self.targets[k], estimate[k]
             if k == i or table is None or not np.isfinite(pose[0]) or not _stands(pose):
                 continue
             x, y, z = target.model.extent
@@ -317,6 +352,9 @@ class Looker:
                 f"and {one} {names} would show much the same if they changed places; give them different "
                 f"colours"
             )
+        cameras = f"cameras {names} show" if len(pictures) > 1 else f"camera {names} shows"
+        if self.targets[i].model.joint is not None:
+            return f"{self.targets[i].model.name} is not seen: {cameras} too little of where it may be"
         most = max(
             (
                 max((segment.pixels for segment in picture.segments[i]), default=0)
@@ -326,7 +364,6 @@ class Looker:
             default=0,
         )
         amount = f"{most} pixels" if most >= SMALLEST else f"fewer than {SMALLEST} pixels"
-        cameras = f"cameras {names} show" if len(pictures) > 1 else f"camera {names} shows"
         return (
             f"{self.targets[i].model.name} is not seen: {cameras} {amount} "
             f"of its colour{' but not its shape' if most >= SMALLEST else ''}"

@@ -120,6 +120,7 @@ class CameraPostProcess(PostProcessEngine):
         self._model = model
         self._looker = Looker(configuration, model, self.errors, self.every)
         self._tracks = [TrackedObject() for _ in range(n)]
+        self._parts = [i for i, known in enumerate(model.objects) if known.joint is not None]
         self._estimate = np.full((n, 7), np.nan)
         self._builder = ObservationBuilder(self.robot, configuration)
         self._begun = False
@@ -152,14 +153,16 @@ class CameraPostProcess(PostProcessEngine):
         shown = {name: image for name, image in images.items() if self._shows_now(name, image, time)}
         if shown:
             self._look(shown, time)
-        return self._builder.build(state, self._estimate.copy())
+        seen = self._builder.build(state, self._estimate.copy())
+        self._estimate[self._parts] = seen.objects[self._parts]
+        return seen
 
     def unseen(self) -> dict[str, str]:
         """For each object that was not seen in the last look at it, one sentence that says so, by name."""
         return {
             target.model.name: track.note
-            for target, track in zip(self._looker.targets, self._tracks, strict=True)
-            if track.note
+            for i, (target, track) in enumerate(zip(self._looker.targets, self._tracks, strict=True))
+            if track.note and self._looker.sought(i, first=False)
         }
 
     def _feel(self, state: WorldState) -> None:
@@ -177,7 +180,8 @@ class CameraPostProcess(PostProcessEngine):
                     self._look_later(track, float(state.time))
             elif i == near and opposed and not any(t.grip is not None for t in self._tracks):
                 track.grip = poses.multiply(poses.inverse(state.tool_pose), self._estimate[i])
-                track.touched, track.apart, track.due = True, 0, float(state.time) + HELD[0]
+                again = float(state.time) + HELD[0] if self._looker.sought(i, first=False) else np.inf
+                track.touched, track.apart, track.due = True, 0, again
             elif i == near and np.any(touching):
                 track.touched, track.apart, track.due = True, 0, np.inf
             elif track.touched and not np.isfinite(track.due):
@@ -186,7 +190,12 @@ class CameraPostProcess(PostProcessEngine):
                     self._look_later(track, float(state.time))
 
     def _look_later(self, track: TrackedObject, time: float) -> None:
-        track.touched, track.apart, track.due, track.captures = False, 0, time + WAIT, CAPTURES
+        track.touched, track.apart = False, 0
+        part = any(track is self._tracks[i] for i in self._parts)
+        for i, other in enumerate(self._tracks):
+            seen_anew = self._looker.sought(i, first=False) and other.grip is None
+            if seen_anew and (other is track or part):  # what is in a drawer goes along with it
+                other.due, other.captures = time + WAIT, CAPTURES
 
     def _in_reach(self, tool: Array) -> int:
         """Index of the object nearest to the tool, its nominal box within the fingers' reach; or -1."""
@@ -235,7 +244,7 @@ class CameraPostProcess(PostProcessEngine):
             said = {found.notes[min(pair)] for pair in found.alike}
             raise NotToldApartError("; ".join(sorted(said)))
         for i, track in enumerate(self._tracks):
-            if _handled(track) != capture.handled[i]:
+            if _handled(track) != capture.handled[i] or not self._looker.sought(i, first):
                 continue
             sighting = found.sightings.get(i)
             if sighting is not None:

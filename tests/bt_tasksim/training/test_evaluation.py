@@ -54,15 +54,15 @@ def timeless(outcomes):
 
 @pytest.fixture(scope="module")
 def evaluated():
-    return evaluate(Job("pick_and_throw"), range(30, 36))
+    return evaluate(Job("pick_and_throw"), range(30, 34))
 
 
 def test_one_and_two_workers_and_another_order_give_the_same_numbers(evaluated):
-    seeds = [35, 31, 33, 30, 34, 32]
+    seeds = [31, 33, 30, 32]
     two = evaluate(Job("pick_and_throw"), seeds, workers=2)
     assert [o.seed for o in two.outcomes] == seeds
     assert sorted(timeless(two.outcomes), key=lambda o: o.seed) == timeless(evaluated.outcomes)
-    assert len({o.position_error for o in two.outcomes}) == 6, "exact floats, and none like another"
+    assert len({o.position_error for o in two.outcomes}) == 4, "exact floats, and none like another"
 
 
 def test_a_worker_that_cannot_begin_ends_the_evaluation(tmp_path):
@@ -86,17 +86,17 @@ def test_what_is_written_adds_up(evaluated):
     assert content["scenario"] == "pick_and_throw" and content["robot"] == "panda"
     assert content["engines"] == "sapien" and content["perception"] == "state, noise fine"
     assert content["policies"]["grasp cup"] == "programmed"
-    assert content["episodes"] == 6 == content["successes"] + sum(content["failures"].values())
-    assert content["success_rate"] == content["successes"] / 6
+    assert content["episodes"] == 4 == content["successes"] + sum(content["failures"].values())
+    assert content["success_rate"] == content["successes"] / 4
     low, high = content["confidence_interval"]
     assert low <= content["success_rate"] <= high
-    assert content["control_steps"] == sum(o["control_steps"] for o in content["outcomes"]) > 6 * 80
+    assert content["control_steps"] == sum(o["control_steps"] for o in content["outcomes"]) > 4 * 80
     assert content["seconds"] > 0
 
 
 def test_workers_take_the_policies_of_the_job(policy):
     job = Job("pick_and_place", policies=(("grasp", str(policy("mine"))),))
-    one, two = evaluate(job, range(3, 6)), evaluate(job, range(3, 6), workers=2)
+    one, two = evaluate(job, range(3, 5)), evaluate(job, range(3, 5), workers=2)
     assert one.policies == two.policies and one.policies["grasp target"].startswith("mine@")
     assert {v for k, v in one.policies.items() if k != "grasp target"} == {"programmed"}
     # The policy by hand does nothing but say "done", and the grasp's reference motion is enough here.

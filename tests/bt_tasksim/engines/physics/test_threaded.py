@@ -94,7 +94,7 @@ def assert_row(got, row, expected):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(("worlds", "threads"), [(1, 1), (2, 2), (64, 2)])
+@pytest.mark.parametrize(("worlds", "threads"), [(1, 1), (2, 2), (20, 2)])
 def test_a_world_is_the_same_bits_in_any_company_and_order_with_any_number_of_threads(
     engine, worlds, threads
 ):
@@ -103,7 +103,7 @@ def test_a_world_is_the_same_bits_in_any_company_and_order_with_any_number_of_th
     shown = np.arange(worlds) % len(known) if worlds > 2 else np.array([2, 1])[:worlds]
     at = np.zeros(worlds, int)
     batch.reset(np.arange(worlds), [known[k].configuration for k in shown])
-    for _ in range(60 if worlds > 2 else 220):
+    for _ in range(50 if worlds > 2 else 220):
         rows = rng.permutation(worlds)[: max(1, worlds - int(rng.integers(3)))]
         now = [(known[shown[row]], at[row]) for row in rows]
         position = np.array([known.targets[k].position for known, k in now])
