@@ -11,15 +11,19 @@ import numpy as np
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.body_contacts import BodyContacts
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
-from bt_tasksim.engines.physics.mujoco_model import BodyNumbers, World, build_world
+from bt_tasksim.engines.physics.mujoco_model import GRAVITY, BodyNumbers, World, build_world
 from bt_tasksim.engines.physics.mujoco_sensing import ContactReader, Forces, Near, object_velocities
 from bt_tasksim.engines.physics.mujoco_timing import StepPlan
+from bt_tasksim.engines.physics.threaded import FALLING
 from bt_tasksim.robot.description import RobotDescription
-from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
+from bt_tasksim.scene.shapes import BallPiece
 
 WATCHED = 4
 """Control periods after the hand was moved or a contact came or went, in which overlaps are looked for at
 every step; at other times at the period's end."""
+STRIDE = 6e-4
+"""Metres that a ball which falls goes in one step, at most, and so deep it is in what it meets."""
 
 
 class MujocoReading(NamedTuple):
@@ -88,7 +92,7 @@ class MujocoWorld:
         names = [actor.name for actor in configuration.objects]
         self.n_objects, self.n_fixtures = len(names), len(configuration.fixtures)
         self._plan = StepPlan.of(configuration)
-        self._periods = 0
+        self._periods, self._finer = 0, self._plan.finer
         self._reader = ContactReader(
             self.world.bodies, self.world.model.geom_bodyid, len(robot.tips), len(names), self.n_fixtures
         )
@@ -98,6 +102,7 @@ class MujocoWorld:
         self._numbers = BodyNumbers.of(robot, self.world, self.n_fixtures)
         self._frames = self._numbers.read[: 1 + len(robot.tips)]
         self._object_com = self.world.model.body_ipos[self.world.object_body]
+        self._balls = np.array([_is_ball(actor) for actor in configuration.objects], bool)
         disturbance = configuration.disturbance
         self._disturbance = DisturbanceForce(disturbance)
         self._pushed = names.index(disturbance.object) if disturbance is not None else -1
@@ -137,8 +142,30 @@ class MujocoWorld:
         self._periods += 1
 
     def note_motion(self, falling: bool, spin: float) -> None:
-        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
+        """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`.
+
+        Balls may spin, since that sinks no corner into anything; those that go along with what the hand
+        holds, as in a jug, do not fall; and for those that do steps are as fine as they are fast.
+        """
+        self._finer = self._plan.finer
         self._falling = falling
+        if falling and self._balls.any():
+            self._falling, speed = self._falls()
+            if speed is not None:
+                sunk = (speed + GRAVITY * self._plan.period) * self._plan.step
+                self._finer = min(self._plan.finer, max(1, math.ceil(sunk / STRIDE)))
+
+    def _falls(self) -> tuple[bool, float | None]:
+        """Whether an object that the hand does not touch is fast; where balls alone are, how fast, m/s."""
+        held: Array = np.array(self.reading.hand_force) > 0.0
+        linear, angular = self.reading.object_motion[:, :3], self.reading.object_motion[:, 3:]
+        speed = np.linalg.norm(linear, axis=1)
+        beside = np.linalg.norm(linear[:, None] - linear[None, held], axis=2).min(axis=1, initial=math.inf)
+        others = ~held & ~self._balls
+        if (others & ((speed > FALLING[0]) | (np.linalg.norm(angular, axis=1) > FALLING[1]))).any():
+            return True, None
+        fast = ~held & self._balls & (np.minimum(speed, beside) > FALLING[0])
+        return bool(fast.any()), float(speed[fast].max(initial=0.0))
 
     def _step(self, sensed: bool) -> None:
         """One ordinary step, in finer ones while something falls or is pushed."""
@@ -150,8 +177,8 @@ class MujocoWorld:
             self._falling |= self._disturbance.pushing  # until the period's end, where it is looked at again
         if self._falling:
             ordinary = model.opt.timestep
-            model.opt.timestep = ordinary / self._plan.finer
-            for _ in range(self._plan.finer):
+            model.opt.timestep = ordinary / self._finer
+            for _ in range(self._finer):
                 if self._disturbance.pushing:
                     self._push()
                 self._pull()
@@ -238,3 +265,7 @@ class MujocoWorld:
         lever = data.xpos[body] - data.xipos[body]
         data.xfrc_applied[body, :3] = force - np.array([0.0, 0.0, world.weight[k]])
         data.xfrc_applied[body, 3:] = np.cross(lever, force)
+
+
+def _is_ball(actor: ObjectActor) -> bool:
+    return all(isinstance(piece, BallPiece) for piece in actor.shape().collision)

@@ -91,6 +91,13 @@ def test_a_landing_is_no_deeper_than_two_millimetres(engine, kind):
     assert np.linalg.norm(still.physics.hidden().velocities[0, :3]) < 0.05
 
 
+def test_a_ball_lands_no_deeper_than_that_either(engine):
+    still = Still(lifted(scene("ball").sample(1), 0.25), engine)
+    still.step(40)
+    assert 0 < still.physics.hidden().penetration < 0.002
+    assert abs(still.physics.hidden().velocities[0, 2]) < 0.05
+
+
 def test_an_overlap_is_recorded_and_remembered(engine):
     still = Still(lifted(scene().sample(1), -0.06), engine)
     still.step(1)  # what overlaps is driven apart
