@@ -2,11 +2,13 @@
 
     python -m benchmarks.concepts --block B0011                          # everything: hours
     python -m benchmarks.concepts --only push slide --engines mujoco     # a look, on development seeds
+    python -m benchmarks.concepts --only make_room pour_a_cup --engines twin --episodes 6
 
 For every ready-made scenario, with the Panda in SAPIEN and in MuJoCo and with the Ability hand in SAPIEN:
 how many of a hundred draws succeed, judged by the physics state, and why the others do not; and of the same
 runs the force at the wrist, how the tool is jerked, and the deepest overlap, beside the limits that
-docs/concepts.md states. Writes ``concept-<scenario>-<robot>-<engine>.json``: of a block to its folder in
+docs/concepts.md states. On the twin (``--engines twin``), over ROS and in real time, only how many succeed
+(`benchmarks.concepts_twin`). Writes ``concept-<scenario>-<robot>-<engine>.json``: of a block to its folder in
 ``benchmarks/results``, of other seeds to ``runs/benchmarks``. What a block has of a row already is left
 alone, so that a call that was broken off goes on where it was.
 """
@@ -19,7 +21,7 @@ import multiprocessing
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import sealed
+from benchmarks.concepts_twin import TwinOfScenarios
 from bt_tasksim.core.errors import BtTasksimError
 from bt_tasksim.core.identity import identity
 from bt_tasksim.core.poses import Array
@@ -40,6 +43,8 @@ from bt_tasksim.trees.load import scenarios
 
 CIRCUMSTANCES = (("panda", "sapien"), ("panda", "mujoco"), ("xarm7_ability", "sapien"))
 """Robots and physics engines."""
+TWIN = "twin"
+"""Stands for the twin among the engines; measured where it is asked for."""
 EPISODES = 100
 """Draws."""
 WORLDS = 50
@@ -137,13 +142,14 @@ def main(arguments: list[str] | None = None) -> int:
     known = scenarios()
     parser.add_argument("--only", nargs="*", default=known, choices=known, metavar="SCENARIO")
     parser.add_argument("--robots", nargs="*", default=sorted({r for r, _ in CIRCUMSTANCES}))
-    parser.add_argument("--engines", nargs="*", default=sorted({e for _, e in CIRCUMSTANCES}))
+    usual = sorted({e for _, e in CIRCUMSTANCES})
+    parser.add_argument("--engines", nargs="*", default=usual, choices=[*usual, TWIN])
     parser.add_argument("--episodes", type=int, default=EPISODES, metavar="N")
     parser.add_argument("--workers", type=int, default=2, help="rows that are measured side by side")
     options = parser.parse_args(arguments)
     rows = [
         Row(scenario, robot, engines)
-        for scenario, (robot, engines) in itertools.product(options.only, CIRCUMSTANCES)
+        for scenario, (robot, engines) in itertools.product(options.only, (*CIRCUMSTANCES, ("panda", TWIN)))
         if robot in options.robots and engines in options.engines
     ]
     try:
@@ -151,12 +157,30 @@ def main(arguments: list[str] | None = None) -> int:
     except BtTasksimError as error:
         print(f"concepts: {error}", file=sys.stderr)
         return 2
-    if options.workers == 1:
+    simulated = {row: seeds for row, seeds in todo.items() if row.engines != TWIN}
+    real_time = {row: seeds for row, seeds in todo.items() if row.engines == TWIN}
+    return max(_simulated(simulated, options), _on_the_twin(real_time, options))
+
+
+def _simulated(todo: Mapping[Row, Sequence[int]], options: argparse.Namespace) -> int:
+    """Rows side by side; the exit code."""
+    if options.workers == 1 or not todo:
         return max((_kept(row, seeds, options.block) for row, seeds in todo.items()), default=0)
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(options.workers, spawn, max_tasks_per_child=1) as pool:
         asked = [pool.submit(_kept, row, seeds, options.block) for row, seeds in todo.items()]
     return max((each.result() for each in asked), default=0)
+
+
+def _on_the_twin(todo: Mapping[Row, Sequence[int]], options: argparse.Namespace) -> int:
+    """Rows one after the other, in real time; the exit code."""
+    with TwinOfScenarios() as twin:
+
+        def measured(row: Row, seeds: Sequence[int]) -> dict[str, Any]:
+            found = twin.measure(row.scenario, row.robot, seeds)
+            return {"versions": identity(), "first_seed": seeds[0], **found}
+
+        return max((_kept(row, seeds, options.block, measured) for row, seeds in todo.items()), default=0)
 
 
 def _measure_of(row: Row) -> str:
@@ -171,22 +195,27 @@ def _seeds(row: Row, options: argparse.Namespace) -> range | None:
     return sealed.choose(options.block, options.seed, _measure_of(row), options.episodes)
 
 
-def _kept(row: Row, seeds: Sequence[int], block: str | None) -> int:
+def _kept(
+    row: Row,
+    seeds: Sequence[int],
+    block: str | None,
+    measured: Callable[[Row, Sequence[int]], dict[str, Any]] = measure,
+) -> int:
     """Measure, keep and print a row; the exit code."""
     try:
-        found = measure(row, seeds)
+        found = measured(row, seeds)
         sealed.keep(block, _measure_of(row), found)
     except BtTasksimError as error:
         print(f"concepts: {row.name}: {error}", file=sys.stderr, flush=True)
         return 2
-    force, jerk, overlap = (found.get(what, {}) for what in ("force", "jerk", "overlap"))
-    print(
-        f"{row.name:45} {found['successes']:4d} of {found['episodes']}   "
-        f"wrist {force.get('usual', 0):.0f} N, jerk {jerk.get('usual', 0):.0f} m/s^3, "
-        f"overlap {1000 * overlap.get('usual', 0):.1f} mm  "
-        f"{found['reasons']}",
-        flush=True,
-    )
+    said = f"{row.name:45} {found['successes']:4d} of {found['episodes']}   "
+    if "force" in found:
+        force, jerk, overlap = (found.get(what, {}) for what in ("force", "jerk", "overlap"))
+        said += (
+            f"wrist {force.get('usual', 0):.0f} N, jerk {jerk.get('usual', 0):.0f} m/s^3, "
+            f"overlap {1000 * overlap.get('usual', 0):.1f} mm  "
+        )
+    print(f"{said}{found['reasons']}", flush=True)
     return 0
 
 

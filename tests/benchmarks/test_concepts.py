@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks import concepts
+from benchmarks import concepts, concepts_twin
 
 
 def test_a_row_is_counted_and_felt(tmp_path, monkeypatch, capsys):
@@ -31,3 +31,21 @@ def test_the_jerk_of_a_cubic_motion_is_its_third_derivative():
     feeler, period = concepts.Feeler(), 0.05
     feeler.tool[7] = [np.array([(k * period) ** 3, 0.0, 0.0]) for k in range(12)]
     assert feeler.jerk(7, period) == pytest.approx(6.0, rel=1e-6)
+
+
+def test_rows_on_the_twin_are_measured_where_they_are_asked_for(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    asked = []
+
+    def measure(self, scenario, robot, seeds):
+        asked.append((scenario, robot, list(seeds)))
+        ok = {"success": True, "leaf": "", "reason": ""}
+        return concepts_twin.summary([ok, ok | {"success": False, "leaf": "pour jug", "reason": "spilled"}])
+
+    monkeypatch.setattr(concepts_twin.TwinOfScenarios, "measure", measure)
+    rows = ["--only", "make_room", "pour_a_cup", "--engines", "twin", "--episodes", "2", "--seed", "620000"]
+    assert concepts.main(rows) == 0
+    assert asked == [(name, "panda", [620000, 620001]) for name in ("make_room", "pour_a_cup")]
+    assert "pour_a_cup-panda-twin" in capsys.readouterr().out
+    found = json.loads((tmp_path / "runs/benchmarks/concept-make_room-panda-twin.json").read_text())
+    assert found["successes"] == 1 and found["reasons"] == {"pour jug: spilled": 1}

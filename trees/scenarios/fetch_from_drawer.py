@@ -10,18 +10,20 @@ from bt_tasksim.trees import recovering, sequence
 
 
 def scene(robot: str = "panda") -> Scene:
-    """A chest, a cube in the front part of its drawer, and a spot for it on the table."""
+    """A chest, a cube in its drawer, where an open hand has room about it, and a spot for it on the table."""
     return Scene(
         robot,
         fixtures=[
             FixtureSpec(
                 "drawer",
                 parameters={
-                    "x": (0.66, 0.70),
+                    "x": (0.68, 0.72),
                     "y": (-0.12, -0.06),
                     "heading": (-0.1, 0.1),
+                    "width": (0.30, 0.34),
+                    "depth": (0.28, 0.32),
                     "base": 0.10,
-                    "opens": 0.24,
+                    "opens": 0.25,
                 },
             )
         ],
@@ -30,8 +32,8 @@ def scene(robot: str = "panda") -> Scene:
                 kinds=("cube",),
                 inside="drawer",
                 size=((0.04, 0.04, 0.04), (0.05, 0.05, 0.05)),
-                centre=(-0.06, 0.0),
-                area=(0.02, 0.05),
+                centre=(-0.03, 0.0),
+                area=(0.01, 0.03),
             )
         },
         spots=[SpotSpec("spot", on="table", centre=(-0.02, 0.28), area=(0.04, 0.03))],
@@ -46,7 +48,7 @@ def build() -> Behaviour:
         sequence(
             "fetch the cube",
             Grasp("drawer"),
-            OpenDrawer("drawer", distance=0.20),
+            OpenDrawer("drawer", distance=0.23),
             Release("drawer"),
             Grasp("cube"),
             Pick("cube", distance=0.15),
