@@ -41,6 +41,8 @@ from bt_tasksim.concept_nodes.stop_conditions import Against, ClearOf, HeldAgain
 from bt_tasksim.concept_nodes.tip_up import TipUp
 from bt_tasksim.concept_nodes.turn import Turn
 from bt_tasksim.concept_nodes.turn_knob import TurnKnob
+from bt_tasksim.concept_nodes.turn_off_stop import TurnOffStop
+from bt_tasksim.concept_nodes.turn_to_stop import TurnToStop
 from bt_tasksim.concept_nodes.turned_conditions import Emptied, Lying, OnEnd, TurnedLike
 from bt_tasksim.concept_nodes.wait import Wait
 from bt_tasksim.concept_nodes.withdraw import Withdraw
@@ -55,6 +57,8 @@ __all__ = [
     "PressedOn",
     "PressButton",
     "TurnKnob",
+    "TurnOffStop",
+    "TurnToStop",
     "CloseDoor",
     "AdjustDoor",
     "OpenDoor",

@@ -40,12 +40,15 @@ class CloseDoor(OnJoint):
         sayings=("I close the {}", "swing the {} shut", "now shut the {}"),
     )
 
-    stops = -1
-
     @classmethod
     def describe_task(cls, parameters: Mapping[str, Any]) -> str:
         """Nothing: it goes onto its stop."""
         return ""
+
+    @property
+    def stops(self) -> int:
+        """See `OnJoint.stops`."""
+        return -1
 
     def wanted(self, now: Array, limits: Array) -> Array:
         """See `OnJoint.wanted`."""

@@ -179,7 +179,9 @@ def candidates(view: WorldView, target: str, approach: Array, neutral: Array) ->
         leaned = poses.quat_multiply(rotation, poses.from_rotation_vector(np.array([lean, 0.0, 0.0])))
         rotation = np.concatenate([rotation, leaned], axis=1)
         position = np.concatenate([position + 0.0 * axes] * 2, axis=1)
-    turned = np.arccos(np.clip(along @ approach, -1.0, 1.0))
+    given = poses.rotate(pose[3:], grips.approach)[which]
+    usual = np.where(np.isfinite(given).all(axis=-1, keepdims=True), given, approach)
+    turned = np.arccos(np.clip(np.sum(along * usual, axis=-1), -1.0, 1.0))
     room = (view.robot.opening - widths) / 2
     thin = np.maximum(0.0, 1.0 - widths / THIN)
     own = turned + 1.5 * (1.0 - firmness) + (thin if side is None else MISSED * thin)

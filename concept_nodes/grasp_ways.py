@@ -9,6 +9,7 @@ import numpy as np
 from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept_nodes.closer import TOUCHING
 from bt_tasksim.concept_nodes.grasp_aims import Around, Served
+from bt_tasksim.concept_nodes.joint_way import SPARE, gone_along
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.planning.bodies import bodies_of
@@ -58,8 +59,8 @@ class ServedAlong(Served):
     def goes_on(self, joints: Array, goal: Array, hand: Array) -> bool:
         """Whether the arm goes along from joints ``(n_arm,)`` at a grasp ``(7,)``."""
         finder, tools = self._finder(goal, hand), self._along(goal)
-        found = finder.arm.along(joints, tools)
-        if found is None or not finder.collisions.all_free(found):
+        found = gone_along(finder, joints, tools, SPARE if self._closer < TOUCHING else 0.0)
+        if found is None:
             return False
         # At the end the hand is to draw back, and what it held stays there.
         last = np.repeat(tools[-1][None], len(self._back), axis=0)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from functools import cached_property
 
 import numpy as np
 
+from bt_tasksim.concept_nodes.turning import POSTURES, elbow_moved
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.joints import Joints
@@ -18,6 +20,14 @@ from bt_tasksim.planning.ways import WayFinder
 
 STEP = {False: 0.02, True: math.radians(3.0)}
 """Metres or radians between poses of the way, by whether the part turns."""
+LEAP = 0.35
+"""Radians that no joint of the arm turns between two of them: it would be at the brink of what it can do,
+and go through it in a bound."""
+ASTRAY = 0.002
+"""Metres by which the tool may be beside its way half way between two postures: furniture gives no more."""
+SPARE = 0.1
+"""Radians that the joints keep from their limits on a way that a grasp is chosen for: hands close, and
+postures drift, a little otherwise than was planned."""
 ABOUT = 0.01
 """Metres above and beside a part within which the middle of what stands in or on it may be."""
 
@@ -69,6 +79,71 @@ class JointWay:
         grip = poses.relative(self._view.objects[self._target], tool)
         found: Array = poses.multiply(parts, grip[None])
         return found
+
+
+def gone_along(finder: WayFinder, start: Array, tools: Array, spare: float = 0.0) -> Array | None:
+    """Joints ``(n, n_arm)`` in which the arm leads what it holds through tool poses ``(n, 7)``.
+
+    An arm of more joints than it needs goes there in many ways. What moves least follows best, so it keeps
+    its posture; where that leads nowhere it is drawn to that at rest, or to one in which it may end.
+
+    Args:
+        finder: What is around.
+        start: Joints ``(n_arm,)`` where the tool is before the first pose.
+        tools: The poses, close together.
+        spare: Radians that the joints keep from their limits.
+    """
+    arm, robot = finder.arm, finder.arm.robot
+    low, high = robot.arm_lower + spare, robot.arm_upper - spare
+    before = arm.tool(start)[None]
+    middle = poses.interpolate(np.concatenate([before, tools[:-1]]), tools, 0.5 + 0.0 * tools[:, 0])
+
+    def serves(joints: Array) -> bool:
+        line = np.concatenate([start[None], joints])
+        if float(np.abs(np.diff(line, axis=0)).max()) > LEAP:
+            return False
+        if spare and not bool(((joints > low) & (joints < high)).all()):
+            return False
+        halfway = arm.tools(0.5 * (line[1:] + line[:-1]))[:, :3]
+        return float(np.linalg.norm(halfway - middle[:, :3], axis=-1).max()) <= ASTRAY and finder.clear(line)
+
+    for towards in _ends(finder, start, tools[-1]):
+        joints = arm.along(start, tools, towards=towards)
+        if joints is not None and serves(joints):
+            return joints
+    return None
+
+
+def gone_anyhow(finder: WayFinder, tools: Array) -> Array | None:
+    """Joints ``(n, n_arm)`` from where the arm is through tool poses ``(k, 7)``, as `gone_along`.
+
+    Where it cannot go there as it is, its elbow moves first, while the tool stays.
+    """
+    found = gone_along(finder, finder.start, tools)
+    if found is not None or not finder.goes_straight:
+        return found
+    here = finder.arm.tool(finder.start)
+    for start in itertools.islice(finder.postures(here), POSTURES):
+        after = gone_along(finder, start, tools)
+        moved = None if after is None else elbow_moved(finder, start, here)
+        if after is not None and moved is not None:
+            return np.concatenate([moved[1:], after])
+    return None
+
+
+def _ends(finder: WayFinder, start: Array, tool: Array) -> Iterator[Array | None]:
+    """Postures ``(n_arm,)`` to which the arm may be drawn on its way to a tool pose; None: at rest."""
+    if not finder.goes_straight:
+        yield None
+        return
+    yield start
+    yield None
+    found: list[Array] = []
+    for seed in (start, *finder.arm.seeds):
+        end = finder.arm.joints(tool, seed)
+        if end is not None and all(float(np.abs(end - other).max()) > LEAP for other in found):
+            found.append(end)
+            yield end
 
 
 def carried_by(view: WorldView, target: str) -> frozenset[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING, VERY_CLOSE, with_room
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
 from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
-from bt_tasksim.concept_nodes.joint_way import JointWay
+from bt_tasksim.concept_nodes.joint_way import JointWay, gone_anyhow
 from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
@@ -30,6 +30,7 @@ from bt_tasksim.core.world import Command
 from bt_tasksim.planning.reference_motion import Path, at_times, plan, position, searched_for
 from bt_tasksim.planning.route import Pace, Route, followed
 from bt_tasksim.planning.routes import SAMPLES, with_routes
+from bt_tasksim.planning.ways import WayFinder
 
 UNITS: Mapping[bool, Unit] = {False: METRES, True: RADIANS}
 """Of what a part does, by whether it turns."""
@@ -70,7 +71,7 @@ BEHIND = {False: 0.04, True: math.radians(10.0)}
 """Metres or radians by which a part may be behind the hand."""
 PATIENCE = 1.0
 """Seconds for which it may be farther behind, and after the way's end until which it may come there."""
-SLOWLY = 0.008
+SLOWLY = 0.016
 """Metres of the hand's way before a stop from which on it goes no faster than `GENTLY`."""
 GENTLY = 0.01
 """Metres per second: what meets its stop at 60 mm/s in the hand of a stiff arm strains the wrist with
@@ -79,6 +80,14 @@ BRAKES = 0.1
 """m/s^2 by which it comes to go so slowly."""
 FELT = 2
 """Ticks in a row for which a stop must be felt."""
+ROUND = 0.01
+"""Metres from the axis within which a hand turns about itself rather than that it goes somewhere."""
+ARM = 0.05
+"""Metres from the axis at which a torque about it is taken as a force."""
+YIELDS, UNFELT, MOST = 3e-5, 3.0, 0.012
+"""Metres a second for each newton from aside with which the hand gives way, newtons that it does not mind,
+and metres that it gives way at most: no hinge is quite where it is taken to be. Where an arm is near to the
+end of its reach, its drives resist a step with up to 500 N/mm: any faster, it would swing."""
 TOLERANCE = {False: 0.004, True: math.radians(1.5)}
 """Metres or radians within which a value counts as reached."""
 ACCELERATION = 0.4
@@ -98,7 +107,7 @@ class JointMemory(NamedTuple):
         path: Tool path along the joint.
         grip: Pose ``(N, 7)`` of the part in the tool frame.
         goal: Value ``(N,)`` that is wanted, metres or radians.
-        baseline: Force ``(N,)`` against the motion when it began, N.
+        offset: Metres ``(N, 3)`` by which the hand has given way aside, robot base frame.
         progress: Seconds ``(N,)`` of the path that have been commanded.
         felt: Ticks ``(N,)`` in a row with the stop's force.
         behind: Seconds ``(N,)`` in a row for which the part was far behind the hand.
@@ -108,7 +117,7 @@ class JointMemory(NamedTuple):
     path: Path
     grip: Array
     goal: Array
-    baseline: Array
+    offset: Array
     progress: Array
     felt: Array
     behind: Array
@@ -125,9 +134,6 @@ class OnJoint(ConceptModel[JointMemory]):
 
     turns: ClassVar[bool] = False
     """It is a task of what turns, and not of what slides."""
-    stops: ClassVar[int] = 0
-    """-1 or 1: it ends where the part is felt to be stopped, at the lower or the upper end."""
-
     maintains = (HOLDING,)
     default_timeout = 20.0
 
@@ -139,6 +145,11 @@ class OnJoint(ConceptModel[JointMemory]):
             limits: Lowest and highest ``(N, 2)``.
         """
         raise NotImplementedError
+
+    @property
+    def stops(self) -> int:
+        """-1 or 1: it ends where the part is felt to be stopped, at the lower or the upper end; else 0."""
+        return 0
 
     @property
     def wholly(self) -> bool:
@@ -174,7 +185,7 @@ class OnJoint(ConceptModel[JointMemory]):
             path=path,
             grip=poses.relative(seen.tool, seen.object(self.target)),
             goal=poses.constant(np.array([goal for goal, _ in found]), now),
-            baseline=nothing,
+            offset=0.0 * seen.tool[:, :3],
             progress=nothing,
             felt=xp.astype(nothing, xp.int64),
             behind=nothing,
@@ -194,19 +205,22 @@ class OnJoint(ConceptModel[JointMemory]):
             beyond = self.stops * BEYOND[self.turns] if share == 1.0 else 0.0
             finder = way.finder(view.tool, closer)
             tools = way.tools(view.tool, way.poses(now, end + beyond))
-            joints = finder.arm.along(finder.start, tools)
+            joints = gone_anyhow(finder, tools)
             if joints is None:
-                raise NoWayError(self._too_far(way, finder, view, now, end))
-            if not finder.clear(np.concatenate([finder.start[None], joints])):
-                touch = next((t for q in joints for t in finder.collisions.touches(q)), None)
-                what = f"{touch[0]} would touch {touch[1]}" if touch else "something would be touched"
-                raise NoWayError(f"{self.target} cannot be moved: {what} on the way: make room there")
+                raise NoWayError(self._why_not(way, finder, view, now, end))
             return end, followed(finder.arm, np.concatenate([finder.start[None], joints]), pace)
 
         return with_room(((share, closer) for share in shares for closer in ROOMS), find)
 
-    def _too_far(self, way: JointWay, finder: Any, view: WorldView, now: float, end: float) -> str:
-        """How far the arm can go along, in one sentence."""
+    def _why_not(self, way: JointWay, finder: WayFinder, view: WorldView, now: float, end: float) -> str:
+        """What would be touched, or how far the arm can go along, in one sentence."""
+        along = finder.arm.along(finder.start, way.tools(view.tool, way.poses(now, end)))
+        touch = (
+            None if along is None else next((t for q in along for t in finder.collisions.touches(q)), None)
+        )
+        if touch is not None:
+            what = f"{touch[0]} would touch {touch[1]}"
+            return f"{self.target} cannot be moved: {what} on the way: make room there"
         last, joints = now, finder.start
         for value in np.linspace(now, end, 21)[1:]:
             tools = way.tools(view.tool, way.poses(last, float(value)))
@@ -232,7 +246,8 @@ class OnJoint(ConceptModel[JointMemory]):
             goal = way.now + SHARES[-1] * (goal - way.now)
         unit = UNITS[self.turns]
         words = f"be taken from {unit.text(way.now)} to {unit.text(goal)}"
-        return Aim(way.poses(way.now, goal), words, way.beside, along=True, carried=way.carried)
+        beyond = self.stops * BEYOND[self.turns]
+        return Aim(way.poses(way.now, goal + beyond), words, way.beside, along=True, carried=way.carried)
 
     def _law(self, seen: Seen) -> Joints:
         return seen.model(self.target).joints
@@ -241,12 +256,8 @@ class OnJoint(ConceptModel[JointMemory]):
         """How far ``(N,)`` the part is taken to be open."""
         return self._law(seen).value(seen.object(self.target))
 
-    def _command(self, seen: Seen, memory: JointMemory) -> tuple[Array, Array | None]:
-        """Where the hand should be now, tool poses ``(N, 7)``, and the arm's joints there."""
-        return at_times(memory.path, memory.progress)
-
-    def _against(self, seen: Seen, memory: JointMemory) -> Array:
-        """Force ``(N,)`` at the wrist against the motion along the joint, N."""
+    def _along(self, seen: Seen, memory: JointMemory) -> Array:
+        """Unit vectors ``(N, 3)`` in which the tool goes now; shorter where it turns about itself."""
         xp, now = array_namespace(seen.tool), self._value(seen)
         ahead = xp.sign(memory.goal - now + self.stops * BEYOND[self.turns])
         law = self._law(seen)
@@ -255,15 +266,32 @@ class OnJoint(ConceptModel[JointMemory]):
         here = poses.multiply(law.pose(now), poses.inverse(memory.grip))
         moved = there[:, :3] - here[:, :3]
         long = poses.norm(moved)
-        along = moved / poses.clip(long, 1e-9, math.inf)[:, None]
-        return -poses.dot(poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3]), along)
+        return moved / poses.clip(long, ROUND * step, math.inf)[:, None]
+
+    def _against(self, seen: Seen, memory: JointMemory, force: Array, along: Array) -> Array:
+        """Force ``(N,)`` against the motion, N; near the axis that of the torque at `ARM`.
+
+        Args:
+            seen: What is seen.
+            memory: What it remembers.
+            force: At the tool ``(N, 3)``, robot base frame, N.
+            along: See `_along`.
+        """
+        if not self.turns:
+            return -poses.dot(force, along)
+        xp, law, now = array_namespace(seen.tool), self._law(seen), self._value(seen)
+        at = law.pose(now)
+        axis, lever = poses.rotate(at[:, 3:], law.axis), seen.tool[:, :3] - poses.transform(at, law.origin)
+        torque = poses.rotate(seen.tool[:, 3:], seen.wrench[:, 3:]) + poses.cross(lever, force)
+        way = xp.sign(memory.goal - now + self.stops * BEYOND[True])
+        arm = poses.norm(lever - poses.dot(lever, axis)[:, None] * axis)
+        return -way * poses.dot(torque, axis) / poses.clip(arm, ARM, math.inf)
 
     def advance(self, action: Array, seen: Seen, memory: JointMemory) -> JointMemory:
-        """Go on, slower where the wrist feels force; notice a stop, and a part that does not follow."""
+        """Go on, slower where the wrist feels force, and give way aside; notice stops, and what jams."""
         xp, period = array_namespace(seen.tool), seen.world.control_period
         force, now = force_at_wrist(seen), self._value(seen)
-        tool, _ = self._command(seen, memory)
-        asked = self._law(seen).value(poses.multiply(tool, memory.grip))
+        asked = self._asked(seen, memory)
         share = poses.clip((HARD - force / self.force_limit) / (HARD - SOFT), 0.0, 1.0)
         if self.stops:
             here, next_one = (position(memory.path, memory.progress + dt) for dt in (0.0, period))
@@ -275,13 +303,18 @@ class OnJoint(ConceptModel[JointMemory]):
             share = xp.where(memory.felt > 0, xp.zeros_like(share), share)
         progress = memory.progress + period * share
         far = abs(asked - now) > BEHIND[self.turns]
-        against = self._against(seen, memory)
+        force_there, along = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3]), self._along(seen, memory)
+        aside = force_there - poses.dot(force_there, along)[:, None] * along
+        against = self._against(seen, memory, force_there, along)
+        minds = poses.clip(1.0 - UNFELT / poses.clip(poses.norm(aside), 1e-9, math.inf), 0.0, 1.0)
+        offset = poses.clip(memory.offset + (YIELDS * period * minds)[:, None] * aside, -MOST, MOST)
         ticks = xp.where(against > 1.5 * self.press, FELT + 0 * memory.felt, 1 + 0 * memory.felt)
         feels = against > self.press
         at_stop = abs(now - memory.goal) < NEAR[self.turns]
         felt = feels & at_stop if self.stops else xp.zeros_like(far)
         over = (progress >= memory.path.duration) | (share <= 0.0)
         return memory._replace(
+            offset=offset,
             progress=xp.minimum(progress, memory.path.duration),
             felt=xp.where(felt, memory.felt + ticks, xp.zeros_like(memory.felt)),
             behind=xp.where(far, memory.behind + period, xp.zeros_like(memory.behind)),
@@ -289,9 +322,14 @@ class OnJoint(ConceptModel[JointMemory]):
         )
 
     def command(self, action: Array, seen: Seen, memory: JointMemory) -> Command:
-        """Follow the path; the hand keeps its grip."""
-        tool, arm = self._command(seen, memory)
-        return Command(tool=tool, posture=arm)
+        """Follow the path, aside of it where the hand gives way; it keeps its grip."""
+        tool, arm = at_times(memory.path, memory.progress)
+        return Command(tool=poses.shifted(tool, memory.offset), posture=arm)
+
+    def _asked(self, seen: Seen, memory: JointMemory) -> Array:
+        """The value ``(N,)`` that the hand asks for now."""
+        tool, _ = at_times(memory.path, memory.progress)
+        return self._law(seen).value(poses.multiply(tool, memory.grip))
 
     def planned(self, memory: JointMemory) -> Array | float:
         """How long the way takes."""
@@ -300,9 +338,7 @@ class OnJoint(ConceptModel[JointMemory]):
     def limits(self, seen: Seen, memory: JointMemory) -> tuple[Limit, ...]:
         """The force at the wrist; a part that does not follow; one that stopped short."""
         names = {"object": self.target}
-        tool, _ = self._command(seen, memory)
-        now = self._value(seen)
-        asked = self._law(seen).value(poses.multiply(tool, memory.grip))
+        now, asked = self._value(seen), self._asked(seen, memory)
         off = abs(now - memory.goal)
         return (
             strain(seen, self.force_limit),

@@ -76,7 +76,7 @@ class _Scratch(Scratch):
     """
 
     def __init__(self) -> None:
-        self.solved: dict[tuple[bytes, bytes, bool, float], Array | None] = {}
+        self.solved: dict[tuple[bytes, bytes, bytes, float], Array | None] = {}
 
 
 class Arm:
@@ -133,33 +133,35 @@ class Arm:
         return found
 
     def joints(
-        self, tool: Array, start: Array, *, follow: bool = False, leans: float = LEANS
+        self, tool: Array, start: Array, *, towards: Array | None = None, leans: float = LEANS
     ) -> Array | None:
         """Joints ``(n_arm,)`` for a tool pose ``(7,)``; None where none are found from ``start``.
 
         Args:
             tool: The pose.
             start: Joints ``(n_arm,)`` to begin at.
-            follow: The arm is drawn towards its rest posture on the way, as it is when it follows commands.
+            towards: Joints ``(n_arm,)`` to which the arm is drawn a little, as it is to a posture when it
+                follows commands.
             leans: Radians by which the tool may be turned from the pose, by an arm of fewer than six joints.
         """
-        asked, solved = (tool.tobytes(), start.tobytes(), follow, leans), self._scratch.solved
+        drawn = b"" if towards is None else towards.tobytes()
+        asked, solved = (tool.tobytes(), start.tobytes(), drawn, leans), self._scratch.solved
         if asked not in solved:
             if len(solved) >= _KEPT:
                 solved.clear()
-            solved[asked] = self._solve(tool, start, follow, leans)
+            solved[asked] = self._solve(tool, start, towards, leans)
         found = solved[asked]
         return None if found is None else found.copy()
 
-    def _solve(self, tool: Array, start: Array, follow: bool, leans: float) -> Array | None:
+    def _solve(self, tool: Array, start: Array, towards: Array | None, leans: float) -> Array | None:
         """See `joints`."""
-        robot, target = self.robot, se3(tool)
+        target = se3(tool)
         q = np.minimum(np.maximum(start, self._lower), self._upper)
         if len(q) < FULL:
             return self._nearest(q, target, leans)
         pull = None
-        if follow:
-            pull = self._posture * (robot.rest - q)
+        if towards is not None:
+            pull = self._posture * (towards - q)
             pull *= _PULL_LIMIT / max(_largest(pull), _PULL_LIMIT)
         data, before = self._data, list[float]()
         for k in range(_ITERATIONS + 1):
@@ -242,22 +244,26 @@ class Arm:
             free = np.where(past, 0.0, 1.0 if free is None else free)
         return np.minimum(np.maximum(after, self._lower), self._upper)
 
-    def along(self, start: Array, tools: Array, leans: float = LEANS) -> Array | None:
+    def along(
+        self, start: Array, tools: Array, leans: float = LEANS, towards: Array | None = None
+    ) -> Array | None:
         """Joints ``(n, n_arm)`` that lead the tool through poses ``(n, 7)`` without a jump.
 
         Args:
             start: Joints ``(n_arm,)`` where the tool is before the first pose.
             tools: The poses, some centimetres apart at most.
             leans: As of `joints`, at the last of the poses; before that it may be more.
+            towards: Joints ``(n_arm,)`` to which the arm is drawn a little, by default those at rest.
 
         Returns:
             The joints; None where the arm cannot follow.
         """
         found, now = [], np.asarray(start)
+        drawn = self.robot.rest if towards is None else towards
         before = self.tool(now)
         for k, tool in enumerate(tools):
             most = max(leans, SWAYS) if k < len(tools) - 1 else leans
-            joints = self.joints(tool, now, follow=True, leans=most)
+            joints = self.joints(tool, now, towards=drawn, leans=most)
             if joints is None or not self._between(now, joints, before, tool):
                 return None
             now, before = joints, tool

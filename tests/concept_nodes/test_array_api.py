@@ -76,7 +76,9 @@ from bt_tasksim.concept_nodes import (
     Turn,
     TurnedLike,
     TurnKnob,
+    TurnOffStop,
     Turns,
+    TurnToStop,
     Upright,
     Wait,
     Withdraw,
@@ -116,6 +118,8 @@ OWN = {
     "close a door": DRAWER,
     "turn a knob": DRAWER,
     "hold turned": DRAWER,
+    "turn to a stop": DRAWER,
+    "turn off a stop": DRAWER,
     "press a button": ("press_button", ("button", "table")),
 }
 """Concepts that begin in no such scene: a scenario of their own, with its target and its place."""
@@ -163,6 +167,8 @@ def concepts(target="target", place="goal"):
         "press a button": PressButton.value(target),
         "turn a knob": TurnKnob.value(target, angle=0.1),
         "hold turned": HoldTurned.value(target),
+        "turn to a stop": TurnToStop.value(target),
+        "turn off a stop": TurnOffStop.value(target, angle=0.1),
         # What is there already needs no plan, which takes a second in each world.
         "push": Push.value(target, direction=(1.0, 0.0, 0.0), distance=0.01),
         "pull": Pull.value(target, direction=(-1.0, 0.0, 0.0), distance=0.01),

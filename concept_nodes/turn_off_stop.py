@@ -1,0 +1,54 @@
+"""TurnOffStop: turn a lever off the stop that it leans on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bt_tasksim.concept.contact import ContactChange, ContactState
+from bt_tasksim.concept.declared import ConditionOf
+from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, Radians
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.registry import register
+
+
+@register("concept")
+class TurnOffStop(OnJoint):
+    """Turn a lever, or anything that turns between stops, off the one that is nearer (OT to TR, rotation).
+
+    Args:
+        target: The lever.
+        angle: How far it is from that stop in the end.
+        speed: Peak speed of the tool.
+        press: Force against the motion by which a stop is felt.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    angle: Radians
+    speed: MetresPerSecond = 0.15
+    press: Newtons = 12.0
+    force_limit: Newtons = FORCE_LIMIT
+
+    turns = True
+    requires = (ConditionOf("Turns", target="target"),)
+    contact = ContactChange(ContactState.OT, ContactState.TR, "rotation")
+    presentation = Presentation(
+        colour="#b08fbf",
+        spoken=r"(?:turn|take).*off .*stop|(?:loosen|release).*lever",
+        sayings=("I turn the {} off its stop", "take the {} off the stop", "pull the {} back a bit"),
+    )
+
+    @classmethod
+    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
+        """How far."""
+        return f"by {float(parameters['angle']):.2f} rad" if "angle" in parameters else ""
+
+    def wanted(self, now: Array, limits: Array) -> Array:
+        """See `OnJoint.wanted`."""
+        xp, low, high = array_namespace(now), limits[:, 0], limits[:, 1]
+        from_low = xp.minimum(low + self.angle, high)
+        from_high = xp.maximum(high - self.angle, low)
+        return xp.where(now - low <= high - now, from_low, from_high)

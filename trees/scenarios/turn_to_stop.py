@@ -1,0 +1,30 @@
+"""Turn a lever onto its far stop, and let it go."""
+
+from __future__ import annotations
+
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept_nodes import Grasp, Release, TurnToStop
+from bt_tasksim.scene import FixtureSpec, Goal, Scene
+from bt_tasksim.trees import sequence
+
+
+def scene(robot: str = "panda") -> Scene:
+    """A lever on the top of a console or on its front; sizes, place and friction are drawn."""
+    stands = {"value": (0.0, 0.6), "heading": (-0.2, 0.2)}
+    return Scene(
+        robot,
+        fixtures=[FixtureSpec("lever", parameters=stands)],
+        goal=Goal("lever", relation="open"),
+        name="turn_to_stop",
+    )
+
+
+def build() -> Behaviour:
+    """The tree."""
+    return sequence(
+        "throw the lever",
+        Grasp("lever"),
+        TurnToStop("lever"),
+        Release("lever"),
+    )
