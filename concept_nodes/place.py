@@ -466,7 +466,7 @@ class Place(ConceptModel[PlaceMemory]):
         return (
             strain(seen, self.force_limit),
             Limit(NOT_THERE, missed, MISSED, names, counts=ended),
-            Limit(LEANS_ON, leans, most, names, counts=ended),
+            Limit(LEANS_ON, leans, most, names, counts=ended & ~seen.model(self.target).ball),
         )
 
     def done(self, seen: Seen, memory: PlaceMemory) -> Array:

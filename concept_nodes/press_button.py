@@ -45,8 +45,9 @@ PRESSING = Form(
 )
 AROUND = 12
 """Turns of the hand about the way of the button that are tried."""
-DEEPER = 0.012
-"""Metres beyond the stop to which the hand goes unless it feels it before."""
+DEEPER, YIELDING = 0.012, 0.035
+"""Metres beyond the stop to which the hand goes unless it feels it before: one of two fingers, or of more,
+which give way as they press."""
 TOUCHES, NEAR, GENTLY = 1.5, 0.006, 0.006
 """Newtons from which on the fist is at the button, metres before that from which on it is near, and metres a
 second at which it goes on then."""
@@ -146,6 +147,7 @@ class PressButton(ConceptModel[PressMemory]):
         own = np.array(model.joint.axis)
         axis = poses.rotate(np.array(model.joint.zero)[3:], own)
         low, high = model.joint.limits
+        deeper = YIELDING if view.robot.many_fingers else DEEPER
         top = pose[:3] - axis * float(np.abs(own) @ np.array(model.extent)) / 2
         hand = view.robot.hand_position(np.array([FIST]))
         tools = [np.concatenate([top - ahead, turn]) for turn, ahead in _fists(view.robot, hand, axis)]
@@ -159,7 +161,7 @@ class PressButton(ConceptModel[PressMemory]):
             why = ""
             for tool in tools:
                 before = poses.shifted(tool, -self.standoff * axis)
-                deep = poses.shifted(tool, (high - low + DEEPER) * axis)
+                deep = poses.shifted(tool, (high - low + deeper) * axis)
                 for start in coming.postures(before):
                     joints = on.arm.along(start, np.linspace(before, deep, 12)[1:])
                     if joints is None:
@@ -227,10 +229,11 @@ class PressButton(ConceptModel[PressMemory]):
         """The force at the wrist; and the fist is at the end of its way, and has felt no stop."""
         limits = seen.model(self.target).joints.limits
         most = limits[:, 1] - limits[:, 0]
+        deeper = YIELDING if seen.robot.many_fingers else DEEPER
         over = (memory.deepest >= 1.0) & (memory.felt < 2) & (self._against(seen, memory) < self.press)
         return (
             strain(seen, self.force_limit),
-            Limit(NO_STOP, most + DEEPER, most, {"object": self.target}, counts=over),
+            Limit(NO_STOP, most + deeper, most, {"object": self.target}, counts=over),
         )
 
     def done(self, seen: Seen, memory: PressMemory) -> Array:

@@ -53,6 +53,9 @@ NOTHING_UNDER_GOAL = register_reason(
     "{object} would be moved {aside} beyond the edge of what it stands on",
     aside=METRES,
 )
+ROLLS = register_reason(
+    "rolls_away", "{object} is a ball, which rolls away where it is pushed: take it in the hand, and bring it"
+)
 TIPS = register_reason(
     "tipped_as_moved", "{object} is tilted by {value}, more than {limit}", value=RADIANS, limit=RADIANS
 )
@@ -225,15 +228,16 @@ class Shove(ConceptModel[ShoveMemory]):
         return "'tool' is the target itself" if self.tool == self.target else ""
 
     def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
-        """The tool must be in the hand, or nothing; and the goal on the level of the thing."""
+        """The tool must be in the hand, or nothing; it is no ball, and its goal on its level."""
+        rolls = ROLLS.where(seen.model(self.target).ball, object=self.target)
         now, goal = seen.object(self.target), self._goal(seen)
         higher = abs(goal[:, 2] - now[:, 2])
         other = OTHER_HEIGHT.where(higher > LEVEL, object=self.target, value=higher)
         below, aside = self._beyond(seen, goal)
         nothing = NOTHING_UNDER_GOAL.where(below & (aside > 0.0), object=self.target, aside=aside)
         if self.tool is not None:
-            return not_held(seen, self.tool), other, nothing
-        return HAND_FULL.where(self._full(seen)), other, nothing
+            return not_held(seen, self.tool), rolls, other, nothing
+        return HAND_FULL.where(self._full(seen)), rolls, other, nothing
 
     def _beyond(self, seen: Seen, goal: Array) -> tuple[Array, Array]:
         """Booleans ``(N,)``: it stands on a place; and metres ``(N,)`` of the goal beyond that one's edge."""

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
@@ -21,6 +23,7 @@ from bt_tasksim.concept.parameters import (
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.concept_nodes.shoved_way import touching_now
 from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, not_level
 from bt_tasksim.concept_nodes.stops import nearest_stop, no_way_named, way_in, ways_in
 from bt_tasksim.concept_nodes.tipping import support_of
@@ -83,9 +86,9 @@ class SlideOff(Slid):
             return None
         along = way_in(view, self.target, self.direction, None)
         along = -stop.towards if along is None else along
-        there = poses.shifted(view.objects[self.target], self.distance * along)
-        supports = frozenset(support_of(view, self.target)[0])
-        return Aim(there[None], "be slid off a stop", supports, on_the_way=True)
+        ways = [poses.shifted(view.objects[self.target], share * self.distance * along) for share in SHARES]
+        supports = touching_now(view, self.target).union(support_of(view, self.target)[0])
+        return Aim(np.array(ways), "be slid off a stop", supports, along=True)
 
     def _ended(self, seen: Seen, memory: SlidMemory) -> Array:
         """It has come its way, and the tool is there."""
@@ -93,5 +96,7 @@ class SlideOff(Slid):
         return (memory.progress >= memory.path.duration) & (gone >= self.distance - self.tolerance)
 
 
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Shares of its way at which the arm has to be able to be."""
 NEAR = 0.02
 """Metres from a stop up to which it counts as standing against that when it is grasped."""

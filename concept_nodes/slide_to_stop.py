@@ -96,9 +96,10 @@ class SlideToStop(Slid):
         share = free_until(view, self.target, ABOVE * UP, self.distance * along)
         if share >= 1.0:
             return None
-        there = poses.shifted(view.objects[self.target], share * self.distance * along + ABOVE * UP)
+        now = poses.shifted(view.objects[self.target], ABOVE * UP)
+        way = [poses.shifted(now, part * share * self.distance * along) for part in SHARES]
         supports = self._touches(view).union(support_of(view, self.target)[0])
-        return Aim(there[None], "be slid against a stop", supports, on_the_way=True)
+        return Aim(np.array(way), "be slid against a stop", supports, along=True)
 
     def _until(self, view: WorldView, drop: float, way: Sequence[Array]) -> Sequence[Array]:
         """To where it meets something: the hand has to be clear of that."""
@@ -155,6 +156,8 @@ def _slow(memory: SlidMemory) -> Array:
     return xp.where(memory.clear > whole - BEFORE, whole, left)
 
 
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Shares of its way up to there at which the arm has to be able to be."""
 ABOVE = 0.003
 """Metres above its support at which it is looked at where it meets something."""
 BEFORE, CREEPS, PRESSES = 0.025, 0.015, 0.005

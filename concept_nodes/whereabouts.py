@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Hashable
 import numpy as np
 
 from bt_tasksim.concept.seen import Known, Seen
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.transfer import sent
 from bt_tasksim.core.world import ObjectModel
 from bt_tasksim.planning.things import box_corners
@@ -43,7 +43,11 @@ class Estimates(Whereabouts):
         """See `Whereabouts.body`."""
         pose, model = self._seen.object(name), self._seen.model(name)
         nan = array_namespace(pose).full_like(pose, np.nan)
-        there = array_namespace(pose).where(model.present[:, None], pose, nan)
+        xp = array_namespace(pose)
+        level = xp.zeros_like(pose[:, 3:]) + constant([1.0, 0.0, 0.0, 0.0], pose)
+        unturned = xp.concat([pose[:, :3], level], axis=-1)
+        pose = xp.where(model.ball[:, None], unturned, pose)
+        there = xp.where(model.present[:, None], pose, nan)
         return PlacedObject(there, self._known(name, _outer, (0.0, 0.0, 0.0)), model.cubic)
 
     def surface(self, name: str) -> LevelSurface:

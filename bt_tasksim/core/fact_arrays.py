@@ -43,6 +43,7 @@ class ObjectFacts(FactArrays):
         extent: Full nominal bounding-box size ``(..., 3)``, metres.
         revolved: Boolean ``(...)``: a body of revolution about z.
         cubic: Boolean ``(...)``: it looks the same on each of its faces.
+        ball: Boolean ``(...)``: it looks the same however it is turned.
         rotations: Rotations ``(..., most, 4)`` that bring it onto itself, in its own frame; the first one is
             the identity. Of a body of revolution only that.
         rotation_counts: Boolean ``(..., most)``: there is such a rotation.
@@ -64,6 +65,7 @@ class ObjectFacts(FactArrays):
     extent: Array
     revolved: Array
     cubic: Array
+    ball: Array
     rotations: Array
     rotation_counts: Array
     grasp_axes: Array

@@ -31,6 +31,7 @@ def object_facts(worlds: Sequence[WorldModel], names: Sequence[str]) -> ObjectFa
             shape
         ),
         cubic=np.array([m is not None and m.cubic for m in models], bool).reshape(shape),
+        ball=np.array([m is not None and m.symmetry == 0 and m.cubic for m in models], bool).reshape(shape),
         rotations=turned,
         rotation_counts=counts,
         grasp_axes=_padded(axes, shape, "grasp_axes")[0],

@@ -1,5 +1,6 @@
 """Drawers and doors: the hand goes along the joint, and refuses what it cannot do in one sentence."""
 
+import numpy as np
 import pytest
 from draws import successes
 from py_trees.common import Status
@@ -9,10 +10,15 @@ from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.concept_nodes.limits import WRIST_STRAINED
 from bt_tasksim.concept_nodes.on_joint import JAMMED, NOT_THERE
+from bt_tasksim.concept_nodes.press_button import AROUND, FIST, LEANS, LEVEL, _fists
+from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import NO_WAY
 from bt_tasksim.core.resources import asset
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
+from bt_tasksim.planning.bodies import bodies_of
+from bt_tasksim.planning.hand_collision import hand_pieces
+from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene
 from bt_tasksim.trees import same_tree, sequence, tidy, tree_from_xml, tree_to_xml
 from bt_tasksim.trees.load import load_source
@@ -93,3 +99,17 @@ def test_controls_are_worked(name):
     source = load_source(name)
     (result,) = successes(Runner(source.build(), source.scene, EngineOptions()).run, range(3, 6), n=1)
     assert result.status == Status.SUCCESS and result.verdict.penetration < 0.002
+
+
+@pytest.mark.parametrize("robot", ["panda", "xarm7_ability"])
+def test_the_front_of_a_fist_that_leans_is_where_the_button_is(robot):
+    robot, axis = load_robot(robot), np.array([0.6, 0.0, -0.8])
+    hand = robot.hand_position(np.array([FIST]))
+    corners = np.concatenate(hand_pieces(bodies_of(robot), hand))
+    found = list(_fists(robot, hand, axis))
+    assert len(found) == AROUND * (1 + 2 * len(LEANS))
+    for k, (rotation, ahead) in enumerate(found):
+        lean = [0.0, *LEANS][(k + AROUND) // (2 * AROUND)]
+        assert poses.z_axis(rotation) @ axis == pytest.approx(np.cos(lean))
+        reach = (poses.rotate(rotation, corners) @ axis).max()
+        assert ahead @ axis == pytest.approx(reach, abs=LEVEL if k >= AROUND else 0.02)

@@ -15,6 +15,7 @@ from bt_tasksim.concept_nodes.shove import (
     NOTHING_UNDER_GOAL,
     OTHER_HEIGHT,
     PASSED_BY,
+    ROLLS,
 )
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
@@ -24,6 +25,7 @@ from bt_tasksim.core.world import Obstacle
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.relations.base import lean
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import Goal, ObjectSpec, SpotSpec
 from bt_tasksim.trees import retry
@@ -108,6 +110,16 @@ def test_a_goal_beyond_the_edge_or_on_another_level_is_refused(toy, leaf, reason
     stage = toy(leaf)
     assert stage.tick() == Status.FAILURE
     assert stage.tree.outcome.is_a(CANNOT_START) and stage.tree.outcome.is_a(reason)
+
+
+def test_a_ball_is_not_pushed():
+    scene = Scene(
+        objects={"it": ObjectSpec(kinds=("ball",), on="table")}, goal=Goal("it", "table", relation="anywhere")
+    )
+    result = Runner(Push("it", direction=(0.0, 1.0, 0.0), distance=0.1), scene).run(3)
+    assert result.outcome.is_a(CANNOT_START) and result.outcome.is_a(ROLLS)
+    turned = poses.from_rotation_vector(np.array([0.4, 0.3, 0.0]))
+    assert lean(turned, result.configuration.objects[0].true_model()) == 0.0, "it cannot lean"
 
 
 def test_what_is_there_already_is_left_alone(toy):

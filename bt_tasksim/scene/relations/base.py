@@ -140,8 +140,9 @@ class _Truth(Whereabouts):
 
     def body(self, name: str) -> PlacedObject:
         """See `Whereabouts.body`."""
-        cubic = np.array([self._final.model(name).cubic])
-        return PlacedObject(self._final.pose(name)[None], self._final.shape(name).outer[None], cubic)
+        model, pose = self._final.model(name), self._final.pose(name)
+        pose = poses.pose(pose[:3]) if _is_ball(model) else pose
+        return PlacedObject(pose[None], self._final.shape(name).outer[None], np.array([model.cubic]))
 
     def surface(self, name: str) -> LevelSurface:
         """See `Whereabouts.surface`."""
@@ -198,11 +199,16 @@ class GoalRelation(abc.ABC):
 
 def lean(rotation: Array, model: ObjectModel) -> float:
     """Angle in radians between upright and ``rotation (4,)``; any face of a cubic object may be down."""
-    return float(leaning(rotation[None], np.array([model.cubic]))[0])
+    return 0.0 if _is_ball(model) else float(leaning(rotation[None], np.array([model.cubic]))[0])
 
 
 def turn(rotation: Array, model: ObjectModel) -> float:
     """Smallest angle in radians from no rotation at all to ``rotation (4,)``, over an object's symmetries."""
     if model.symmetry == 0:
-        return float(poses.tilt(rotation))
+        return 0.0 if _is_ball(model) else float(poses.tilt(rotation))
     return float(poses.angle_between(rotation[None], rotations(model)).min())
+
+
+def _is_ball(model: ObjectModel) -> bool:
+    """It looks the same however it is turned."""
+    return model.cubic and model.symmetry == 0
