@@ -95,12 +95,13 @@ def clear_draw(
             raise NoDrawError(
                 _sentence(seed, f"the fixture '{fixture.name}'", found, robot, "put it elsewhere")
             )
-    for name in (actor.name for actor in world.objects):
-        found = object_in_robot(links, world, name)
+    for actor in world.objects:
+        found = object_in_robot(links, world, actor.name)
         if found.depth > TOUCHING:
-            raise NoDrawError(
-                _sentence(seed, f"'{name}'", found, robot, "draw it from an area beside the robot")
-            )
+            remedy = "draw it from an area beside the robot"
+            if actor.joint is not None:
+                remedy = f"put '{actor.joint.fixture}' elsewhere, or draw it less open"
+            raise NoDrawError(_sentence(seed, f"'{actor.name}'", found, robot, remedy))
     return world
 
 

@@ -31,6 +31,17 @@ def test_an_object_or_furniture_in_the_robot_is_no_draw():
         clear_draw(inside, 3, "evaluation", PANDA)
 
 
+def test_a_drawer_that_opens_into_the_robot_is_no_draw():
+    shut, opened = (
+        Scene(fixtures=[Fixture("drawer", at=(0.30, 0.0), parameters={"opens": 0.2, "value": value})])
+        for value in (0.0, 0.2)
+    )
+    clear_draw(shut, 3, "evaluation", PANDA)
+    remedy = "put 'drawer' elsewhere, or draw it less open"
+    with pytest.raises(NoDrawError, match=WITHIN.format("'drawer'") + f".*{remedy}"):
+        clear_draw(opened, 3, "evaluation", PANDA)
+
+
 def test_what_stands_beside_it_is_as_drawn_and_a_hand_elsewhere_is_not_asked(monkeypatch):
     scene = Scene(objects={"far": FAR}, fixtures=["shelf"])
     assert clear_draw(scene, 3, "evaluation", PANDA).to_json() == scene.sample(3).to_json()

@@ -12,7 +12,9 @@ from bt_tasksim.planning.surroundings import (
     pieces_of,
     things_of,
 )
+from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.shapes import ShapeSize, object_model
+from bt_tasksim.scene.specs import FixtureSpec
 
 
 @pytest.fixture
@@ -69,3 +71,17 @@ def test_what_stands_on_another_object_is_not_adrift_and_beside_it_it_is(world):
     assert not adrift(things_of(world, {"a": on, "b": below}), ["a", "b"])
     assert adrift(things_of(world, {"a": beside, "b": below}), ["a", "b"]) == {"a"}
     assert not adrift(things_of(world, {"a": beside, "b": below}), [])
+
+
+def test_a_drawer_stands_in_the_way_as_far_as_it_is_open_and_a_hand_may_reach_into_it():
+    drawn = Scene(fixtures=[FixtureSpec("drawer", parameters={"value": 0.15, "opens": 0.2})]).sample(2)
+    (part,) = drawn.objects
+    *_, drawer = things_of(drawn.world_model(["l", "r"], 0.08), {"drawer": np.array(part.pose)})
+    boxes = [(np.min(c, axis=0), np.max(c, axis=0)) for c in drawer.pieces]
+    assert drawer.margin == CLEAR_OF_OBJECTS and len(boxes) == len(part.boxes)
+    for box in part.boxes:
+        middle = np.array(box.pose[:3])
+        assert any(np.all((low < middle) & (middle < high)) for low, high in boxes)
+    low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+    within = (low + high) / 2
+    assert not any(np.all((low < within) & (within < high)) for low, high in boxes)
