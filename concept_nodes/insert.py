@@ -64,8 +64,9 @@ STUCK, LITTLE = 0.35, 0.0005
 BACK, QUICKLY = 0.003, 0.06
 """Metres that it draws back before it tries another place, and metres a second."""
 GENTLY, SLOWLY, LIGHTLY = 0.008, 0.4, 0.5
-"""Metres before the mouth from which on it comes more slowly until it is in the hole, at what share of the
-usual speed, and with what share of the usual force: an arm that meets an edge at 40 mm/s strains itself."""
+"""Metres before the mouth, or before where it has jammed, from which on it comes more slowly until it is
+beyond that, at what share of the usual speed, and with what share of the usual force: an arm that meets an
+edge at 40 mm/s strains itself."""
 ASIDE = 0.02
 """Metres a second at which it goes from one place to the next."""
 YIELDS, MOST = 0.0004, 0.004
@@ -91,6 +92,7 @@ class InsertMemory(NamedTuple):
         way: Metres ``(N,)`` from `start` that it is told to be.
         offset: Metres ``(N, 3)`` aside of there.
         back: Metres ``(N,)`` from `start` to which it draws back; infinite where it comes on.
+        jammed: Metres ``(N,)`` from `start` at which it jammed, where it was deepest; 0 where it has not.
         tried: How many places about the mouth were tried ``(N,)``.
         best: Metres ``(N,)`` that it was seen to have come.
         stuck: Seconds ``(N,)`` since it came on.
@@ -111,6 +113,7 @@ class InsertMemory(NamedTuple):
     way: Array
     offset: Array
     back: Array
+    jammed: Array
     tried: Array
     best: Array
     stuck: Array
@@ -212,6 +215,7 @@ class Insert(ConceptModel[InsertMemory]):
             way=nothing,
             offset=xp.zeros_like(inward),
             back=nothing + math.inf,
+            jammed=nothing,
             tried=nothing,
             best=nothing,
             stuck=nothing,
@@ -265,9 +269,11 @@ class Insert(ConceptModel[InsertMemory]):
         retreat = xp.maximum(memory.way - QUICKLY * period, back)
         drawn = there & (retreat <= back)
         one = 0.0 * come + 1.0
-        outside = come <= memory.mouth + BACK
+        # Where it has jammed it comes as carefully as to the mouth.
+        edge = xp.maximum(memory.mouth, memory.jammed)
+        outside = come <= edge + BACK
         press = self.press * xp.where(outside, LIGHTLY * one, one)
-        feed = self.feed * xp.where(outside & (come > memory.mouth - GENTLY), SLOWLY * one, one)
+        feed = self.feed * xp.where(outside & (come > edge - GENTLY), SLOWLY * one, one)
         rate = feed * poses.clip(1.0 - self._push(force, weight, memory) / press, -1.0, 1.0)
         fed = xp.where(feeds, xp.minimum(memory.way + period * rate, memory.full + SLIPS), memory.way)
         draws = xp.isfinite(back)
@@ -283,6 +289,7 @@ class Insert(ConceptModel[InsertMemory]):
             way=poses.clip(xp.where(draws, retreat, fed), 0.0, math.inf),
             offset=offset,
             back=xp.where(draws & drawn, xp.full_like(back, math.inf), back),
+            jammed=xp.where(jams, xp.maximum(come, memory.jammed), memory.jammed),
             tried=tried,
             best=xp.where(draws, come, xp.where(on, come, memory.best)),
             stuck=xp.where(jams, xp.zeros_like(stuck), stuck),
