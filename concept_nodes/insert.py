@@ -26,6 +26,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.insertion import places_to_try
+from bt_tasksim.concept_nodes.insertion_edges import Edges, away, edges_of, held_up_at, wrench_of
 from bt_tasksim.concept_nodes.insertion_way import ROWS, STANDOFF, WayIn, ends_in, sides_of, way_in
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
@@ -59,6 +60,10 @@ NEAR = 0.006
 """Metres from where it should end at which a push that is felt is that of the stop."""
 SLIPS = 0.03
 """Metres that it may slip back in the hand as it is pushed in."""
+FEELS = 12.0
+"""Places to which it goes by what the wrist feels, before others are tried about the last of them."""
+FAR, TURNED = 0.006, math.radians(4.0)
+"""Metres aside, and radians about the way in, as far as it goes by that."""
 STUCK, LITTLE = 0.35, 0.0005
 """Seconds in which it has come on by less than so many metres where it jams."""
 BACK, QUICKLY = 0.003, 0.06
@@ -86,11 +91,15 @@ class InsertMemory(NamedTuple):
         full: Metres ``(N,)`` from there to where it should end.
         lies: How it lies in the hand ``(N, 7)``, as seen from where it seems to be.
         grip: The tool's pose ``(N, 7)`` in the object.
-        weight: Force ``(N, 3)`` at rest before the mouth, N, robot base frame.
+        weight: Force and torque ``(N, 6)`` at the tool at rest before the mouth, robot base frame.
+        edges: The hole in which it goes, see `Edges`.
         begun: Booleans ``(N,)``: it goes in.
         lines: Booleans ``(N,)``: it has come before the mouth, and is lined up with it.
         way: Metres ``(N,)`` from `start` that it is told to be.
         offset: Metres ``(N, 3)`` aside of there.
+        centre: Metres ``(N, 3)`` aside of there, about which places are tried.
+        turn: Radians ``(N,)`` about the way in by which it is turned.
+        felt: How hard, and where, it was held up since it jammed last, see `held_up_at`.
         back: Metres ``(N,)`` from `start` to which it draws back; infinite where it comes on.
         jammed: Metres ``(N,)`` from `start` at which it jammed, where it was deepest; 0 where it has not.
         tried: How many places about the mouth were tried ``(N,)``.
@@ -108,10 +117,14 @@ class InsertMemory(NamedTuple):
     lies: Array
     grip: Array
     weight: Array
+    edges: Edges
     begun: Array
     lines: Array
     way: Array
     offset: Array
+    centre: Array
+    turn: Array
+    felt: Array
     back: Array
     jammed: Array
     tried: Array
@@ -124,8 +137,9 @@ class Insert(ConceptModel[InsertMemory]):
     """Push a held object into a hole (makes contact: NC to OP).
 
     The object is brought before the mouth, turned as it fits, the least way round, and goes straight in, the
-    slower the more the wrist feels. Where it jams it draws back a little and tries another place about the
-    mouth. It ends at the hole's stop, or as deep as is asked.
+    slower the more the wrist feels. Where it jams it draws back a little and goes away from the edge that the
+    wrist has felt, and then tries other places about the mouth. It ends at the hole's stop, or as deep as is
+    asked.
 
     Args:
         target: The held object.
@@ -209,11 +223,15 @@ class Insert(ConceptModel[InsertMemory]):
             full=full,
             lies=lies,
             grip=poses.relative(held, seen.tool),
-            weight=xp.zeros_like(inward),
+            weight=xp.concat([xp.zeros_like(inward)] * 2, axis=-1),
+            edges=edges_of(seen, self.target, self.into, end),
             begun=nothing > 1.0,
             lines=nothing > 1.0,
             way=nothing,
             offset=xp.zeros_like(inward),
+            centre=xp.zeros_like(inward),
+            turn=nothing,
+            felt=xp.zeros((worlds, 4), dtype=like.dtype, device=like.device) + 0.0 * full[:, None],
             back=nothing + math.inf,
             jammed=nothing,
             tried=nothing,
@@ -249,7 +267,8 @@ class Insert(ConceptModel[InsertMemory]):
     def advance(self, action: Array, seen: Seen, memory: InsertMemory) -> InsertMemory:
         """Line up and weigh before the mouth; then come on as the wrist allows, and search where it jams."""
         xp, period = array_namespace(seen.tool), seen.world.control_period
-        force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+        wrench = wrench_of(seen)
+        force = wrench[:, :3]
         now = self._now(seen, memory)
         come = poses.dot(now[:, :3] - memory.start[:, :3], memory.inward)
         rested = seen.elapsed - memory.path.duration - SETTLE
@@ -257,14 +276,24 @@ class Insert(ConceptModel[InsertMemory]):
         turned = poses.angle_between(now[:, 3:], memory.start[:, 3:])
         lined = (off < LINED[0]) & (turned < LINED[1]) | (rested > LINING)
         begins = (rested >= 0.0) & lined & ~memory.begun
-        weight = xp.where(begins[:, None], force, memory.weight)
+        weights = xp.where(begins[:, None], wrench, memory.weight)
+        weight = weights[:, :3]
         feeds = memory.begun & ~xp.isfinite(memory.back)
         on = come > memory.best + LITTLE
         stuck = xp.where(on | ~feeds, xp.zeros_like(come), memory.stuck + period)
         jams = feeds & (stuck > STUCK) & (come < memory.full - NEAR)
         tried = xp.where(jams, memory.tried + 1.0, memory.tried)
+        felt = memory.felt + held_up_at(seen.tool, now, wrench - weights, memory.inward, memory.edges)
+        felt = xp.where(feeds[:, None], felt, memory.felt)
+        aside, turn = away(felt, memory.inward, memory.edges)
+        feels = jams & (tried <= FEELS)
+        centre = xp.where(feels[:, None], memory.centre + aside, memory.centre)
+        turn = xp.where(feels, memory.turn + turn, memory.turn)
         back = xp.where(jams, xp.maximum(come - BACK, 0.0 * come), memory.back)
-        offset, there = self._aside(force - weight, come, tried, memory, period, places_to_try(seen.robot))
+        memory = memory._replace(centre=poses.clip(centre, -FAR, FAR), turn=poses.clip(turn, -TURNED, TURNED))
+        places = places_to_try(seen.robot)
+        spiral = poses.clip(tried - FEELS, 0.0, math.inf)
+        offset, there = self._aside(force - weight, come, spiral, memory, period, places)
         # As it is told to be, it is deeper than it can be where it jams.
         retreat = xp.maximum(memory.way - QUICKLY * period, back)
         drawn = there & (retreat <= back)
@@ -283,7 +312,8 @@ class Insert(ConceptModel[InsertMemory]):
         gain = xp.where(free, GAIN * one, 0.0 * one)
         return memory._replace(
             grip=poses.interpolate(memory.grip, self._regripped(now, come, memory), gain),
-            weight=weight,
+            weight=weights,
+            felt=xp.where(jams[:, None], xp.zeros_like(felt), felt),
             begun=memory.begun | begins,
             lines=rested >= 0.0,
             way=poses.clip(xp.where(draws, retreat, fed), 0.0, math.inf),
@@ -297,7 +327,10 @@ class Insert(ConceptModel[InsertMemory]):
 
     def _told(self, memory: InsertMemory) -> Array:
         """Poses ``(N, 7)`` where the object is told to be."""
-        return poses.shifted(memory.start, memory.way[:, None] * memory.inward + memory.offset)
+        xp, start = array_namespace(memory.start), memory.start
+        turn = poses.from_rotation_vector(memory.turn[:, None] * memory.inward)
+        start = xp.concat([start[:, :3], poses.quat_multiply(turn, start[:, 3:])], axis=-1)
+        return poses.shifted(start, memory.way[:, None] * memory.inward + memory.offset)
 
     def _regripped(self, now: Array, come: Array, memory: InsertMemory) -> Array:
         """The tool's pose ``(N, 7)`` in the object by which this would come to where it is told to be.
@@ -319,7 +352,7 @@ class Insert(ConceptModel[InsertMemory]):
         index = xp.astype(poses.clip(tried, 0.0, len(places) - 1.0), xp.int64)
         table = constant(places, force)
         goal = xp.stack([xp.take(table[:, k], index) for k in (0, 1)], axis=-1)
-        wanted = goal[:, :1] * memory.sides[:, 0, :] + goal[:, 1:] * memory.sides[:, 1, :]
+        wanted = goal[:, :1] * memory.sides[:, 0, :] + goal[:, 1:] * memory.sides[:, 1, :] + memory.centre
         step, most = wanted - memory.offset, ASIDE * period
         length = poses.norm(step)
         share = xp.minimum(most / xp.maximum(length, xp.zeros_like(length) + 1e-9), xp.ones_like(length))
@@ -353,13 +386,13 @@ class Insert(ConceptModel[InsertMemory]):
         names = {"object": self.target, "place": self.into}
         return (
             strain(seen, self.force_limit),
-            Limit(JAMMED, memory.tried, float(len(places_to_try(seen.robot))), names),
+            Limit(JAMMED, memory.tried, FEELS + float(len(places_to_try(seen.robot))), names),
         )
 
     def done(self, seen: Seen, memory: InsertMemory) -> Array:
         """It is where it should end, or near it and at the stop."""
         force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
-        stops = self._push(force, memory.weight, memory) > 0.5 * self.press
+        stops = self._push(force, memory.weight[:, :3], memory) > 0.5 * self.press
         missing = self._missing(seen, memory)
         return memory.begun & ((missing <= self.tolerance) | (stops & (missing <= NEAR)))
 
