@@ -13,6 +13,7 @@ from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array, array_namespace, constant
+from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.planning.route import Pace, Route
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Held, Leave
@@ -24,6 +25,8 @@ ROOMS = (CARRIED, BROUGHT, TOUCHING)
 """How much closer than usual one may come to things, tried one after the other."""
 OTHERS, POSTURES = 8, 4
 """Ways round in which it may go in, and postures before the mouth, that are tried."""
+HELD_BY = 0.015
+"""Metres of what is in a hole by which fingers hold it, at least."""
 ROWS = 33
 """Poses straight in for which joints are computed."""
 
@@ -99,7 +102,26 @@ def way_in(
         nearest = min(good, key=lambda joints: float(abs(joints[0] - route.joints[-1]).max()))
         return WayIn(route, nearest, start, end, poses.relative(seen, held))
 
-    return with_room(itertools.product(ROOMS, ends), find)
+    try:
+        return with_room(itertools.product(ROOMS, ends), find)
+    except NoWayError as error:
+        if short := _too_short(view, target, hole, ends, share):
+            raise NoWayError(f"{target} cannot be pushed into {into}: {short}") from error
+        raise
+
+
+def _too_short(view: WorldView, target: str, hole: PlaceModel, ends: Array, share: float) -> str:
+    """That nothing would stick out of a hole by which a hand could hold it; empty where some does."""
+    out = poses.z_axis(np.asarray(hole.pose)[3:])
+    corners = np.concatenate(pieces_of(view.model(target)))
+    reach = max(float((poses.rotate(end[3:], corners) @ out).max() + end[:3] @ out) for end in ends)
+    sticks = reach - float(np.asarray(hole.pose)[:3] @ out) - hole.height
+    if sticks >= HELD_BY:
+        return ""
+    return (
+        f"only {1000 * max(sticks, 0.0):.0f} mm of it would stick out for the fingers: push it in less far "
+        f"(share={max(0.0, share - (HELD_BY - sticks) / hole.height):.1f})"
+    )
 
 
 def _why_not(finder: WayFinder, inside: WayFinder, tools: Array) -> str:

@@ -29,6 +29,8 @@ DIRECTIONS = 16
 BEFORE, FARTHEST = 0.3, 0.03
 """Share of the opening's half width by which the lip is on this side of its middle, and metres at most: what
 rolls over a lip falls a little beyond it."""
+NARROWEST = 0.045
+"""Metres of an opening that what is poured hits for certain."""
 CLEARANCE = 0.025
 """Metres that the vessel's lowest point is above the other one's rim."""
 
@@ -128,7 +130,7 @@ def tilts(view: WorldView, target: str, into: str, most: float, height: float) -
         height: Metres that its lip is then above the rim.
 
     Raises:
-        NoWayError: One of the two has no hollow.
+        NoWayError: One of the two has no hollow, or the other one's opening is too narrow.
     """
     model = view.model(target)
     boxes = np.zeros((0, 6)) if model.solid is None else model.solid.hollow
@@ -136,6 +138,11 @@ def tilts(view: WorldView, target: str, into: str, most: float, height: float) -
         raise NoWayError(f"nothing can be poured out of {target}: it has no hollow with walls all around")
     assert model.solid is not None
     outer, mouth = model.solid.outer, mouth_of(view, into)
+    if 2 * mouth.half < NARROWEST:
+        raise NoWayError(
+            f"the opening of {into} is {2000 * mouth.half:.0f} mm wide, and what falls out of {target} needs "
+            f"{1000 * NARROWEST:.0f} mm: take a wider one"
+        )
     now = view.objects[target]
     headings = [2 * math.pi * k / DIRECTIONS for k in range(DIRECTIONS)]
     found = [
