@@ -69,15 +69,23 @@ KINDS: dict[str, Maker] = {}
 """What makes a chore of each kind."""
 IN_FRONT: set[str] = set()
 """Kinds that need a slot in front of the robot."""
+NEEDED: dict[str, tuple[Slot, ...]] = {}
+"""Which other slots a kind needs for itself: for a place beside its furniture, or for a door that swings."""
 
 
-def kind(front: bool = False) -> Callable[[Maker], Maker]:
-    """A decorator that announces a kind by the name of what makes it."""
+def kind(front: bool = False, needs: tuple[Slot, ...] = ()) -> Callable[[Maker], Maker]:
+    """A decorator that announces a kind by the name of what makes it.
+
+    Args:
+        front: See `IN_FRONT`.
+        needs: See `NEEDED`.
+    """
 
     def announce(make: Maker) -> Maker:
         KINDS[make.__name__] = make
         if front:
             IN_FRONT.add(make.__name__)
+        NEEDED[make.__name__] = needs
         return make
 
     return announce

@@ -9,8 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from py_trees.behaviour import Behaviour
 
-from benchmarks.chores import carrying, opening, pushing  # noqa: F401  # which announce their kinds
-from benchmarks.chores.chore import IN_FRONT, KINDS, SLOTS, Chore
+from benchmarks.chores import (  # noqa: F401  # which announce their kinds
+    carrying,
+    fetching,
+    opening,
+    pushing,
+    turning,
+)
+from benchmarks.chores.chore import IN_FRONT, KINDS, NEEDED, SLOTS, Chore
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.scene import Scene
 from bt_tasksim.trees import recovering, sequence
@@ -48,7 +54,12 @@ class Task:
         """
         chores = self.chores if order is None else [self.chores[k] for k in order]
         tree = sequence("chores", *(leaf for chore in chores for leaf in chore.leaves()))
-        return recovering(tree) if kind == "recovering" else tree
+        if kind != "recovering":
+            return tree
+        try:
+            return recovering(tree)
+        except InputError:  # nothing tells whether any of it is done, as with buttons alone
+            return tree
 
 
 def task(seed: int, robot: str = "panda", kinds: Sequence[str] = ()) -> Task:
@@ -77,13 +88,13 @@ def task(seed: int, robot: str = "panda", kinds: Sequence[str] = ()) -> Task:
 
 def _drawn(seed: int, robot: str, known: Sequence[str], rng: np.random.Generator) -> Task:
     count = int(rng.integers(1, MOST + 1))
-    slots = [SLOTS[k] for k in rng.permutation(len(SLOTS))[:count]]
-    chores = []
-    for slot in slots:
+    wanted = []
+    for slot in (SLOTS[k] for k in rng.permutation(len(SLOTS))[:count]):
         fitting = [name for name in known if slot.front or name not in IN_FRONT]
-        if not fitting:
-            continue
-        chores.append(KINDS[str(rng.choice(fitting))](slot, rng))
+        if fitting:
+            wanted.append((slot, str(rng.choice(fitting))))
+    taken = [slot for _, name in wanted for slot in NEEDED[name]]
+    chores = [KINDS[name](slot, rng) for slot, name in wanted if slot not in taken]
     if not chores:
         raise InputError("none of these kinds of chores fits the part of the table that was drawn")
     scene = Scene(

@@ -13,15 +13,18 @@ from bt_tasksim.concept_nodes import (
     Grasp,
     OpenDoor,
     OpenDrawer,
+    PressButton,
     Release,
+    TurnKnob,
 )
 from bt_tasksim.scene import FixtureSpec, Goal
+from bt_tasksim.scene.specs import Parameter
 
 TURNED = 0.15
 """Radians by which furniture is turned from facing the robot, at most."""
 
 
-def _furniture(slot: Slot, made: str, name: str, rng: np.random.Generator, **sizes: float) -> FixtureSpec:
+def furniture(slot: Slot, made: str, name: str, rng: np.random.Generator, **sizes: Parameter) -> FixtureSpec:
     """A piece of furniture that faces the robot from a slot, or nearly so."""
     x, y = slot.centre
     turn = float(rng.uniform(-TURNED, TURNED))
@@ -38,7 +41,7 @@ def open_drawer(slot: Slot, rng: np.random.Generator) -> Chore:
         f"{name} by {far:.2f} m",
         lambda: [Grasp(name), OpenDrawer(name, distance=far), Release(name)],
         [Goal(name, relation="open", value=far - 0.01)],
-        fixtures=[_furniture(slot, "drawer", name, rng)],
+        fixtures=[furniture(slot, "drawer", name, rng)],
     )
 
 
@@ -51,7 +54,7 @@ def close_drawer(slot: Slot, rng: np.random.Generator) -> Chore:
         f"{name}, open by {value:.2f} m",
         lambda: [Grasp(name), CloseDrawer(name), Release(name)],
         [Goal(name, relation="shut")],
-        fixtures=[_furniture(slot, "drawer", name, rng, value=value)],
+        fixtures=[furniture(slot, "drawer", name, rng, value=value)],
     )
 
 
@@ -65,7 +68,7 @@ def adjust_drawer(slot: Slot, rng: np.random.Generator) -> Chore:
         f"{name} from {value:.2f} to {wanted:.2f} m",
         lambda: [Grasp(name), AdjustDrawer(name, distance=wanted), Release(name)],
         [Goal(name, relation="set", value=wanted, position_tolerance=0.015)],
-        fixtures=[_furniture(slot, "drawer", name, rng, value=value)],
+        fixtures=[furniture(slot, "drawer", name, rng, value=value)],
     )
 
 
@@ -78,7 +81,7 @@ def open_door(slot: Slot, rng: np.random.Generator) -> Chore:
         f"{name} by {far:.2f} rad",
         lambda: [Grasp(name), OpenDoor(name, angle=far), Release(name)],
         [Goal(name, relation="open", value=far - 0.05)],
-        fixtures=[_furniture(slot, "door", name, rng)],
+        fixtures=[furniture(slot, "door", name, rng)],
     )
 
 
@@ -91,7 +94,7 @@ def close_door(slot: Slot, rng: np.random.Generator) -> Chore:
         f"{name}, open by {value:.2f} rad",
         lambda: [Grasp(name), CloseDoor(name), Release(name)],
         [Goal(name, relation="shut")],
-        fixtures=[_furniture(slot, "door", name, rng, value=value)],
+        fixtures=[furniture(slot, "door", name, rng, value=value)],
     )
 
 
@@ -105,5 +108,31 @@ def adjust_door(slot: Slot, rng: np.random.Generator) -> Chore:
         f"{name} from {value:.2f} to {wanted:.2f} rad",
         lambda: [Grasp(name), AdjustDoor(name, angle=wanted), Release(name)],
         [Goal(name, relation="set", value=wanted, angle_tolerance=0.08)],
-        fixtures=[_furniture(slot, "door", name, rng, value=value)],
+        fixtures=[furniture(slot, "door", name, rng, value=value)],
+    )
+
+
+@kind()
+def press(slot: Slot, rng: np.random.Generator) -> Chore:
+    """A button on a console."""
+    name = f"{slot.name}_button"
+    return Chore(
+        "press",
+        name,
+        lambda: [PressButton(name)],
+        [Goal(name, relation="open", when="once")],
+        fixtures=[furniture(slot, "button", name, rng)],
+    )
+
+
+@kind()
+def turn_knob(slot: Slot, rng: np.random.Generator) -> Chore:
+    """By 40 to 100 degrees."""
+    name, far = f"{slot.name}_knob", round(float(rng.uniform(0.7, 1.7)), 2)
+    return Chore(
+        "turn_knob",
+        f"{name} by {far:.2f} rad",
+        lambda: [Grasp(name), TurnKnob(name, angle=far), Release(name)],
+        [Goal(name, relation="set", value=far, angle_tolerance=0.08)],
+        fixtures=[furniture(slot, "knob", name, rng)],
     )

@@ -6,8 +6,19 @@ import numpy as np
 
 from benchmarks.chores.carrying import thing
 from benchmarks.chores.chore import Chore, Slot, kind
-from bt_tasksim.concept_nodes import Grasp, Insert, Pick, Place, Pull, Push, Release, Slide
-from bt_tasksim.scene import FixtureSpec, Goal, SpotSpec
+from bt_tasksim.concept_nodes import (
+    Grasp,
+    Insert,
+    Pick,
+    Place,
+    Pull,
+    Push,
+    Release,
+    Slide,
+    SlideOff,
+    SlideToStop,
+)
+from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, SpotSpec
 from bt_tasksim.trees import retry
 
 
@@ -75,4 +86,35 @@ def insert(slot: Slot, rng: np.random.Generator) -> Chore:
         [Goal(peg, f"{block}_hole", relation="inserted", position_tolerance=0.01)],
         {peg: thing(slot, -0.09, "peg", wide=0.02)},
         [FixtureSpec("peg_block", at=(x, y + 0.08), area=(0.01, 0.01), yaw=(-0.4, 0.4), name=block)],
+    )
+
+
+@kind(front=True)
+def slide_to_stop(slot: Slot, rng: np.random.Generator) -> Chore:
+    """Along a board against its rim, and off that again."""
+    block, ledge = f"{slot.name}_block", f"{slot.name}_ledge"
+    lies = ObjectSpec(
+        kinds=("box", "cube"),
+        on=ledge,
+        centre=(-0.01, 0.0),
+        area=(0.05, 0.10),
+        yaw=0.3,
+        size=((0.042, 0.042, 0.045), (0.055, 0.060, 0.075)),
+    )
+    return Chore(
+        "slide_to_stop",
+        f"{block} against {ledge}, and off it",
+        lambda: [
+            Grasp(block, closing=(0.0, 1.0, 0.0)),
+            SlideToStop(block, direction=(1.0, 0.0, 0.0), distance=0.25, against=ledge),
+            SlideOff(block, direction=(-1.0, 0.0, 0.0), distance=0.08),
+            Place(block, anywhere=True),
+            Release(block),
+        ],
+        [
+            Goal(block, ledge, relation="held_against", when="once"),
+            Goal(block, ledge, relation="anywhere"),
+        ],
+        {block: lies},
+        [FixtureSpec("ledge", at=(0.54, 0.0), area=(0.02, 0.02), name=ledge)],
     )
