@@ -11,6 +11,7 @@ from py_trees.behaviour import Behaviour
 
 from benchmarks.chores import (  # noqa: F401  # which announce their kinds
     carrying,
+    controls,
     fetching,
     opening,
     pushing,

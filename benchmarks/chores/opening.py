@@ -13,9 +13,7 @@ from bt_tasksim.concept_nodes import (
     Grasp,
     OpenDoor,
     OpenDrawer,
-    PressButton,
     Release,
-    TurnKnob,
 )
 from bt_tasksim.scene import FixtureSpec, Goal
 from bt_tasksim.scene.specs import Parameter
@@ -112,27 +110,14 @@ def adjust_door(slot: Slot, rng: np.random.Generator) -> Chore:
     )
 
 
-@kind()
-def press(slot: Slot, rng: np.random.Generator) -> Chore:
-    """A button on a console."""
-    name = f"{slot.name}_button"
+@kind(front=True)
+def open_panel(slot: Slot, rng: np.random.Generator) -> Chore:
+    """Aside, by 8 to 14 cm."""
+    name, far = f"{slot.name}_panel", round(float(rng.uniform(0.08, 0.14)), 3)
     return Chore(
-        "press",
-        name,
-        lambda: [PressButton(name)],
-        [Goal(name, relation="open", when="once")],
-        fixtures=[furniture(slot, "button", name, rng)],
-    )
-
-
-@kind()
-def turn_knob(slot: Slot, rng: np.random.Generator) -> Chore:
-    """By 40 to 100 degrees."""
-    name, far = f"{slot.name}_knob", round(float(rng.uniform(0.7, 1.7)), 2)
-    return Chore(
-        "turn_knob",
-        f"{name} by {far:.2f} rad",
-        lambda: [Grasp(name), TurnKnob(name, angle=far), Release(name)],
-        [Goal(name, relation="set", value=far, angle_tolerance=0.08)],
-        fixtures=[furniture(slot, "knob", name, rng)],
+        "open_panel",
+        f"{name} by {far:.2f} m",
+        lambda: [Grasp(name), OpenDrawer(name, distance=far), Release(name)],
+        [Goal(name, relation="open", value=far - 0.01)],
+        fixtures=[furniture(slot, "panel", name, rng)],
     )
