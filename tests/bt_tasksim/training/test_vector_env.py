@@ -136,7 +136,7 @@ def vector_of(toy_engines):
 @pytest.mark.parametrize("longest", [30.0, 0.6])
 @pytest.mark.parametrize("tree", TREES.values(), ids=list(TREES))
 def test_rollouts_are_those_of_an_environment_of_their_own(env_of, batch_of, tree, longest):
-    tasks = [task(k) for k in range(4)]
+    tasks = [task(k, decisions=24) for k in range(4)]
     expected = []
     try:
         expected = [as_bytes(alone(env_of(tree(), longest=longest), t)) for t in tasks]
@@ -145,8 +145,7 @@ def test_rollouts_are_those_of_an_environment_of_their_own(env_of, batch_of, tre
             batched(batch_of(tree(), worlds=3, longest=longest), tasks)
         assert str(caught.value).startswith(str(error).split("draws")[0])
         return
-    for worlds in (1, 5):
-        assert batched(batch_of(tree(), worlds=worlds, longest=longest), tasks) == expected
+    assert batched(batch_of(tree(), worlds=5, longest=longest), tasks) == expected
     again = batch_of(tree(), worlds=2, longest=longest)
     assert batched(again, tasks[::-1])[::-1] == expected
     assert batched(again, tasks) == expected, "and the same worlds once more"
