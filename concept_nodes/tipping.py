@@ -69,7 +69,7 @@ RAISED = 0.003
 """Metres above that to which it is brought where the arm cannot lead it over an edge."""
 TURN = 0.7
 """Radians a second at which it is tipped."""
-YIELDS, SOFTLY = 1.5, 0.005
+YIELDS, SOFTLY = 1.0, 0.015
 """N beyond those at the begin from which on what is tipped gives way upwards; and metres a second for each N
 above that: at a lever of a tenth of a metre a few newtons turn a thing between two fingers."""
 DOWN, DEEPEST = 0.015, 0.010
