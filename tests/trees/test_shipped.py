@@ -53,9 +53,9 @@ def test_it_succeeds_and_is_recorded_shown_replayed_and_demonstrated(name, tmp_p
     page = report_page(run, runner.tree)
     assert all(leaf.name in page for leaf in leaves)
     shown, labels = as_person(run, recorder.nodes, seed=1)
-    done = {leaf for leaf in leaves if leaf.status == Status.SUCCESS}
-    assert len(shown.time) > 20
-    assert {concept_name(type(leaf.model)) for leaf in done} <= {label.concept for label in labels}
+    done = {label.concept for label in labels}
+    assert len(shown.time) > 20 and done <= {concept_name(type(leaf.model)) for leaf in leaves}
+    assert done, "something took its time and succeeded"
 
     recorder.write(tmp_path / "run.h5", result)
     again = replay(tmp_path / "run.h5", until=None if name in WHOLE else FIRST)
