@@ -11,6 +11,7 @@ from bt_tasksim.concept_nodes.arrangement import Beside, Clear, Inside, StandsOn
 from bt_tasksim.concept_nodes.bring import Bring
 from bt_tasksim.concept_nodes.close_door import CloseDoor
 from bt_tasksim.concept_nodes.close_drawer import CloseDrawer
+from bt_tasksim.concept_nodes.close_lid import CloseLid
 from bt_tasksim.concept_nodes.conditions import AtPose, Holding, TimePassed, Upright
 from bt_tasksim.concept_nodes.extract import Extract
 from bt_tasksim.concept_nodes.grasp import Grasp
@@ -24,6 +25,7 @@ from bt_tasksim.concept_nodes.joint_conditions import IsOpen, IsShut, JointAt, S
 from bt_tasksim.concept_nodes.lay_down import LayDown
 from bt_tasksim.concept_nodes.open_door import OpenDoor
 from bt_tasksim.concept_nodes.open_drawer import OpenDrawer
+from bt_tasksim.concept_nodes.open_lid import OpenLid
 from bt_tasksim.concept_nodes.orientation import Oriented, PointingUp
 from bt_tasksim.concept_nodes.pick import Pick
 from bt_tasksim.concept_nodes.place import Place
@@ -57,6 +59,8 @@ __all__ = [
     "PressedOn",
     "PressButton",
     "TurnKnob",
+    "OpenLid",
+    "CloseLid",
     "TurnOffStop",
     "TurnToStop",
     "CloseDoor",

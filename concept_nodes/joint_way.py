@@ -28,6 +28,13 @@ ASTRAY = 0.002
 SPARE = 0.1
 """Radians that the joints keep from their limits on a way that a grasp is chosen for: hands close, and
 postures drift, a little otherwise than was planned."""
+PIVOTS = (0.0, 0.5, 1.0)
+"""Shares of its turn that a part may make between the fingers, where they close along its axis: who lifts a
+lid by its edge need not turn the hand over."""
+LOOKS = 5
+"""Places on the way at which it is looked at whether the arm meets a part that turns so in its hand."""
+PARALLEL, FAR = 0.95, 0.03
+"""Cosine between closing axis and joint's from which it may, and metres from that one at least."""
 ABOUT = 0.01
 """Metres above and beside a part within which the middle of what stands in or on it may be."""
 
@@ -74,11 +81,61 @@ class JointWay:
         apart = [self._target, *self.carried]
         return view.finder(apart, held=held, leave=Leave(held=self.beside), closer=closer, hand=hand)
 
-    def tools(self, tool: Array, parts: Array) -> Array:
-        """Tool poses ``(n, 7)`` for poses ``(n, 7)`` of the part, by where the tool holds it now."""
+    def alone(self, closer: float) -> WayFinder:
+        """Ways of an arm in whose hand the part turns, so that it does not go along with the hand."""
+        return self._view.finder([self._target, *self.carried], closer=closer)
+
+    def tools(self, tool: Array, parts: Array, pivot: float = 0.0) -> Array:
+        """Tool poses ``(n, 7)`` for poses ``(n, 7)`` of the part, by where the tool holds it now.
+
+        Args:
+            tool: Where the tool is now ``(7,)``.
+            parts: The part's poses.
+            pivot: Share of its turn that the part makes in the hand, see `PIVOTS`.
+        """
         grip = poses.relative(self._view.objects[self._target], tool)
-        found: Array = poses.multiply(parts, grip[None])
-        return found
+        return pivoted(poses.multiply(parts, grip[None]), axis_of(self._view, self._target), pivot)
+
+
+def axis_of(view: WorldView, target: str) -> Array:
+    """Unit vector ``(3,)`` along a part's joint, robot base frame."""
+    joint = view.model(target).joint
+    assert joint is not None, "it is a part of furniture"
+    found: Array = poses.rotate(np.array(joint.zero)[3:], np.array(joint.axis))
+    return found
+
+
+def pivots(view: WorldView, target: str, tool: Array) -> tuple[float, ...]:
+    """Which of `PIVOTS` are possible for a hand that holds a part at a tool pose ``(7,)``."""
+    joint, axis = view.model(target).joint, axis_of(view, target)
+    assert joint is not None
+    if not joint.turns or abs(float(poses.to_matrix(tool[3:])[:, 1] @ axis)) < PARALLEL:
+        return PIVOTS[:1]
+    lever = tool[:3] - poses.transform(np.array(joint.zero), np.array(joint.origin))
+    return PIVOTS if float(np.linalg.norm(lever - (lever @ axis) * axis)) > FAR else PIVOTS[:1]
+
+
+def pivoted(tools: Array, axis: Array, share: float) -> Array:
+    """Tool poses ``(n, 7)`` of a hand that turns less about an axis ``(3,)`` than the part that it holds."""
+    if not share:
+        return tools
+    turns = poses.quat_multiply(tools[:, 3:], poses.quat_conjugate(tools[:1, 3:]))
+    angles = np.unwrap(poses.rotation_vector(turns) @ axis)
+    back = poses.from_rotation_vector(-share * angles[:, None] * axis)
+    return np.concatenate([tools[:, :3], poses.quat_multiply(back, tools[:, 3:])], axis=-1)
+
+
+def keeps_clear(view: WorldView, target: str, parts: Array, joints: Array, hand: Array | None = None) -> bool:
+    """Whether the arm does not meet a part at poses ``(n, 7)`` with its joints ``(n, n_arm)`` there.
+
+    Its hand may, since it holds the part.
+    """
+    for k in np.linspace(0, len(parts) - 1, LOOKS).astype(int):
+        there = view._replace(objects={target: parts[k]})
+        finder = there.finder(leave=Leave(hand={target}), closer=1.0, hand=hand, taken=target, palm=False)
+        if not finder.collisions.free(joints[k]):
+            return False
+    return True
 
 
 def gone_along(finder: WayFinder, start: Array, tools: Array, spare: float = 0.0) -> Array | None:

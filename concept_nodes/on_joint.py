@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
@@ -16,7 +17,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING, VERY_CLOSE, with_room
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
 from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
-from bt_tasksim.concept_nodes.joint_way import JointWay, gone_anyhow
+from bt_tasksim.concept_nodes.joint_way import JointWay, gone_anyhow, keeps_clear, pivots
 from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
@@ -69,7 +70,7 @@ BEYOND = {False: 0.008, True: math.radians(2.5)}
 """Metres or radians beyond the stop to which the hand goes unless it feels it before."""
 BEHIND = {False: 0.04, True: math.radians(10.0)}
 """Metres or radians by which a part may be behind the hand."""
-PATIENCE = 1.0
+PATIENCE, LATE = 1.0, 2.5
 """Seconds for which it may be farther behind, and after the way's end until which it may come there."""
 SLOWLY = 0.016
 """Metres of the hand's way before a stop from which on it goes no faster than `GENTLY`."""
@@ -88,6 +89,11 @@ YIELDS, UNFELT, MOST = 3e-5, 3.0, 0.012
 """Metres a second for each newton from aside with which the hand gives way, newtons that it does not mind,
 and metres that it gives way at most: no hinge is quite where it is taken to be. Where an arm is near to the
 end of its reach, its drives resist a step with up to 500 N/mm: any faster, it would swing."""
+RELAXES = 1.0
+"""Share of what the tool is held aside of where it is told to be, in which it gives way in a second: where an
+arm is soft, that is more than what `YIELDS` says."""
+PUSHES = 2.0
+"""Share of what is missing at the way's end that the hand goes on in a second: arms give way to friction."""
 TOLERANCE = {False: 0.004, True: math.radians(1.5)}
 """Metres or radians within which a value counts as reached."""
 ACCELERATION = 0.4
@@ -107,6 +113,9 @@ class JointMemory(NamedTuple):
         path: Tool path along the joint.
         grip: Pose ``(N, 7)`` of the part in the tool frame.
         goal: Value ``(N,)`` that is wanted, metres or radians.
+        begun: Value ``(N,)`` when it began.
+        start: Where the tool was then ``(N, 3)``.
+        pivots: Booleans ``(N,)``: the part turns between the fingers, as `joint_way.PIVOTS` says.
         offset: Metres ``(N, 3)`` by which the hand has given way aside, robot base frame.
         progress: Seconds ``(N,)`` of the path that have been commanded.
         felt: Ticks ``(N,)`` in a row with the stop's force.
@@ -117,6 +126,9 @@ class JointMemory(NamedTuple):
     path: Path
     grip: Array
     goal: Array
+    begun: Array
+    start: Array
+    pivots: Array
     offset: Array
     progress: Array
     felt: Array
@@ -178,13 +190,16 @@ class OnJoint(ConceptModel[JointMemory]):
         found = [self._way(view, values[k], goals[k]) for k, view in enumerate(views(seen))]
         path = plan([seen.tool], self.speed, samples=SAMPLES)
         path = with_routes(
-            path, {k: [route] for k, (_, route) in enumerate(found)}, len(seen.robot.arm_joints)
+            path, {k: [route] for k, (_, route, _) in enumerate(found)}, len(seen.robot.arm_joints)
         )
         nothing = xp.zeros_like(path.duration)
         return JointMemory(
             path=path,
             grip=poses.relative(seen.tool, seen.object(self.target)),
-            goal=poses.constant(np.array([goal for goal, _ in found]), now),
+            goal=poses.constant(np.array([goal for goal, _, _ in found]), now),
+            begun=now,
+            start=seen.tool[:, :3],
+            pivots=poses.constant(np.array([pivot for _, _, pivot in found]), seen.contacts),
             offset=0.0 * seen.tool[:, :3],
             progress=nothing,
             felt=xp.astype(nothing, xp.int64),
@@ -192,25 +207,31 @@ class OnJoint(ConceptModel[JointMemory]):
             late=nothing,
         )
 
-    def _way(self, view: WorldView, now: float, goal: float) -> tuple[float, Route]:
-        """The value at the end, and the motion, in one world."""
+    def _way(self, view: WorldView, now: float, goal: float) -> tuple[float, Route, bool]:
+        """The value at the end, the motion, and whether the part turns in the hand, in one world."""
         if view.model(self.target).joint is None:
             raise NoWayError(NO_PART(object=self.target).sentence)
         way, shares = JointWay(view, self.target), SHARES if self.wholly else SHARES[:1]
         pace = Pace(self.speed, TURN, ACCELERATION)
 
-        def find(asked: tuple[float, float]) -> tuple[float, Route]:
-            share, closer = asked
+        def find(asked: tuple[float, float, float]) -> tuple[float, Route, bool]:
+            share, closer, pivot = asked
             end = now + share * (goal - now)
             beyond = self.stops * BEYOND[self.turns] if share == 1.0 else 0.0
-            finder = way.finder(view.tool, closer)
-            tools = way.tools(view.tool, way.poses(now, end + beyond))
-            joints = gone_anyhow(finder, tools)
+            parts = way.poses(now, end + beyond)
+            finder = way.alone(closer) if pivot else way.finder(view.tool, closer)
+            joints = gone_anyhow(finder, way.tools(view.tool, parts, pivot))
             if joints is None:
                 raise NoWayError(self._why_not(way, finder, view, now, end))
-            return end, followed(finder.arm, np.concatenate([finder.start[None], joints]), pace)
+            if pivot and not keeps_clear(view, self.target, parts, joints[-len(parts) :]):
+                raise NoWayError(
+                    f"the arm would meet {self.target} as it turns in the hand: take it otherwise"
+                )
+            return end, followed(finder.arm, np.concatenate([finder.start[None], joints]), pace), pivot > 0.0
 
-        return with_room(((share, closer) for share in shares for closer in ROOMS), find)
+        turning = pivots(view, self.target, view.tool)
+        asked = itertools.product(shares, ROOMS, turning)
+        return with_room(asked, find)
 
     def _why_not(self, way: JointWay, finder: WayFinder, view: WorldView, now: float, end: float) -> str:
         """What would be touched, or how far the arm can go along, in one sentence."""
@@ -255,6 +276,13 @@ class OnJoint(ConceptModel[JointMemory]):
     def _value(self, seen: Seen) -> Array:
         """How far ``(N,)`` the part is taken to be open."""
         return self._law(seen).value(seen.object(self.target))
+
+    def _missing(self, seen: Seen, memory: JointMemory) -> Array:
+        """The way ``(N, 3)`` of the tool that is left to the wanted value, metres."""
+        law = self._law(seen)
+        ends = (law.pose(value) for value in (memory.goal, self._value(seen)))
+        there, here = (poses.multiply(end, poses.inverse(memory.grip))[:, :3] for end in ends)
+        return there - here
 
     def _along(self, seen: Seen, memory: JointMemory) -> Array:
         """Unit vectors ``(N, 3)`` in which the tool goes now; shorter where it turns about itself."""
@@ -307,7 +335,15 @@ class OnJoint(ConceptModel[JointMemory]):
         aside = force_there - poses.dot(force_there, along)[:, None] * along
         against = self._against(seen, memory, force_there, along)
         minds = poses.clip(1.0 - UNFELT / poses.clip(poses.norm(aside), 1e-9, math.inf), 0.0, 1.0)
-        offset = poses.clip(memory.offset + (YIELDS * period * minds)[:, None] * aside, -MOST, MOST)
+        behind = (
+            seen.tool[:, :3] - poses.shifted(at_times(memory.path, memory.progress)[0], memory.offset)[:, :3]
+        )
+        behind = behind - poses.dot(behind, along)[:, None] * along
+        give = (period * minds)[:, None] * (YIELDS * aside + RELAXES * behind)
+        short = self._missing(seen, memory) * PUSHES * period
+        at_end = (memory.late > 0.0) & (share > 0.0) & (self.stops == 0)
+        give = xp.where(at_end[:, None], give + short, give)
+        offset = poses.clip(memory.offset + give, -MOST, MOST)
         ticks = xp.where(against > 1.5 * self.press, FELT + 0 * memory.felt, 1 + 0 * memory.felt)
         feels = against > self.press
         at_stop = abs(now - memory.goal) < NEAR[self.turns]
@@ -329,7 +365,10 @@ class OnJoint(ConceptModel[JointMemory]):
     def _asked(self, seen: Seen, memory: JointMemory) -> Array:
         """The value ``(N,)`` that the hand asks for now."""
         tool, _ = at_times(memory.path, memory.progress)
-        return self._law(seen).value(poses.multiply(tool, memory.grip))
+        law, xp = self._law(seen), array_namespace(seen.tool)
+        held = law.value(poses.multiply(tool, memory.grip))
+        gone = memory.begun + law.shift(memory.begun, memory.start, tool[:, :3])
+        return xp.where(memory.pivots, gone, held)
 
     def planned(self, memory: JointMemory) -> Array | float:
         """How long the way takes."""
@@ -343,7 +382,7 @@ class OnJoint(ConceptModel[JointMemory]):
         return (
             strain(seen, self.force_limit),
             Limit(JAMMED[self.turns], abs(asked - now), BEHIND[self.turns], names, memory.behind >= PATIENCE),
-            Limit(NOT_THERE[self.turns], off, TOLERANCE[self.turns], names, memory.late >= PATIENCE),
+            Limit(NOT_THERE[self.turns], off, TOLERANCE[self.turns], names, memory.late >= LATE),
         )
 
     def done(self, seen: Seen, memory: JointMemory) -> Array:

@@ -30,6 +30,7 @@ from bt_tasksim.concept_nodes import (
     ClearOf,
     CloseDoor,
     CloseDrawer,
+    CloseLid,
     Emptied,
     Extract,
     Grasp,
@@ -51,6 +52,7 @@ from bt_tasksim.concept_nodes import (
     OnEnd,
     OpenDoor,
     OpenDrawer,
+    OpenLid,
     Oriented,
     OutOf,
     Over,
@@ -119,6 +121,8 @@ OWN = {
     "turn a knob": DRAWER,
     "hold turned": DRAWER,
     "turn to a stop": DRAWER,
+    "open a lid": DRAWER,
+    "close a lid": DRAWER,
     "turn off a stop": DRAWER,
     "press a button": ("press_button", ("button", "table")),
 }
@@ -168,6 +172,8 @@ def concepts(target="target", place="goal"):
         "turn a knob": TurnKnob.value(target, angle=0.1),
         "hold turned": HoldTurned.value(target),
         "turn to a stop": TurnToStop.value(target),
+        "open a lid": OpenLid.value(target, angle=0.1),
+        "close a lid": CloseLid.value(target),
         "turn off a stop": TurnOffStop.value(target, angle=0.1),
         # What is there already needs no plan, which takes a second in each world.
         "push": Push.value(target, direction=(1.0, 0.0, 0.0), distance=0.01),

@@ -15,7 +15,7 @@ def scene(robot: str = "panda") -> Scene:
     return Scene(
         robot,
         fixtures=[FixtureSpec("valve", parameters=stands)],
-        goal=Goal("valve", relation="set", value=1.2, angle_tolerance=0.08),
+        goal=Goal("valve", relation="set", value=1.2, angle_tolerance=0.1),
         name="turn_valve",
     )
 

@@ -1,0 +1,35 @@
+"""OpenLid: lift a lid by what the hand holds of it."""
+
+from __future__ import annotations
+
+from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, Radians
+from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT
+from bt_tasksim.concept_nodes.open_door import OpenDoor
+from bt_tasksim.core.registry import register
+
+
+@register("concept")
+class OpenLid(OpenDoor):
+    """Turn a lid up, off its stop, by the handle in the hand (OP to PR): a door about a level axis.
+
+    Args:
+        target: The lid.
+        angle: How far it is open in the end, from where it is shut; by default all the way. What is open by
+            less than upright falls shut when it is let go.
+        speed: Peak speed of the tool.
+        press: Force against the motion by which a stop is felt.
+        force_limit: Force at the wrist at which the task is broken off.
+    """
+
+    target: ObjectName
+    angle: Radians | None = None
+    speed: MetresPerSecond = 0.15
+    press: Newtons = 12.0
+    force_limit: Newtons = FORCE_LIMIT
+
+    presentation = Presentation(
+        colour="#5f8f4f",
+        spoken=r"(?:open|lift|raise).*(?:lid|cover)",
+        sayings=("I open the {}", "lift the {}", "now raise the {}"),
+    )

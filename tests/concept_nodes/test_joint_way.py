@@ -1,0 +1,30 @@
+"""The hand's way along a joint: what may turn between the fingers, and where the tool stays."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bt_tasksim.concept_nodes.joint_way import pivoted
+from bt_tasksim.core import poses
+from bt_tasksim.core.joints import JointModel, Joints
+
+UP = np.array([0.0, 0.0, 1.0])
+angles = st.floats(-2.5, 2.5).filter(lambda a: abs(a) > 0.05)
+
+
+def led(angle, n=40):
+    """Tool poses of a hand that holds something 0.3 m from a hinge, and the hinge's angles."""
+    model = JointModel("hinge", (0.0, 0.3, 0.0), (0.0, 0.0, 1.0), (0.5, 0.0, 0.2, 1, 0, 0, 0), (-3.0, 3.0))
+    values = np.linspace(0.0, angle, n)
+    return Joints.of([model]).pose(values), values
+
+
+@given(angles, st.floats(0.0, 1.0))
+def test_what_turns_in_the_hand_is_led_the_same_way(angle, share):
+    tools, values = led(angle)
+    found = pivoted(tools, UP, share)
+    assert found[:, :3] == pytest.approx(tools[:, :3])
+    turned = poses.angle_between(found[:1, 3:], found[:, 3:])
+    assert turned == pytest.approx((1.0 - share) * abs(values), abs=1e-6)
+    assert found[0] == pytest.approx(tools[0])

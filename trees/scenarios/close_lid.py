@@ -1,0 +1,40 @@
+"""Turn a lid that stands open down onto its box, and let it go."""
+
+from __future__ import annotations
+
+from py_trees.behaviour import Behaviour
+
+from bt_tasksim.concept_nodes import CloseLid, Grasp, Release
+from bt_tasksim.scene import FixtureSpec, Goal, Scene
+from bt_tasksim.trees import sequence
+
+
+def scene(robot: str = "panda") -> Scene:
+    """A box whose lid is open; sizes, place, handle and friction are drawn."""
+    return Scene(
+        robot,
+        fixtures=[
+            FixtureSpec(
+                "lidded_box",
+                parameters={
+                    "x": (0.40, 0.44),
+                    "length": (0.16, 0.19),
+                    "opens": 1.95,
+                    "value": 1.95,
+                    "heading": (-0.2, 0.2),
+                },
+            )
+        ],
+        goal=Goal("lid", relation="shut"),
+        name="close_lid",
+    )
+
+
+def build() -> Behaviour:
+    """The tree."""
+    return sequence(
+        "close the lid",
+        Grasp("lid"),
+        CloseLid("lid"),
+        Release("lid"),
+    )
