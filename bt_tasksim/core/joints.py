@@ -13,10 +13,38 @@ from typing import NamedTuple
 import numpy as np
 
 from bt_tasksim.core import poses
+from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.poses import Array, array_namespace
 
 SLIDES, TURNS = "slide", "hinge"
 KINDS = (SLIDES, TURNS)
+LONGEST = {SLIDES: 2.0, TURNS: 6.0}
+"""Metres or radians that a part can go at most; of what turns nearly round, estimates would not tell one end
+from the other."""
+
+
+def check_way(kind: str, limits: tuple[float, float], value: tuple[float, float]) -> None:
+    """Check what a part can do.
+
+    Args:
+        kind: ``slide`` or ``hinge``.
+        limits: Lowest and highest value, m or rad.
+        value: Lowest and highest value at the start.
+
+    Raises:
+        InputError: The limits are in no order or too far apart, or the part begins beyond them.
+    """
+    (low, high), unit = limits, "m" if kind == SLIDES else "rad"
+    if not low < high:
+        raise InputError(f"'limits' should be the lower one first, found {low:g} and {high:g}")
+    if high - low > LONGEST[kind]:
+        raise InputError(f"'limits' should be at most {LONGEST[kind]:g} {unit} apart, found {high - low:g}")
+    if not low <= value[0] <= value[1] <= high:
+        said = f"{value[0]:g}" if value[0] == value[1] else f"{value[0]:g} to {value[1]:g}"
+        raise InputError(
+            f"'value', how far it is open at the start, should be between {low:g} and {high:g} {unit}, the "
+            f"lower one first, found {said}"
+        )
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Fixtures from URDF and MJCF files: links on one joint each become parts, and all others stand still.
 
-MuJoCo reads what is in the text alone; nothing that a file names is opened.
+MuJoCo reads links, joints and shapes alone: all else is left out of the text before, or refused by its name.
+So nothing that a file names is opened, and nothing makes many of one.
 """
 
 from __future__ import annotations
@@ -23,8 +24,22 @@ HANDLES = ("handle", "knob", "grip")
 """What the name of a link or of a shape contains by which two fingers may hold the part."""
 WIDEST = 0.07
 """Metres up to which two fingers are taken to hold something."""
-_UNLIMITED = math.pi
-_FILES = {"file", "filename", "meshdir", "texturedir", "assetdir"}
+UNLIMITED = 3.0
+"""Radians either way between which a hinge without limits turns: one that goes round would have no value."""
+MOST = 5000
+"""Elements that a file may have."""
+_URDF = (
+    "robot link joint collision inertial origin mass inertia geometry box cylinder sphere axis parent child "
+    "limit dynamics"
+)
+_MJCF = "mujoco compiler default asset material worldbody body frame joint freejoint geom inertial"
+_READ = {"robot": frozenset(_URDF.split()), "mujoco": frozenset(_MJCF.split())}
+"""Elements that are read, by the root's name."""
+_URDF_SEEN = "visual material gazebo transmission ros2_control mujoco safety_controller calibration"
+_MJCF_SEEN = "visual statistic option size sensor actuator keyframe custom light camera site texture contact"
+_LEFT_OUT = {"robot": frozenset(_URDF_SEEN.split()), "mujoco": frozenset(_MJCF_SEEN.split())}
+"""Those that do not matter for furniture, and are left out."""
+_NAMES_FILE = {"mesh", "include", "model", "plugin", "hfield", "skin"}
 
 
 def articulated(path: Path) -> dict[str, Plain]:
@@ -62,14 +77,23 @@ def _root(path: Path) -> Element:
         raise InputError(f"fixture file '{path}' is no XML that can be read: {error}") from None
     if root.tag not in ("robot", "mujoco"):
         raise InputError(f"fixture file '{path}' is neither URDF nor MJCF: its root is '{shown(root.tag)}'")
+    if sum(1 for _ in root.iter()) > MOST:
+        raise InputError(f"fixture file '{path}' has more than {MOST} elements: make a simpler model of it")
     for parent in root.iter():
-        for child in [c for c in parent if c.tag == "visual" and root.tag == "robot"]:
+        for child in [c for c in parent if c.tag in _LEFT_OUT[root.tag]]:
             parent.remove(child)
     for element in root.iter():
-        if element.tag in ("include", "model", "plugin") or _FILES & element.attrib.keys():
+        element.attrib.pop("texture", None)
+        files = [name for name in element.attrib if name.startswith("file") or name.endswith("dir")]
+        if element.tag in _NAMES_FILE or files:
             raise InputError(
                 f"fixture file '{path}': '{shown(element.tag)}' names another file, and a fixture's shapes "
                 f"are boxes and cylinders: put these in place of meshes"
+            )
+        if element.tag not in _READ[root.tag]:
+            raise InputError(
+                f"fixture file '{path}': furniture is made of links, joints and shapes, and "
+                f"'{shown(element.tag)}' is none of them: leave it out, or write out what it makes"
             )
     for limit in root.iter("limit"):
         if _number(limit.get("lower")) > _number(limit.get("upper")):
@@ -139,18 +163,22 @@ class _Reader:
             raise self._error(f"the joint of '{name}' slides without limits: give it some")
         qpos, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
         zero = float(model.qpos0[qpos])
-        limits = [float(v) - zero for v in model.jnt_range[joint]]
+        limited = bool(model.jnt_limited[joint])
+        low, high = (float(v) - zero for v in model.jnt_range[joint]) if limited else (-UNLIMITED, UNLIMITED)
+        way = -1.0 if low < 0.0 and high <= 0.0 else 1.0  # values grow as it opens, from where it is shut
+        if way < 0.0:
+            low, high = -high, -low
         return {
             "name": name,
             "joint": kind,
-            "axis": self.data.xaxis[joint].tolist(),
+            "axis": (way * self.data.xaxis[joint]).tolist(),
             "origin": self.data.xanchor[joint].tolist(),
-            "limits": limits if model.jnt_limited[joint] else [-_UNLIMITED, _UNLIMITED],
+            "limits": [low, high],
             "friction": float(model.dof_frictionloss[dof]),
             "damping": float(np.ravel(model.dof_damping[dof])[0]),
             "stiffness": float(np.ravel(model.jnt_stiffness[joint])[0]),
-            "rest": float(model.qpos_spring[qpos]) - zero,
-            "value": min(max(0.0, limits[0]), limits[1]) if model.jnt_limited[joint] else 0.0,
+            "rest": way * (float(model.qpos_spring[qpos]) - zero),
+            "value": min(max(0.0, low), high),
             "boxes": [],
             "grasps": [],
         }
@@ -165,7 +193,8 @@ class _Reader:
         kinds, kind = self.mujoco.mjtGeom, int(self.model.geom_type[geom])
         size, at = self.model.geom_size[geom], self._placed(geom)
         colour: list[Plain] = [float(v) for v in np.clip(self.model.geom_rgba[geom][:3], 0.0, 1.0)]
-        if kind == kinds.mjGEOM_PLANE:
+        seen_only = not (self.model.geom_contype[geom] or self.model.geom_conaffinity[geom])
+        if kind == kinds.mjGEOM_PLANE or seen_only:
             return []
         if kind == kinds.mjGEOM_BOX:
             placed = [(at, 2 * size)]

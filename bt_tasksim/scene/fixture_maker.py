@@ -17,7 +17,8 @@ from bt_tasksim.scene.fixtures import Fixture
 
 NOMINAL = 0.5
 """Share of each range at which a fixture stands for all that may be drawn."""
-_CORNERS = (0.0, 1.0, NOMINAL)
+CORNERS = 32
+"""Corners of what parameters leave open that are tried, besides those where all are low, or high."""
 _USUAL = "usual"
 
 
@@ -76,13 +77,15 @@ class FixtureMaker(Model):
 
     @classmethod
     def check(cls, name: str, parameters: Mapping[str, Any]) -> None:
-        """Check that what parameters leave open can be made at its ends, and in its middle.
+        """Check that what parameters leave open can be made in its middle, and where each is at an end.
 
         Raises:
             FieldError: See `fixture`.
         """
-        for share in _CORNERS:
-            cls._made(name, parameters, [share] * len(cls.model_fields))
+        count = len(cls.model_fields)
+        corners = np.random.default_rng(0).integers(2, size=(CORNERS, count)).astype(float)
+        for shares in ([0.0] * count, [1.0] * count, [NOMINAL] * count, *corners.tolist()):
+            cls._made(name, parameters, shares)
 
     @classmethod
     def _made(cls, name: str, parameters: Mapping[str, Any], shares: list[float]) -> Fixture:

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from bt_tasksim.core.joints import check_way
 from bt_tasksim.core.typed_file import (
     Direction,
     Extent2,
@@ -136,16 +137,8 @@ class PartEntry(Model):
 
     @model_validator(mode="after")
     def _within_limits(self) -> PartEntry:
-        low, high = self.limits
-        if not low < high:
-            raise ValueError(f"'limits' should be the lower one first, found {low:g} and {high:g}")
-        most = 2.0 if self.joint == "slide" else 6.3
-        if high - low > most:
-            unit = "m" if self.joint == "slide" else "rad"
-            raise ValueError(f"'limits' should be at most {most:g} {unit} apart, found {high - low:g}")
-        values = (self.value,) if isinstance(self.value, float) else self.value
-        if not all(low <= v <= high for v in values) or values[0] > values[-1]:
-            raise ValueError(f"'value' should be between {low:g} and {high:g}, the lower one first")
+        low, high = (self.value,) * 2 if isinstance(self.value, float) else self.value
+        check_way(self.joint, self.limits, (low, high))
         return self
 
 

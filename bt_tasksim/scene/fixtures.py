@@ -15,6 +15,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.document import Document
 from bt_tasksim.core.errors import FieldError
 from bt_tasksim.core.files import file_version
+from bt_tasksim.core.joints import check_way
 from bt_tasksim.core.named_data import named_data
 from bt_tasksim.core.names import check_name
 from bt_tasksim.core.plain import Plain, shown
@@ -94,6 +95,7 @@ class FixturePart:
 
     def __post_init__(self) -> None:
         check_name(self.name, "the name of a part of a fixture")
+        check_way(self.kind, self.limits, self.value)
 
 
 @dataclass(frozen=True)

@@ -74,8 +74,7 @@ class JointedBody:
             return
         value, speed = float(self._articulation.get_qpos()[0]), float(self._articulation.get_qvel()[0])
         pull = self.joint.pull(value, speed, self._inertia, seconds)
-        if pull != 0.0:
-            self._articulation.set_qf(np.array([pull], np.float32))
+        self._articulation.set_qf(np.array([pull], np.float32))  # it acts until another one is set
 
 
 def add_part(

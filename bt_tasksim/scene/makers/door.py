@@ -60,8 +60,6 @@ class Door(FixtureMaker):
                 f"its handle is {self.handle_height:.2f} m above the table, and its door has room for one "
                 f"from {low:.2f} to {high:.2f} m"
             )
-        if self.value > self.opens:
-            raise InputError(f"it is open by {self.value:.2f} rad at the start, and 'opens' {self.opens:.2f}")
         width, top = self.radius + EDGE, self.base + self.height
         left = 1.0 if self.side == "left" else -1.0
         hinge = left * width / 2

@@ -54,8 +54,6 @@ class Drawer(FixtureMaker):
                 f"its drawer is {self.depth:.2f} m deep and comes out by {self.opens:.2f} m: it would fall "
                 f"out of the chest"
             )
-        if self.value > self.opens:
-            raise InputError(f"it is out by {self.value:.2f} m at the start, and 'opens' {self.opens:.2f}")
         depth, outer = self.depth + WALL + GAP, self.width + 2 * (WALL + GAP)
         top = self.base + self.height + GAP
         grip = handle(self.handle, frame((-FRONT, 0.0, self.base + self.height / 2), (-1, 0, 0), (0, 1, 0)))

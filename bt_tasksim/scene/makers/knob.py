@@ -35,9 +35,9 @@ class Knob(ControlMaker):
     """Width of the ridge, m."""
     ahead: Annotated[Number, usually(-0.3, 0.3, ge=-3.2, le=3.2)]
     """Where the ridge points at 0, from straight away from the robot, or upwards on a front, rad."""
-    turns: Annotated[Number, usually(2.0, 2.6, ge=0.2, le=6.2)]
+    turns: Annotated[Number, usually(2.0, 2.6, ge=0.2, le=6.0)]
     """How far it can be turned, rad."""
-    value: Annotated[Number, usually(0.0, ge=0.0, le=6.2)]
+    value: Annotated[Number, usually(0.0, ge=0.0, le=6.0)]
     """How far it is turned at the start, rad."""
     mass: Annotated[Number, usually(0.1, ge=0.01, le=5.0)]
     """Of the knob, kg."""

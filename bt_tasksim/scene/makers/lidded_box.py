@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.typed_file import Number
 from bt_tasksim.scene.carpentry import DARK, LIGHT, PALE, STEEL, Made, board, frame, handle, held
@@ -46,8 +45,6 @@ class LiddedBox(FixtureMaker):
 
     def make(self, name: str) -> Fixture:
         """See `FixtureMaker.make`."""
-        if self.value > self.opens:
-            raise InputError(f"it is open by {self.value:.2f} rad at the start, and 'opens' {self.opens:.2f}")
         grip = self._handle()
         lid = board((self.length / 2, 0.0, self.height + LID / 2), (self.length, self.width, LID), PALE)
         part = FixturePart(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.typed_file import Number
 from bt_tasksim.scene.carpentry import DARK, LIGHT, PALE, HandleKind, board, frame, handle
@@ -50,8 +49,6 @@ class Panel(FixtureMaker):
         """See `FixtureMaker.make`."""
         left, half, top = 1.0 if self.side == "left" else -1.0, self.width / 2, self.base + self.height
         opens = half - WALL - LAP
-        if self.value > opens:
-            raise InputError(f"it is open by {self.value:.2f} m at the start, and opens by {opens:.2f} m")
         middle, panel = (self.base + top) / 2, -SHEET - 0.002
         face = panel - SHEET / 2
         grip = handle(self.handle, frame((face, left * half / 2, middle), (-1, 0, 0), (0, 0, 1)))

@@ -33,9 +33,9 @@ class Valve(ControlMaker):
     """To the middle of the rim, or where a spoke is held, m."""
     ahead: Annotated[Number, usually(-0.3, 0.3, ge=-3.2, le=3.2)]
     """Where a spoke points at 0, from straight away from the robot, or upwards on a front, rad."""
-    turns: Annotated[Number, usually(1.6, 2.6, ge=0.2, le=6.2)]
+    turns: Annotated[Number, usually(1.6, 2.6, ge=0.2, le=6.0)]
     """How far it can be turned, rad."""
-    value: Annotated[Number, usually(0.0, ge=0.0, le=6.2)]
+    value: Annotated[Number, usually(0.0, ge=0.0, le=6.0)]
     """How far it is turned at the start, rad."""
     mass: Annotated[Number, usually(0.3, 0.5, ge=0.02, le=20.0)]
     """Of the wheel, kg."""

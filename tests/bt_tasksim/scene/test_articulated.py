@@ -66,6 +66,26 @@ def test_bodies_of_an_mjcf_become_parts(write):
     assert len(valve.boxes) == 4 and valve.mass == pytest.approx(0.3) and len(valve.grasps) == 2
 
 
+def test_values_grow_from_where_it_is_shut_whichever_way_the_file_counts(write):
+    ranged = MJCF.replace(
+        'type="hinge" axis="0 0 1" range="-90 90"', 'type="slide" axis="1 0 0" range="-0.3 0"'
+    )
+    (drawer,) = load_fixture(write(ranged, "drawer.xml")).parts
+    assert np.allclose(drawer.limits, [0.0, 0.3]) and np.allclose(drawer.axis, [-1, 0, 0])
+    assert drawer.value == (0.0, 0.0)
+
+
+def test_what_is_only_seen_is_left_out(write):
+    seen = '<geom type="sphere" size="0.1" contype="0" conaffinity="0"/>'
+    cube = '<texture name="t" type="cube" fileright="/etc/passwd"/><material name="m" texture="t"/>'
+    texture = f"<asset>{cube}</asset>"
+    text = MJCF.replace("<worldbody>", f"{texture}<worldbody>{seen}").replace(
+        'name="grip"', 'name="grip" material="m"'
+    )
+    fixture = load_fixture(write(text, "seen.xml"))
+    assert len(fixture.boxes) == 1 and len(fixture.parts[0].boxes) == 4
+
+
 def test_in_scenes_and_scene_files(write, tmp_path):
     file = write(URDF)
     spec = FixtureSpec(file, at=(0.6, 0.0), name="mine", sensed=True)
@@ -94,6 +114,13 @@ def test_in_scenes_and_scene_files(write, tmp_path):
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><robot>&b;</robot>", "no XML that can be read"),
         ("<html/>", "neither URDF nor MJCF"),
         (URDF.replace('upper="1.5"', 'upper="-1.5"'), "'lower' limit is above"),
+        (MJCF.replace("<worldbody>", "<worldbody><replicate count='99999'/>"), "'replicate' is none of them"),
+        (
+            MJCF.replace("<worldbody>", "<asset><mesh name='m' file='a.stl'/></asset><worldbody>"),
+            "another file",
+        ),
+        (MJCF.replace("<worldbody>", "<worldbody>" + "<body/>" * 6000), "more than 5000 elements"),
+        (URDF.replace("<axis", "<mimic joint='other'/><axis"), "'mimic' is none of them"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_sentence(write, text, words):
