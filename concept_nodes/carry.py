@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
+
+from typing_extensions import TypeVar
 
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
@@ -39,6 +41,17 @@ class MoveMemory(NamedTuple):
     path: Path
 
 
+class Moved(Protocol):
+    """A memory that holds such a path, among other things."""
+
+    @property
+    def path(self) -> Path:
+        """The path."""
+
+
+MovedT = TypeVar("MovedT", bound=Moved, default=MoveMemory)
+
+
 def straight_path(
     seen: Seen, goal: Array, speed: float, joints: Sequence[Array], before: Sequence[Array] = ()
 ) -> Path:
@@ -65,7 +78,7 @@ def straight_path(
     return with_routes(path, routes, len(seen.robot.arm_joints))
 
 
-class Carry(ConceptModel[MoveMemory]):
+class Carry(ConceptModel[MovedT]):
     """A task in which the held ``target`` is moved along a path that `begin` plans, and must stay held."""
 
     target: str
@@ -77,32 +90,32 @@ class Carry(ConceptModel[MoveMemory]):
         """The object must be in the hand."""
         return not_held(seen, self.target)
 
-    def command(self, action: Array, seen: Seen, memory: MoveMemory) -> Command:
+    def command(self, action: Array, seen: Seen, memory: MovedT) -> Command:
         """Follow the path; the hand keeps its grip."""
         tool, arm = at_times(memory.path, seen.elapsed)
         return Command(tool=tool, posture=arm)
 
-    def planned(self, memory: MoveMemory) -> Array | float:
+    def planned(self, memory: MovedT) -> Array | float:
         """How long the way takes, where it was searched for."""
         return searched_for(memory.path)
 
-    def limits(self, seen: Seen, memory: MoveMemory) -> tuple[Limit, ...]:
+    def limits(self, seen: Seen, memory: MovedT) -> tuple[Limit, ...]:
         """The force at the wrist."""
         return (strain(seen, self.force_limit),)
 
-    def done(self, seen: Seen, memory: MoveMemory) -> Array:
+    def done(self, seen: Seen, memory: MovedT) -> Array:
         """The tool has come to the end of the path."""
         return (seen.elapsed >= memory.path.duration) & (miss(seen, memory.path) < self.tolerance)
 
-    def maintained(self, goal: str, seen: Seen, memory: MoveMemory) -> Array:
+    def maintained(self, goal: str, seen: Seen, memory: MovedT) -> Array:
         """The object may still be in the hand."""
         return may_hold(seen, self.target)
 
-    def necessary_cost(self, seen: Seen, memory: MoveMemory) -> Array:
+    def necessary_cost(self, seen: Seen, memory: MovedT) -> Array:
         """Distance of the tool from the end of the path, metres."""
         return miss(seen, memory.path)
 
-    def sufficient_cost(self, known: Known, memory: MoveMemory) -> Array:
+    def sufficient_cost(self, known: Known, memory: MovedT) -> Array:
         """How far the object failed to follow the hand, over what is tolerable.
 
         10 unless it hangs in the hand, clear of everything else; else the larger of its slip in the hand over
@@ -120,7 +133,7 @@ class Carry(ConceptModel[MoveMemory]):
         tilt = poses.angle_between(before[:, 3:], after[:, 3:]) / TILT
         return xp.maximum(cost, xp.maximum(slip, tilt))
 
-    def explain(self, seen: Seen, memory: MoveMemory) -> Statement:
+    def explain(self, seen: Seen, memory: MovedT) -> Statement:
         """How far the tool still is from its goal, and the object from the tool."""
         return CARRIED(
             tool_to_goal=miss(seen, memory.path),

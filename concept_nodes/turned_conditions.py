@@ -9,7 +9,7 @@ from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.parameters import ObjectName, PlaceName, Radians
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.contents import seen_within
-from bt_tasksim.concept_nodes.spin import turned_off
+from bt_tasksim.concept_nodes.spin import LIKE, turned_off
 from bt_tasksim.concept_nodes.whereabouts import Estimates
 from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.poses import Array, array_namespace, host
@@ -135,7 +135,7 @@ class TurnedLike(Condition):
 
     target: ObjectName
     like: PlaceName
-    angle: Radians = 0.15
+    angle: Radians = LIKE
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
