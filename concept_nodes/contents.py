@@ -1,14 +1,52 @@
-"""What is in a vessel, as far as is seen, or in truth: laws over arrays of worlds."""
+"""What is in a vessel, as far as is seen, or in truth, and what keeps it there."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from typing import Protocol, TypeVar
 
 from bt_tasksim.concept.seen import Known, Seen
-from bt_tasksim.concept_nodes.view import WITHIN
+from bt_tasksim.concept_nodes.view import WITHIN, WorldView
 from bt_tasksim.concept_nodes.whereabouts import Estimates, Truth
+from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.scene.spatial_laws import Whereabouts, beyond_walls
+
+SPILLS = math.radians(30.0)
+"""Lean at which what lies in a vessel may fall out."""
+
+
+class Way(Protocol):
+    """A way on which something is turned."""
+
+    @property
+    def poses(self) -> Array:
+        """Poses ``(n, 7)`` on it."""
+
+
+W = TypeVar("W", bound=Way)
+
+
+def spilling_none(view: WorldView, target: str, ways: Sequence[W]) -> list[W]:
+    """Of the ways to turn something those on which what lies in it stays there: all where nothing does.
+
+    A vessel that leans already may lean as much.
+
+    Raises:
+        NoWayError: There are ways, and something would fall out on each.
+    """
+    inside = view.contents(target)
+    if not inside or not ways:
+        return list(ways)
+    most = max(SPILLS, float(poses.tilt(view.objects[target][3:])) + 1e-6)
+    kept = [way for way in ways if float(poses.tilt(way.poses[:, 3:]).max()) <= most]
+    if not kept:
+        raise NoWayError(
+            f"{inside[0]} would fall out of {target} as it is turned: empty it first, or use Pour"
+        )
+    return kept
 
 
 def seen_within(seen: Seen, vessel: str, names: Sequence[str]) -> Array:

@@ -44,6 +44,8 @@ STUCK_IN = register_reason(
     value=METRES,
     limit=METRES,
 )
+SEEN = 0.005
+"""Metres before the mouth, beyond the tolerance, from which on a thing is seen to be out."""
 LEFT = 0.02
 """Metres by which the hand may go farther than what it pulls."""
 YIELDS, MOST = 0.0004, 0.004
@@ -118,6 +120,11 @@ class Extract(ConceptModel[ExtractMemory]):
     def from_task(cls, task: Task, later: Sequence[Task]) -> dict[str, Any]:
         """What comes out of what."""
         return {"target": task.parameters["target"], "out_of": task.parameters["out_of"]}
+
+    def contradiction(self) -> str:
+        """What ends so near the mouth is never seen to be out."""
+        least = round(self.tolerance + SEEN, 6)
+        return f"'clear' should be at least {least} m, found {self.clear}" if self.clear < least else ""
 
     def initial_state(self, seen: Seen) -> Possible:
         """The object must be in the hand."""

@@ -8,6 +8,7 @@ kept a hair above the surface, and gives way where it is felt to press.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING, VERY_CLOSE, with_room
+from bt_tasksim.concept_nodes.contents import spilling_none
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import strain
@@ -170,7 +172,7 @@ class Tipping(ConceptModel[TipMemory]):
 
     def _found(self, view: WorldView) -> tuple[Route, Array]:
         grip = poses.relative(view.objects[self.target], view.tool)
-        ways = self._swings(view)
+        ways = spilling_none(view, self.target, self._swings(view))
 
         def find(closer: float) -> tuple[Route, Array]:
             supports = frozenset(support_of(view, self.target)[0])
@@ -190,7 +192,7 @@ class Tipping(ConceptModel[TipMemory]):
             )
             goals: list[Array] = []
             downs: list[Array] = []
-            for down, pose in self._ends(view):
+            for down, pose in self._ends(view, ways):
                 joints = next(finder.postures(poses.multiply(pose, grip)), None)
                 if joints is not None:
                     goals.append(joints)
@@ -211,10 +213,10 @@ class Tipping(ConceptModel[TipMemory]):
         except NoWayError:
             return with_room(ROOMS, through_the_air)
 
-    def _ends(self, view: WorldView) -> list[tuple[Array, Array]]:
+    def _ends(self, view: WorldView, ways: Sequence[Toppling]) -> list[tuple[Array, Array]]:
         """What points down in the end, and poses ``(7,)``: with any heading, the nearest first."""
         now, found = view.objects[self.target], []
-        for way in self._swings(view):
+        for way in ways:
             end = way.poses[-1] + np.array([*(now[:2] - way.poses[-1][:2]), RAISED, 0.0, 0.0, 0.0, 0.0])
             turned = (poses.quat_multiply(turn, end[3:]) for turn in headings(AROUND))
             found += [(way.down, np.concatenate([end[:3], turn])) for turn in turned]
@@ -229,7 +231,7 @@ class Tipping(ConceptModel[TipMemory]):
         count = max(len(way.poses) for way in ways)
         on = np.array([_spread(way.poses, max(2, count // 2)) for way in ways])
         now = np.array([lifted(view, self.target)] * len(ways))
-        aside = np.array([pose for _, pose in self._ends(view)])
+        aside = np.array([pose for _, pose in self._ends(view, ways)])
         supports = frozenset(support_of(view, self.target)[0])
         return Aim(now, self.words, supports, True, aside=aside, onwards=on)
 

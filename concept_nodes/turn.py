@@ -19,6 +19,7 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.closer import BROUGHT, CARRIED, TOUCHING, with_room
+from bt_tasksim.concept_nodes.contents import spilling_none
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
 from bt_tasksim.concept_nodes.orientation import UP, missing_lean, missing_turn
@@ -69,8 +70,6 @@ CLOSE, OFF = 0.05, math.radians(8.0)
 """Radians within which it is turned as it should be; and that are tolerable."""
 RESTS, PATIENCE = 0.3, 2.5
 """Seconds after its way at which it may have come to rest, and after which it has to be turned."""
-SPILLS = math.radians(30.0)
-"""Lean at which what lies in a vessel may fall out."""
 
 
 class TurnMemory(NamedTuple):
@@ -175,13 +174,7 @@ class Turn(ConceptModel[TurnMemory]):
 
     def _found(self, view: WorldView) -> tuple[Route, Array]:
         grip = poses.relative(view.objects[self.target], view.tool)
-        ways = self._turnings(view, view.objects[self.target])
-        inside = view.contents(self.target)
-        ways = [way for way in ways if not inside or way.leans <= SPILLS]
-        if not ways:
-            raise NoWayError(
-                f"{inside[0]} would fall out of {self.target} as it is turned: empty it first, or use Pour"
-            )
+        ways = spilling_none(view, self.target, self._turnings(view, view.objects[self.target]))
 
         def here(closer: float) -> tuple[Route, Array]:
             finder = view.finder([self.target], held=view.held(self.target), closer=closer)

@@ -27,11 +27,6 @@ class Turning(NamedTuple):
 
     poses: Array
 
-    @property
-    def leans(self) -> float:
-        """The farthest that its own z axis leans on the way, radians."""
-        return float(poses.tilt(self.poses[:, 3:]).max())
-
 
 def turnings(
     now: Array, model: ObjectModel, *, should: Array | None = None, up: Array | None = None

@@ -36,3 +36,5 @@ def test_nothing_is_pulled_out_of_what_is_no_hole():
     assert "'table' is no hole but a table" in result.why
     with pytest.raises(InputError, match="parameter 'out_of' is missing"):
         Extract("box")
+    with pytest.raises(InputError, match="'clear' should be at least"):
+        Extract("box", out_of="table", clear=0.004)

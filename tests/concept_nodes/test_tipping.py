@@ -10,14 +10,17 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 
 from bt_tasksim.concept_nodes import Grasp, LayDown, Release, TipUp
+from bt_tasksim.concept_nodes.contents import spilling_none
 from bt_tasksim.concept_nodes.tipping import long_axis, swing
 from bt_tasksim.core import poses
+from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.shapes import ShapeSize, object_model
 from bt_tasksim.scene.spatial_laws import rise_of_long_axis
 from bt_tasksim.scene.specs import Goal, ObjectSpec
 from bt_tasksim.trees import sequence
+from tests.concept_nodes.test_pour import CUP, world
 
 SIDES = st.sampled_from([(k, sign) for k in range(3) for sign in (1.0, -1.0)])
 SIZES = st.tuples(*[st.floats(0.03, 0.2)] * 3)
@@ -50,6 +53,21 @@ def test_ends_are_those_of_the_longest_axis():
     pegs = [object_model("it", "box", ShapeSize((0.2, 0.05, 0.04)))]
     assert len(TipUp.sides(pegs[0])) == 2 and len(LayDown.sides(pegs[0])) == 4
     assert len(LayDown.sides(object_model("it", "cylinder", ShapeSize((0.05, 0.05, 0.12))))) == 16
+
+
+def test_what_lies_in_a_cup_stays_there():
+    view = world("cup", CUP)
+    with pytest.raises(NoWayError, match="a would fall out of jug as it is turned"):
+        LayDown.value(target="jug")._found(view)
+    lies = poses.pose([0.4, 0.1, 0.04], poses.from_rotation_vector(np.array([0.0, math.pi / 2, 0.0])))
+    ball = poses.multiply(lies, poses.pose([0.0, 0.0, -0.02]))
+    lying = view._replace(objects=view.objects | {"jug": lies, "a": ball})
+    ways = TipUp.value(target="jug")._swings(lying)
+    (upright,) = spilling_none(lying, "jug", ways)  # not onto its rim
+    assert len(ways) == 2 and np.allclose(upright.down, [0.0, 0.0, -1.0])
+    assert (
+        len(spilling_none(lying._replace(objects=lying.objects | {"a": view.objects["b"]}), "jug", ways)) == 2
+    )
 
 
 @settings(max_examples=30, deadline=None)
