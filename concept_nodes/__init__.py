@@ -21,7 +21,7 @@ from bt_tasksim.concept_nodes.hold_turned import HoldTurned
 from bt_tasksim.concept_nodes.in_contact import InContact
 from bt_tasksim.concept_nodes.insert import Insert
 from bt_tasksim.concept_nodes.inserted import Inserted, OutOf
-from bt_tasksim.concept_nodes.joint_conditions import IsOpen, IsShut, JointAt, Slides, Turns
+from bt_tasksim.concept_nodes.joint_conditions import IsOpen, IsShut, JointAt, OffStop, Slides, Turns
 from bt_tasksim.concept_nodes.lay_down import LayDown
 from bt_tasksim.concept_nodes.open_door import OpenDoor
 from bt_tasksim.concept_nodes.open_drawer import OpenDrawer
@@ -70,6 +70,7 @@ __all__ = [
     "Turns",
     "Slides",
     "JointAt",
+    "OffStop",
     "IsShut",
     "IsOpen",
     "CloseDrawer",

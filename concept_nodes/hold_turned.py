@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
@@ -15,6 +17,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
 from bt_tasksim.concept_nodes.hold import GIVES_WAY, PRESSED, QUICKEST, SMOOTH, YIELDS
 from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
+from bt_tasksim.concept_nodes.joint_force import arm_of, force_against, lever_of
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Possible, Statement, register_reason
@@ -25,6 +28,12 @@ from bt_tasksim.core.world import Command
 
 AT_STOP = math.radians(4.0)
 """Radians from a stop within which a part may seem to be where it stands at it."""
+BACK, OFF = 0.001, 0.004
+"""Metres that the hand may go back from the stop, which an arm does that is soft, before it presses more; and
+metres from which on that does not count as held."""
+PRESSES_ON, MOSTLY = 2000.0, 0.9
+"""Newtons more for each metre beyond, up to that share of ``most``: a spring may be as strong as the middle
+of the limits, and would turn the part off its stop."""
 NO_STOP = register_reason(
     "not_at_stop",
     "{object} stands {value} from the nearer stop of its hinge, more than {limit}: turn it there",
@@ -40,7 +49,7 @@ class HoldTurnedMemory(NamedTuple):
         value: Radians ``(N,)`` to which the part was turned at the begin.
         way: Sign ``(N,)`` of the turn onto the stop.
         grip: Pose ``(N, 7)`` of the part in the tool frame.
-        reach: Metres ``(N,)`` that the tool goes for each radian.
+        reach: Metres ``(N,)`` that the tool goes for each radian, see `joint_force.arm_of`.
         pushed: Metres ``(N,)`` that the tool is told to go beyond the stop.
         pressed: Newtons ``(N,)`` with which it presses, smoothed.
         held: Seconds ``(N,)`` for which that has been between its limits.
@@ -59,8 +68,9 @@ class HoldTurnedMemory(NamedTuple):
 class HoldTurned(ConceptModel[HoldTurnedMemory]):
     """Press a lever, or anything on a hinge, against the stop at which it stands (keeps FT, rotation).
 
-    The force is led to the middle of its limits, along the way of the hand about the hinge; the time counts
-    for which it stays between them.
+    The force is that of the torque about the hinge, at the hand; near the axis, as on a knob, at 50 mm from
+    it. It is led to the middle of its limits, or to more where a spring turns the part back, and the time
+    counts for which it stays between them, and the part on its stop.
 
     Args:
         target: What turns; the hand holds it, and it stands at one of its stops.
@@ -113,11 +123,8 @@ class HoldTurned(ConceptModel[HoldTurnedMemory]):
         nothing = array_namespace(value).zeros_like(value)
         grip = poses.relative(seen.tool, seen.object(self.target))
         start = HoldTurnedMemory(value, way, grip, nothing, nothing, nothing, nothing)
-        small = 0.01
-        there, here = self._tool(seen, start, small), self._tool(seen, start, 0.0)
-        reach = poses.clip(poses.norm(there[:, :3] - here[:, :3]) / small, 1e-3, math.inf)
-        start = start._replace(reach=reach)
-        return start._replace(pressed=self._against(seen, start))
+        felt = force_against(seen, self.target, way)
+        return start._replace(reach=arm_of(seen, self.target), pressed=felt)
 
     def command(self, action: Array, seen: Seen, memory: HoldTurnedMemory) -> Command:
         """A little beyond the stop."""
@@ -125,12 +132,14 @@ class HoldTurned(ConceptModel[HoldTurnedMemory]):
         return Command(tool=self._tool(seen, after, after.pushed / after.reach))
 
     def advance(self, action: Array, seen: Seen, memory: HoldTurnedMemory) -> HoldTurnedMemory:
-        """Lead the force to the middle of its limits, and count the time."""
+        """Lead the force to the middle of its limits, to more off the stop, and count the time."""
         xp, period = array_namespace(seen.tool), seen.world.control_period
-        pressed = memory.pressed + SMOOTH * (self._against(seen, memory) - memory.pressed)
-        middle = (self.least + self.most) / 2
+        pressed = memory.pressed + SMOOTH * (force_against(seen, self.target, memory.way) - memory.pressed)
+        back = -self._beyond(seen, memory)
+        middle = (self.least + self.most) / 2 + PRESSES_ON * poses.clip(back - BACK, 0.0, math.inf)
+        middle = poses.clip(middle, 0.0, MOSTLY * self.most)
         speed = poses.clip(YIELDS * (middle - pressed), -QUICKEST, QUICKEST)
-        within = (pressed >= self.least) & (pressed <= self.most)
+        within = (pressed >= self.least) & (pressed <= self.most) & (back <= OFF)
         held = xp.where(within, memory.held + period, xp.zeros_like(memory.held))
         return memory._replace(pushed=memory.pushed + period * speed, pressed=pressed, held=held)
 
@@ -140,8 +149,7 @@ class HoldTurned(ConceptModel[HoldTurnedMemory]):
 
     def limits(self, seen: Seen, memory: HoldTurnedMemory) -> tuple[Limit, ...]:
         """The force at the wrist; and there is a stop."""
-        here = self._tool(seen, memory, 0.0)
-        gone = poses.dot(seen.tool[:, :3] - here[:, :3], self._along(seen, memory))
+        gone = self._beyond(seen, memory)
         return strain(seen, self.force_limit), Limit(GIVES_WAY, gone, self.tolerance, {"object": self.target})
 
     def maintained(self, goal: str, seen: Seen, memory: HoldTurnedMemory) -> Array:
@@ -181,13 +189,14 @@ class HoldTurned(ConceptModel[HoldTurnedMemory]):
         part = seen.model(self.target).joints.pose(memory.value + memory.way * beyond)
         return poses.multiply(part, poses.inverse(memory.grip))
 
-    def _along(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
-        """Unit vectors ``(N, 3)`` of the hand's way onto the stop, robot base frame."""
-        small = 0.01
-        moved = (self._tool(seen, memory, small) - self._tool(seen, memory, -small))[:, :3]
-        return moved / poses.clip(poses.norm(moved), 1e-9, math.inf)[:, None]
+    def _beyond(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """Metres ``(N,)`` that the hand has gone beyond the stop: along its way, or by what it has turned.
 
-    def _against(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
-        """Force ``(N,)`` at the wrist against that way, N."""
-        force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
-        return -poses.dot(force, self._along(seen, memory))
+        Where it is on the axis it has no way, and where it slips on the part it does not turn.
+        """
+        law, xp = seen.model(self.target).joints, array_namespace(memory.way)
+        free = law._replace(limits=law.limits + poses.constant(np.array([-math.pi, math.pi]), law.limits))
+        turned = free.value(poses.multiply(seen.tool, memory.grip)) - memory.value
+        gone = law.shift(memory.value, self._tool(seen, memory, 0.0)[:, :3], seen.tool[:, :3])
+        away = poses.norm(lever_of(seen, self.target))
+        return xp.maximum(memory.way * gone * away, memory.way * turned * memory.reach)

@@ -158,6 +158,27 @@ class JointAt(Condition):
         return _by(seen, self.target)
 
 
+@register("concept")
+class OffStop(Condition):
+    """Does a part of furniture stand off both of its stops, as far as is seen?
+
+    Args:
+        target: The part.
+    """
+
+    target: ObjectName
+
+    def holds(self, seen: Seen) -> Array:
+        """See `Condition.holds`."""
+        (low, high), value = limits_of(seen, self.target), value_of(seen, self.target)
+        off = array_namespace(value).minimum(value - low, high - value)
+        return seen.model(self.target).jointed & (off > allowed(seen, self.target, SLACK))
+
+    def explain(self, seen: Seen) -> Statement:
+        """How far it is open."""
+        return _by(seen, self.target)
+
+
 def value_of(seen: Seen, target: str) -> Array:
     """How far ``(N,)`` a part is taken to be open, metres or radians."""
     return seen.model(target).joints.value(seen.object(target))

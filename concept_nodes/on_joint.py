@@ -17,6 +17,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING, VERY_CLOSE, with_room
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
 from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
+from bt_tasksim.concept_nodes.joint_force import force_against
 from bt_tasksim.concept_nodes.joint_way import JointWay, gone_anyhow, keeps_clear, pivots
 from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
@@ -37,13 +38,11 @@ UNITS: Mapping[bool, Unit] = {False: METRES, True: RADIANS}
 """Of what a part does, by whether it turns."""
 
 
-def _by_kind(name: str, sentence: str, **numbers: str) -> dict[bool, Reason]:
+def _by_kind(name: str, sentence: str) -> dict[bool, Reason]:
     """A reason for what slides and one for what turns, which have other units."""
     return {
         turns: register_reason(
-            f"{name}_{'turning' if turns else 'sliding'}",
-            sentence,
-            **dict.fromkeys(numbers or ("value", "limit"), unit),
+            f"{name}_{'turning' if turns else 'sliding'}", sentence, value=unit, limit=unit
         )
         for turns, unit in UNITS.items()
     }
@@ -83,8 +82,6 @@ FELT = 2
 """Ticks in a row for which a stop must be felt."""
 ROUND = 0.01
 """Metres from the axis within which a hand turns about itself rather than that it goes somewhere."""
-ARM = 0.05
-"""Metres from the axis at which a torque about it is taken as a force."""
 YIELDS, UNFELT, MOST = 3e-5, 3.0, 0.012
 """Metres a second for each newton from aside with which the hand gives way, newtons that it does not mind,
 and metres that it gives way at most: no hinge is quite where it is taken to be. Where an arm is near to the
@@ -284,36 +281,20 @@ class OnJoint(ConceptModel[JointMemory]):
         there, here = (poses.multiply(end, poses.inverse(memory.grip))[:, :3] for end in ends)
         return there - here
 
+    def _ahead(self, seen: Seen, memory: JointMemory) -> Array:
+        """Sign ``(N,)`` of what is missing to the wanted value; of a stop, to a little beyond it."""
+        missing = memory.goal - self._value(seen) + self.stops * BEYOND[self.turns]
+        return array_namespace(missing).sign(missing)
+
     def _along(self, seen: Seen, memory: JointMemory) -> Array:
         """Unit vectors ``(N, 3)`` in which the tool goes now; shorter where it turns about itself."""
-        xp, now = array_namespace(seen.tool), self._value(seen)
-        ahead = xp.sign(memory.goal - now + self.stops * BEYOND[self.turns])
-        law = self._law(seen)
+        now, law, ahead = self._value(seen), self._law(seen), self._ahead(seen, memory)
         step = 0.01
         there = poses.multiply(law.pose(now + step * ahead), poses.inverse(memory.grip))
         here = poses.multiply(law.pose(now), poses.inverse(memory.grip))
         moved = there[:, :3] - here[:, :3]
         long = poses.norm(moved)
         return moved / poses.clip(long, ROUND * step, math.inf)[:, None]
-
-    def _against(self, seen: Seen, memory: JointMemory, force: Array, along: Array) -> Array:
-        """Force ``(N,)`` against the motion, N; near the axis that of the torque at `ARM`.
-
-        Args:
-            seen: What is seen.
-            memory: What it remembers.
-            force: At the tool ``(N, 3)``, robot base frame, N.
-            along: See `_along`.
-        """
-        if not self.turns:
-            return -poses.dot(force, along)
-        xp, law, now = array_namespace(seen.tool), self._law(seen), self._value(seen)
-        at = law.pose(now)
-        axis, lever = poses.rotate(at[:, 3:], law.axis), seen.tool[:, :3] - poses.transform(at, law.origin)
-        torque = poses.rotate(seen.tool[:, 3:], seen.wrench[:, 3:]) + poses.cross(lever, force)
-        way = xp.sign(memory.goal - now + self.stops * BEYOND[True])
-        arm = poses.norm(lever - poses.dot(lever, axis)[:, None] * axis)
-        return -way * poses.dot(torque, axis) / poses.clip(arm, ARM, math.inf)
 
     def advance(self, action: Array, seen: Seen, memory: JointMemory) -> JointMemory:
         """Go on, slower where the wrist feels force, and give way aside; notice stops, and what jams."""
@@ -333,7 +314,7 @@ class OnJoint(ConceptModel[JointMemory]):
         far = abs(asked - now) > BEHIND[self.turns]
         force_there, along = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3]), self._along(seen, memory)
         aside = force_there - poses.dot(force_there, along)[:, None] * along
-        against = self._against(seen, memory, force_there, along)
+        against = force_against(seen, self.target, self._ahead(seen, memory))
         minds = poses.clip(1.0 - UNFELT / poses.clip(poses.norm(aside), 1e-9, math.inf), 0.0, 1.0)
         behind = (
             seen.tool[:, :3] - poses.shifted(at_times(memory.path, memory.progress)[0], memory.offset)[:, :3]
@@ -343,7 +324,8 @@ class OnJoint(ConceptModel[JointMemory]):
         short = self._missing(seen, memory) * PUSHES * period
         at_end = (memory.late > 0.0) & (share > 0.0) & (self.stops == 0)
         give = xp.where(at_end[:, None], give + short, give)
-        offset = poses.clip(memory.offset + give, -MOST, MOST)
+        offset = memory.offset + give
+        offset = offset * poses.clip(MOST / poses.clip(poses.norm(offset), 1e-9, math.inf), 0.0, 1.0)[:, None]
         ticks = xp.where(against > 1.5 * self.press, FELT + 0 * memory.felt, 1 + 0 * memory.felt)
         feels = against > self.press
         at_stop = abs(now - memory.goal) < NEAR[self.turns]

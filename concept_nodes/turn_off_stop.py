@@ -33,6 +33,7 @@ class TurnOffStop(OnJoint):
     force_limit: Newtons = FORCE_LIMIT
 
     turns = True
+    establishes = (ConditionOf("OffStop", target="target"),)
     requires = (ConditionOf("Turns", target="target"),)
     contact = ContactChange(ContactState.OT, ContactState.TR, "rotation")
     presentation = Presentation(

@@ -4,7 +4,7 @@ import pytest
 from draws import successes
 from py_trees.common import Status
 
-from bt_tasksim.concept_nodes import Grasp, HoldTurned, TurnKnob
+from bt_tasksim.concept_nodes import Grasp, HoldTurned, TurnKnob, TurnToStop
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
 from bt_tasksim.concept_nodes.hold_turned import NO_STOP
 from bt_tasksim.concept_nodes.holding import NOT_HELD
@@ -28,6 +28,19 @@ def test_a_lever_with_a_spring_is_held_on_its_stop():
     def run(seed):
         moved = TurnKnob("lever", angle=1.3), HoldTurned("lever", duration=1.0)
         return ran(Grasp("lever"), *moved, seed=seed)
+
+    (result,) = successes(run, range(3, 6), n=1)
+    assert result.status == Status.SUCCESS
+
+
+@pytest.mark.physical
+def test_a_knob_is_held_on_its_stop_by_the_torque_about_its_axis():
+    def run(seed):
+        fixture = FixtureSpec("knob", parameters={"turns": 2.3, "facing": "up"})
+        goal = Goal("knob", relation="set", value=2.3, angle_tolerance=0.06)
+        made = Scene(fixtures=[fixture], goal=goal, name="knob")
+        tree = sequence("the tree", Grasp("knob"), TurnToStop("knob"), HoldTurned("knob", duration=0.5))
+        return Runner(tree, made, EngineOptions()).run(seed)
 
     (result,) = successes(run, range(3, 6), n=1)
     assert result.status == Status.SUCCESS

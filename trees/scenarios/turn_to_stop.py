@@ -8,14 +8,20 @@ from bt_tasksim.concept_nodes import Grasp, Release, TurnToStop
 from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
 
+TURNS = 1.4
+
 
 def scene(robot: str = "panda") -> Scene:
     """A lever on the top of a console or on its front; sizes, place and friction are drawn."""
-    stands = {"value": (0.0, 0.6), "heading": (-0.2, 0.2)}
+    stands: dict[str, float | tuple[float, float]] = {
+        "value": (0.0, 0.6),
+        "heading": (-0.2, 0.2),
+        "turns": TURNS,
+    }
     return Scene(
         robot,
         fixtures=[FixtureSpec("lever", parameters=stands)],
-        goal=Goal("lever", relation="open"),
+        goal=Goal("lever", relation="set", value=TURNS, angle_tolerance=0.05),
         name="turn_to_stop",
     )
 
