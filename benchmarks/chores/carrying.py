@@ -10,6 +10,8 @@ from bt_tasksim.scene import Goal, ObjectSpec, SpotSpec
 
 SOLIDS = ("box", "cylinder", "oval", "diamond", "cube")
 BALLS = 3
+COASTER = (0.06, 0.06)
+"""Metres of the coaster, on which the jug's middle comes to be, with any heading."""
 
 
 def thing(slot: Slot, y: float, *kinds: str, x: float = 0.0, wide: float = 0.03) -> ObjectSpec:
@@ -103,7 +105,7 @@ def pour(slot: Slot, rng: np.random.Generator) -> Chore:
             Place(jug, on=coaster),
             Release(jug),
         ],
-        [*(Goal(each, inside=bowl) for each in balls), Goal(jug, coaster, angle_tolerance=3.1)],
+        [*(Goal(each, inside=bowl) for each in balls), Goal(jug, coaster, relation="anywhere")],
         {**vessels, **dict.fromkeys(balls, ball)},
-        spots=[SpotSpec(coaster, "table", slot.on_table(0.0, -0.10), (0.02, 0.02))],
+        spots=[SpotSpec(coaster, "table", slot.on_table(0.0, -0.10), (0.02, 0.02), extent=COASTER)],
     )

@@ -28,6 +28,7 @@ def test_every_kind_has_things_goals_and_leaves(kind):
     tree = drawn.tree()
     assert len(tree.children) == sum(len(chore.leaves()) for chore in drawn.chores)
     assert all(chore.goals for chore in drawn.chores)
+    assert all(goal.angle_tolerance < 1.0 for chore in drawn.chores for goal in chore.goals)  # it stands
 
 
 def test_an_unknown_kind_is_refused():

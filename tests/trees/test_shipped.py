@@ -33,6 +33,12 @@ FIRST = 3.0
 """Those seconds."""
 
 
+@pytest.mark.parametrize("name", scenarios())
+def test_what_should_stand_should_stand_upright(name):
+    stand = [goal for goal in load_source(name).scene.goals if goal.relation in ("on", "anywhere", "beside")]
+    assert all(goal.angle_tolerance < 1.0 for goal in stand)  # of any heading says `anywhere`
+
+
 @pytest.mark.physical
 @pytest.mark.parametrize("name", scenarios())
 def test_it_succeeds_and_is_recorded_shown_replayed_and_demonstrated(name, tmp_path):
