@@ -5,8 +5,10 @@
     python -m benchmarks.chores --only 900012 --kinds pour carry     # one of them again
 
 Each draw is a task of its own (`benchmarks.chores.draw`). Draws that fail are given to an oracle, which has
-exact poses, other orders of the chores and trees that recover, each in a world drawn with the same seed: what
-it never achieves does not count.
+exact poses, other orders of the chores and trees that recover, each in a world drawn with the same seed.
+But it has the very concepts that are measured: what none of them can do it calls impossible, too. So
+successes are said of all draws first, then of those that it achieves, and what it calls impossible is listed
+with the reasons of its own tries, to be looked at.
 """
 
 from __future__ import annotations
@@ -79,13 +81,14 @@ def _played(seeds: Sequence[int], asked: argparse.Namespace) -> Iterator[dict[st
         draw |= {"success": found.success, "leaf": found.leaf, "why": found.outcome.sentence}
         draw["reason"] = "" if found.success else found.outcome.cause.reason.name
         if not found.success and asked.oracle > 0:
-            draw["possible"] = _possible(drawn, asked)
+            draw["possible"], draw["oracle"] = _possible(drawn, asked)
         good += found.success
         print(f"{'ok  ' if found.success else 'FAIL'} {seed} {good}/{number}  {drawn.words}", flush=True)
         if not found.success:
             print(f"       {found.leaf}: {draw['reason']}: {draw['why']}", flush=True)
             if "possible" in draw:
-                print(f"       oracle: {'possible' if draw['possible'] else 'IMPOSSIBLE'}", flush=True)
+                said = "possible" if draw["possible"] else f"IMPOSSIBLE: {'; '.join(draw['oracle'])}"
+                print(f"       oracle: {said}", flush=True)
         yield draw
 
 
@@ -96,18 +99,26 @@ def _one(
         return episode(runner, drawn.seed)
 
 
-def _possible(drawn: Task, asked: argparse.Namespace) -> bool:
-    """Whether the oracle achieves it."""
+def _possible(drawn: Task, asked: argparse.Namespace) -> tuple[bool, list[str]]:
+    """Whether the oracle achieves it, and why its tries before that failed: leaves and reasons."""
     orders = itertools.permutations(range(len(drawn.chores)))
     tries = itertools.islice(itertools.product(orders, ("obvious", "recovering")), asked.oracle)
-    return any(_one(drawn, asked.engines, "none", kind, order).success for order, kind in tries)
+    failed: list[str] = []
+    for order, kind in tries:
+        found = _one(drawn, asked.engines, "none", kind, order)
+        if found.success:
+            return True, failed
+        failed.append(f"{found.leaf}: {found.outcome.cause.reason.name}")
+    return False, failed
 
 
 def summary(draws: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Successes of what is possible, and failures by leaf and reason."""
+    """Successes of all draws and of what the oracle achieves, and failures by leaf and reason."""
     possible = [draw for draw in draws if draw["success"] or draw.get("possible", True)]
     successes = sum(draw["success"] for draw in draws)
-    low, high = wilson(successes, len(possible)) if possible else (0.0, 1.0)
+    impossible = Counter(
+        " or ".join(dict.fromkeys(draw["oracle"])) for draw in draws if not draw.get("possible", True)
+    )
     failed = Counter(f"{d['leaf']}: {d['reason']}" for d in draws if not d["success"])
     by_kind = Counter(kind for draw in draws for kind in draw["kinds"])
     missed = Counter(kind for draw in draws if not draw["success"] for kind in draw["kinds"])
@@ -115,21 +126,31 @@ def summary(draws: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "episodes": len(draws),
         "possible": len(possible),
         "successes": successes,
-        "confidence_interval": [round(low, 4), round(high, 4)],
+        "confidence_interval_of_all": _interval(successes, len(draws)),
+        "confidence_interval": _interval(successes, len(possible)),
         "failures": dict(failed.most_common()),
+        "impossible": dict(impossible.most_common()),
         "kinds": {name: {"draws": n, "in_failed": missed[name]} for name, n in sorted(by_kind.items())},
     }
 
 
+def _interval(successes: int, count: int) -> list[float]:
+    """The 95 % interval of a share."""
+    return [round(share, 4) for share in wilson(successes, count)] if count else [0.0, 1.0]
+
+
 def _said(draws: Sequence[dict[str, Any]], name: str) -> None:
     found = summary(draws)
-    low, high = (100 * share for share in found["confidence_interval"])
-    print(
-        f"{name}: {found['successes']} of {found['possible']} possible ones ({low:.1f} to {high:.1f} %), "
-        f"{found['episodes']} draws"
+    of_all, of_possible = (
+        "{:.1f} to {:.1f} %".format(*(100 * share for share in found[interval]))
+        for interval in ("confidence_interval_of_all", "confidence_interval")
     )
+    print(f"{name}: {found['successes']} of {found['episodes']} draws ({of_all})")
+    print(f"  of those that the oracle achieves {found['successes']} of {found['possible']} ({of_possible})")
     for reason, count in found["failures"].items():
         print(f"  {count} x {reason}")
+    for reason, count in found["impossible"].items():
+        print(f"  {count} x called impossible by the oracle: {reason}")
 
 
 if __name__ == "__main__":

@@ -116,5 +116,5 @@ def slide_to_stop(slot: Slot, rng: np.random.Generator) -> Chore:
             Goal(block, ledge, relation="anywhere"),
         ],
         {block: lies},
-        [FixtureSpec("ledge", at=(0.54, 0.0), area=(0.02, 0.02), name=ledge)],
+        [FixtureSpec("ledge", at=(slot.centre[0] - 0.08, slot.centre[1]), area=(0.02, 0.02), name=ledge)],
     )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
+import numpy as np
 import pytest
 
 from benchmarks import chores
 from benchmarks.chores import __main__ as command
-from benchmarks.chores.chore import KINDS, SLOTS
+from benchmarks.chores.chore import FRONT, KINDS, SLOTS
 from benchmarks.chores.draw import task
 from bt_tasksim.core.errors import InputError
 
@@ -42,5 +44,21 @@ def test_one_is_measured(tmp_path, monkeypatch, capsys):
     (file,) = tmp_path.glob("runs/benchmarks/chores-panda.json")
     found = json.loads(file.read_text())
     assert found["episodes"] == 1 and found["draws"][0]["kinds"]
-    assert "possible ones" in capsys.readouterr().out
+    assert "1 draws (" in capsys.readouterr().out
     assert chores.__doc__
+
+
+def test_what_the_oracle_never_achieves_is_counted_and_listed():
+    ok = {"success": True, "leaf": "", "reason": "", "kinds": ["pour"]}
+    failed = ok | {"success": False, "leaf": "pour", "reason": "spilled"}
+    never = failed | {"possible": False, "oracle": ["grasp: no_way", "grasp: no_way"]}
+    found = command.summary([ok, failed | {"possible": True, "oracle": []}, never])
+    assert (found["episodes"], found["possible"], found["successes"]) == (3, 2, 1)
+    assert found["confidence_interval_of_all"][1] < found["confidence_interval"][1]
+    assert found["failures"] == {"pour: spilled": 2} and found["impossible"] == {"grasp: no_way": 1}
+
+
+def test_the_ledge_is_in_its_slot():
+    slot = dataclasses.replace(FRONT, centre=(0.70, 0.05))
+    (ledge,) = KINDS["slide_to_stop"](slot, np.random.default_rng(0)).fixtures
+    assert ledge.at == pytest.approx((0.62, 0.05))
