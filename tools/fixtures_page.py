@@ -75,7 +75,8 @@ def main() -> None:
     page = docs / "fixtures.md"
     head, begin, rest = page.read_text(encoding="utf-8").partition(BEGIN)
     page.write_text(head + begin + "\n\n" + tables() + END + rest.partition(END)[2], encoding="utf-8")
-    cv2.imwrite(str(docs / "pictures" / "fixtures.png"), picture()[:, :, ::-1])
+    shown = picture()[:, :, ::-1]
+    cv2.imwrite(str(docs / "pictures" / "fixtures.jpg"), shown, [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
 def picture() -> np.ndarray:
