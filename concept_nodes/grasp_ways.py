@@ -122,7 +122,7 @@ class ServedAlong(Served):
     def _along(self, goal: Array, pivot: float = 0.0) -> Array:
         view, target = self._around.view, self._around.target
         found = poses.multiply(self._way, poses.relative(self._around.now, goal)[None])
-        return pivoted(found, axis_of(view, target), pivot)
+        return pivoted(found, axis_of(view, target), pivot) if pivot else found
 
     def _finder(self, goal: Array, hand: Array, pivot: float) -> WayFinder:
         key = goal.tobytes() + hand.tobytes() + bytes([pivot > 0.0])

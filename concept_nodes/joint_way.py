@@ -106,9 +106,11 @@ def axis_of(view: WorldView, target: str) -> Array:
 
 
 def pivots(view: WorldView, target: str, tool: Array) -> tuple[float, ...]:
-    """Which of `PIVOTS` are possible for a hand that holds a part at a tool pose ``(7,)``."""
-    joint, axis = view.model(target).joint, axis_of(view, target)
-    assert joint is not None
+    """Which of `PIVOTS` are possible for a hand that holds a thing at a tool pose ``(7,)``."""
+    joint = view.model(target).joint
+    if joint is None:
+        return PIVOTS[:1]
+    axis = axis_of(view, target)
     if not joint.turns or abs(float(poses.to_matrix(tool[3:])[:, 1] @ axis)) < PARALLEL:
         return PIVOTS[:1]
     lever = tool[:3] - poses.transform(np.array(joint.zero), np.array(joint.origin))

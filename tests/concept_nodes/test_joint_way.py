@@ -5,9 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_tasksim.concept_nodes.joint_way import pivoted
+from bt_tasksim.concept_nodes.joint_way import PIVOTS, pivoted, pivots
+from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.joints import JointModel, Joints
+from bt_tasksim.robot.description import load_robot
+from bt_tasksim.scene.scene import Scene
 
 UP = np.array([0.0, 0.0, 1.0])
 angles = st.floats(-2.5, 2.5).filter(lambda a: abs(a) > 0.05)
@@ -28,3 +31,14 @@ def test_what_turns_in_the_hand_is_led_the_same_way(angle, share):
     turned = poses.angle_between(found[:1, 3:], found[:, 3:])
     assert turned == pytest.approx((1.0 - share) * abs(values), abs=1e-6)
     assert found[0] == pytest.approx(tools[0])
+
+
+def test_nothing_free_turns_about_a_hinge_between_the_fingers():
+    robot = load_robot("panda")
+    world = (
+        Scene(objects={"it": "box on table"})
+        .sample(1)
+        .world_model([tip.name for tip in robot.tips], robot.opening)
+    )
+    view = WorldView(robot, world, {}, poses.pose([0.4, 0.0, 0.4]), robot.rest, robot.hand_open)
+    assert pivots(view, "it", view.tool) == PIVOTS[:1]
