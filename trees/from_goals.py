@@ -151,7 +151,7 @@ def _check_goals(goals: Sequence[Goal]) -> None:
                 f"'{goal.object}' cannot be {goal.relation} '{goal.place}', which is to be held in the end"
             )
     if len(held) > 1:
-        once = any(goal.when == "once" and goal.object in held for goal in goals)
+        once = any(goal.when != "end" and goal.object in held for goal in goals)
         said = "; tidy takes goals that should hold once for such as hold in the end" if once else ""
         raise InputError(
             f"the hand can hold one object in the end, and goals ask for {' and '.join(held)}{said}"

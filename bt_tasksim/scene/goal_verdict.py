@@ -40,12 +40,13 @@ class GoalVerdict:
 
     Attributes:
         goal: The goal in words, such as ``cup on lower_board``.
-        when: ``end`` or ``once``, see `Goal`.
+        when: ``end``, ``once`` or ``kept``, see `Goal`.
         reached: It is reached; None where it could not be judged.
         outcome: How it is, or the first thing that is wrong.
         position_error: Metres from where the object should be; NaN where the goal does not say so.
         angle_error: Radians from how it should be; NaN likewise.
-        time: Seconds at which a goal that has to be true once was seen to be; else NaN.
+        time: Seconds at which a goal that has to be true once, or for a while, was first seen to have been;
+            else NaN.
         objects: The objects that it is about, which so may be moved.
     """
 

@@ -158,6 +158,7 @@ def _goal(entry: GoalEntry) -> Goal:
         entry.distance,
         entry.value,
         entry.axis,
+        entry.duration,
         on=entry.on or "",
         inside=entry.inside or "",
         beside=entry.beside or "",

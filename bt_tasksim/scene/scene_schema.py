@@ -139,8 +139,8 @@ class GoalEntry(Model):
     """How far it may be tilted, or turned from the place's heading, rad."""
     height: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.3
     """Of `lifted`: how far above where it stood, m."""
-    when: Literal["end", "once"] = "end"
-    """True at the `end` of the run, or `once` in it."""
+    when: Literal["end", "once", "kept"] = "end"
+    """True at the `end` of the run, `once` in it, or `kept` so for `duration` of it without a break."""
     distance: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.10
     """Of `beside`: between the two outlines from above, at most, m."""
     value: Annotated[Number, Field(ge=-100.0, le=100.0)] | None = None
@@ -148,6 +148,8 @@ class GoalEntry(Model):
     `oriented` an angle, rad."""
     axis: Direction | None = None
     """Of `turned`, `oriented` and `pointing_up`: a direction, x y z."""
+    duration: Annotated[Number, Field(gt=0.0, le=1000.0)] = 1.0
+    """Of `kept`: for how long, s."""
 
 
 class SceneFile(Model):

@@ -183,6 +183,7 @@ class GoalFields(Model):
     distance: AboveZero
     value: Number | None
     axis: Direction | None
+    duration: AboveZero
     on: Reference
     inside: Reference
     beside: Reference

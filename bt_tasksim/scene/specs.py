@@ -41,7 +41,7 @@ SPLITS = ("all", "even", "odd")
 """Parts of a range from which draws are made, see `ObjectSpec`."""
 STARTS = ("on", "inside", "beside")
 """Words that say where an object starts, and in goals where it should be."""
-MOMENTS = ("end", "once")
+MOMENTS = ("end", "once", "kept")
 """When a goal has to be true, see `Goal`."""
 OLD_RELATION = "stands"
 """What files of version 0.1 call the goal relation ``on``."""
@@ -306,12 +306,14 @@ class Goal:
         position_tolerance: Metres.
         angle_tolerance: Radians; pi for any heading and any way up.
         height: Metres, for ``lifted``.
-        when: ``end``: true at the end of the run. ``once``: true at some moment of it.
+        when: ``end``: true at the end of the run. ``once``: true at some moment of it. ``kept``: true for
+            ``duration`` of it without a break.
         distance: Metres between the two outlines: for ``beside`` at most, for ``clear_of`` at least.
         value: How far a part of a fixture should be open, for ``open`` (at least) and ``set``: metres or
             radians; None for the relation's own. Of ``turned`` and ``oriented`` an angle, radians.
         axis: Of ``turned`` (robot base frame), ``oriented`` (the place's) and ``pointing_up`` (the object's):
             a direction ``(3,)``; None for that of z.
+        duration: Seconds, of ``kept``.
 
     Raises:
         FieldError: A field is no good, or the reference is missing or named twice.
@@ -327,6 +329,7 @@ class Goal:
     distance: float = 0.10
     value: float | None = None
     axis: tuple[float, float, float] | None = None
+    duration: float = 1.0
 
     def __init__(
         self,
@@ -340,6 +343,7 @@ class Goal:
         distance: float = 0.10,
         value: float | None = None,
         axis: tuple[float, float, float] | None = None,
+        duration: float = 1.0,
         *,
         on: str = "",
         inside: str = "",
@@ -352,6 +356,7 @@ class Goal:
             "distance": distance,
             "value": value,
             "axis": axis,
+            "duration": duration,
         }
         words = {"place": place, "on": on, "inside": inside, "beside": beside}
         words = {name: "" if word is None else word for name, word in words.items()}
@@ -384,7 +389,13 @@ class Goal:
         if place == object:
             raise FieldError(f"the goal of '{object}' refers to '{object}' itself", "place")
         if when not in MOMENTS:
-            raise FieldError(f"'when' of a goal is 'end' or 'once', found '{when}'", "when")
+            raise FieldError(f"'when' of a goal is 'end', 'once' or 'kept', found '{when}'", "when")
+        if when != "kept" and fields.duration != type(self).duration:
+            raise FieldError(
+                f"'duration' of the goal '{relation}' of '{object}' goes with when='kept', and 'when' is "
+                f"'{when}'",
+                "duration",
+            )
         given = {"object": object, "place": place, "relation": relation, "when": when}
         for name, kept in {**given, **{name: getattr(fields, name) for name in lengths}}.items():
             super().__setattr__(name, kept)

@@ -18,7 +18,7 @@ import numpy as np
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Outcome, register_reason
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.units import COUNT, METRES, RADIANS
+from bt_tasksim.core.units import COUNT, METRES, RADIANS, SECONDS
 from bt_tasksim.core.world import Hidden, WorldModel
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.goal_verdict import (
@@ -43,6 +43,7 @@ __all__ = [
     "KNOCKED_OVER",
     "NEVER",
     "NOT_AT_REST",
+    "NOT_KEPT",
     "NO_GOAL",
     "PENETRATION",
     "GoalVerdict",
@@ -64,6 +65,12 @@ NO_GOAL = register_reason(
 )
 GOALS_REACHED = register_reason("goals_reached", "all {count:.0f} goals are reached: {said}", count=COUNT)
 NEVER = register_reason("never", "at no moment of the run, and in the end")
+NOT_KEPT = register_reason(
+    "not_kept",
+    "{goal} for {value} without a break at most, and not for {limit}",
+    value=SECONDS,
+    limit=SECONDS,
+)
 KNOCKED_OVER = register_reason(
     "knocked_over", "{object} was shifted by {shift} and tilted by {tilt:.0f}", shift=METRES, tilt=RADIANS
 )
@@ -142,8 +149,8 @@ def evaluate_success(
         configuration: The world as it was drawn, with its goals.
         world: Names and facts.
         hidden: The physics state at the end.
-        moments: What was seen of goals that have to be true once; None where nobody looked: then they are
-            judged at the end alone.
+        moments: What was seen of goals that have to be true once, or for a while; None where nobody looked:
+            then they are judged at the end alone.
         overlap: The two bodies that overlapped most; None where the engine does not say it.
 
     Raises:
@@ -171,6 +178,9 @@ def _goals(final: FinalState, moments: Moments | None) -> Iterator[GoalVerdict]:
         now = judge_goal(goal, final) if before is None else before
         if goal.when == "once" and not now.reached:
             now = dataclasses.replace(now, outcome=NEVER(now.outcome))
+        if goal.when == "kept" and before is None and moments is not None:
+            lasted = NOT_KEPT(goal=str(goal), value=moments.longest(goal), limit=goal.duration)
+            now = dataclasses.replace(now, reached=False, outcome=lasted)
         yield now
 
 

@@ -39,6 +39,7 @@ from bt_tasksim.scene.outlines import distance, hull, nearest_way
 from bt_tasksim.scene.relations.base import FinalState
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.scene.specs import Goal, ObjectSpec
+from bt_tasksim.trees import sequence
 from bt_tasksim.trees.from_goals import tidy
 from bt_tasksim.trees.load import load_source
 from bt_tasksim.trees.stages import lasting
@@ -249,3 +250,13 @@ def test_in_mujoco_too():
     runner = Runner(source.build(), source.scene, EngineOptions(engines="mujoco"))
     (result,) = successes(runner.run, range(7, 10), n=1)
     assert result.verdict.penetration < 0.002
+
+
+@pytest.mark.physical
+def test_a_block_that_is_slid_to_the_rim_and_not_held_there_misses_the_goal_of_hold():
+    source = load_source("hold")
+    begun = [child.model.arguments() for child in source.build().children[:2]]
+    leaves = [Grasp(**begun[0]), SlideToStop(**begun[1]), Place("block", anywhere=True), Release("block")]
+    with Runner(sequence("not held", *leaves), source.scene) as runner:
+        result = runner.run(7)
+    assert result.status == Status.SUCCESS and result.verdict.reason == "not_kept", result.why

@@ -1,4 +1,4 @@
-"""Hold a block against the rim of a board for two seconds."""
+"""Hold a block against the rim of a board for three seconds."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from bt_tasksim.scene import Goal, ObjectSpec, Scene
 from bt_tasksim.trees import sequence
 
 FORWARD = (1.0, 0.0, 0.0)
+SECONDS = 3.0
+"""For how long: much longer than a block is held there that is let go at once."""
 
 
 def scene(robot: str = "panda") -> Scene:
@@ -27,7 +29,7 @@ def scene(robot: str = "panda") -> Scene:
             )
         },
         goals=[
-            Goal("block", "ledge", relation="held_against", when="once"),
+            Goal("block", "ledge", relation="held_against", when="kept", duration=SECONDS),
             Goal("block", "ledge", relation="against"),
         ],
         name="hold",
@@ -40,7 +42,7 @@ def build() -> Behaviour:
         "press against the rim",
         Grasp("block", closing=(0.0, 1.0, 0.0)),
         SlideToStop("block", direction=FORWARD, distance=0.25, against="ledge"),
-        Hold("block", direction=FORWARD, duration=2.0),
+        Hold("block", direction=FORWARD, duration=SECONDS),
         Place("block", anywhere=True),
         Release("block"),
     )

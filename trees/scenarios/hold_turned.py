@@ -1,4 +1,4 @@
-"""Turn a lever with a spring onto its stop, and hold it there for two seconds."""
+"""Turn a lever with a spring onto its stop, and hold it there for four seconds."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from bt_tasksim.concept_nodes import Grasp, HoldTurned, TurnKnob
 from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
 
-TURNS = 1.3
+TURNS, SECONDS = 1.3, 4.0
 
 
 def scene(robot: str = "panda") -> Scene:
@@ -22,7 +22,7 @@ def scene(robot: str = "panda") -> Scene:
     return Scene(
         robot,
         fixtures=[FixtureSpec("lever", parameters=lever)],
-        goal=Goal("lever", relation="set", value=TURNS, angle_tolerance=0.06),
+        goal=Goal("lever", relation="set", value=TURNS, angle_tolerance=0.06, when="kept", duration=SECONDS),
         name="hold_turned",
     )
 
@@ -33,5 +33,5 @@ def build() -> Behaviour:
         "hold the lever on its stop",
         Grasp("lever"),
         TurnKnob("lever", angle=TURNS),
-        HoldTurned("lever", duration=2.0),
+        HoldTurned("lever", duration=SECONDS),
     )

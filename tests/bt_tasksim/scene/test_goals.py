@@ -53,7 +53,7 @@ def test_ways_to_write_a_goal(goal, fields):
         (lambda: Goal("cup", on="a", inside="b"), "found on='a' and inside='b'"),
         (lambda: Goal("cup", inside="bin", relation="beside"), "write on='bin', relation='beside'"),
         (lambda: Goal("cup", on="cup"), "refers to 'cup' itself"),
-        (lambda: Goal("cup", on="table", when="always"), "'end' or 'once', found 'always'"),
+        (lambda: Goal("cup", on="table", when="always"), "'end', 'once' or 'kept', found 'always'"),
         (lambda: Goal("cup", on="table", distance=math.nan), "'distance' should be .* finite"),
         (lambda: Goal("cup", on="table", height=-1), "'height' should be positive"),
         (lambda: Goal("cup", on="table", position_tolerance=None), "'position_tolerance' should be a number"),
@@ -320,6 +320,30 @@ def test_once_is_any_moment_at_which_it_is_at_rest_and_let_go():
         state(configuration, {"red": poses.pose([0.5, -0.1, 0.025], tilted(45))}),
         moments,
     ).success
+
+
+def test_kept_is_for_so_many_seconds_without_a_break():
+    goal = Goal("red", on="blue", when="kept", duration=1.0)
+    configuration, world = drawn(Scene(objects=OBJECTS, goals=[goal]))
+    moments = Moments(configuration, world)
+
+    def look(times, at):
+        for time in times:
+            moments.look(state(configuration, at, time=time))
+        return evaluate_success(configuration, world, state(configuration, STACKED), moments)
+
+    broken = look(np.arange(0.0, 0.96, 0.05), STACKED)
+    assert not broken.success and moments.open and broken.reason == "not_kept"
+    assert broken.why == "red on blue for 0.95 s without a break at most, and not for 1 s"
+    assert not look([0.96], {}).success
+    assert not look(np.arange(1.0, 1.96, 0.05), STACKED).success
+    found = look([2.0], STACKED)
+    assert found.success and not moments.open and found.placements[0].time == 2.0
+
+
+def test_a_duration_goes_with_kept():
+    with pytest.raises(FieldError, match=r"'duration' .* goes with when='kept', and 'when' is 'once'"):
+        Goal("red", on="blue", when="once", duration=2.0)
 
 
 def test_goals_for_the_end_alone_are_not_watched():
