@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from bt_tasksim.concept_nodes.joint_sweep import met
 from bt_tasksim.concept_nodes.turning import POSTURES, elbow_moved
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
@@ -71,8 +72,16 @@ class JointWay:
 
     @cached_property
     def beside(self) -> frozenset[str]:
-        """What the part touches on its way: furniture and the other parts of it."""
+        """Furniture and its parts: `met` looks at what the part would meet of these by itself."""
         return beside(self._view, self._target)
+
+    def met(self, begin: float, end: float) -> tuple[float, str] | None:
+        """How far the part may go before it meets something, see `met`, and the name of that."""
+        parts = self.poses(begin, end)
+        found = met(self._view, self._target, parts, self.carried)
+        return (
+            None if found is None else (begin + (found[0] - 1) / (len(parts) - 1) * (end - begin), found[1])
+        )
 
     def finder(self, tool: Array, closer: float, hand: Array | None = None) -> WayFinder:
         """Ways of an arm whose hand holds the part at a tool pose ``(7,)``."""
@@ -213,8 +222,9 @@ def carried_by(view: WorldView, target: str) -> frozenset[str]:
         model = view.model(name)
         if name == target or model.joint is not None or not np.isfinite(pose).all():
             continue
-        x, y, z = np.abs(poses.localise(here, pose[:3])) - size
-        if max(x, y) < ABOUT and z < ABOUT + max(model.extent) / 2:
+        at = poses.localise(here, pose[:3])
+        x, y = np.abs(at[:2]) - size[:2]
+        if max(x, y) < ABOUT and -size[2] < at[2] < size[2] + ABOUT + max(model.extent) / 2:
             found.add(name)
     return frozenset(found)
 

@@ -209,11 +209,16 @@ class OnJoint(ConceptModel[JointMemory]):
         if view.model(self.target).joint is None:
             raise NoWayError(NO_PART(object=self.target).sentence)
         way, shares = JointWay(view, self.target), SHARES if self.wholly else SHARES[:1]
-        pace = Pace(self.speed, TURN, ACCELERATION)
+        pace, met = Pace(self.speed, TURN, ACCELERATION), way.met(now, goal)
 
         def find(asked: tuple[float, float, float]) -> tuple[float, Route, bool]:
             share, closer, pivot = asked
             end = now + share * (goal - now)
+            if met is not None and abs(end - now) > abs(met[0] - now):
+                last = UNITS[self.turns].text(met[0])
+                raise NoWayError(
+                    f"{self.target} can only be moved to {last}, since {met[1]} is in its way: make room"
+                )
             beyond = self.stops * BEYOND[self.turns] if share == 1.0 else 0.0
             parts = way.poses(now, end + beyond)
             finder = way.alone(closer) if pivot else way.finder(view.tool, closer)

@@ -59,6 +59,7 @@ class JointModel:
         zero: Pose ``(7,)`` of the part in the robot base frame where the value is 0.
         limits: Lowest and highest value, metres or radians.
         sensed: The robot sees how far it is open; else it knows only what its hand has done with it.
+        fixture: Name of the fixture whose part it moves.
     """
 
     kind: str
@@ -67,6 +68,7 @@ class JointModel:
     zero: tuple[float, ...]
     limits: tuple[float, float]
     sensed: bool = False
+    fixture: str = ""
 
     @property
     def turns(self) -> bool:

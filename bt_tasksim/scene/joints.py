@@ -24,7 +24,6 @@ class Joint(JointModel):
         stiffness: Of its spring, N/m or Nm/rad.
         rest: Value at which the spring is at rest.
         latch: Force or torque with which a latch holds it shut, N or Nm.
-        fixture: Name of the fixture whose part it moves.
     """
 
     friction: float = 0.0
@@ -32,7 +31,6 @@ class Joint(JointModel):
     stiffness: float = 0.0
     rest: float = 0.0
     latch: float = 0.0
-    fixture: str = ""
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Joint:
