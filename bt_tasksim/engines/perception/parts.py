@@ -27,6 +27,8 @@ TOUCHED = 0.012
 and estimates err."""
 ASIDE, TURNED = 0.002, math.radians(2.0)
 """Metres and radians by which good estimates are wrong."""
+SLIPPED = 0.5
+"""Share of the distance of its tips from their middle to which a hand closes when a part slips out of it."""
 FIST = 0.9
 """Closure from which a hand is a fist."""
 
@@ -41,6 +43,7 @@ class TrackedPart:
         joint: Its joint ``(1,)``.
         told: How far it is open at the beginning ``(1,)``, as the scene says.
         value: How far it is taken to be open ``(1,)``, once somebody has looked.
+        spread: Metres of the fingertips from their middle, at most, since some touch; 0 once they open.
     """
 
     column: int
@@ -48,6 +51,7 @@ class TrackedPart:
     joint: Joints
     told: Array
     value: Array | None = None
+    spread: float = 0.0
 
     @property
     def sensed(self) -> bool:
@@ -63,6 +67,11 @@ class HandContact:
     tips: Array
     touching: Array
     closure: float
+
+    @property
+    def spread(self) -> float:
+        """The farthest that a tip is from their middle, metres."""
+        return float(np.linalg.norm(self.tips - self.tips.mean(axis=0), axis=-1).max())
 
 
 class Parts:
@@ -127,7 +136,11 @@ class Parts:
         if before is None:
             return
         both = before.touching & hand.touching
-        if not both.any():
+        if int(both.sum()) > 1:
+            part.spread = max(part.spread, hand.spread)
+        elif hand.spread > part.spread:  # it has opened
+            part.spread = 0.0
+        if not both.any() or hand.spread < SLIPPED * part.spread:
             return
         pose = part.joint.pose(part.value)[0]
         was, now = before.tips[both], hand.tips[both]

@@ -37,7 +37,7 @@ class Robot:
         grip = self.world.objects[0].grasps[0]
         return poses.transform(self.pose(value), np.array(grip.point))
 
-    def sees(self, value, at=FAR, force=0.0, shut=False):
+    def sees(self, value, at=FAR, force=0.0, shut=False, apart=0.016):
         """The value that it takes the part to have."""
         pose = np.full(7, np.nan) if value is None else self.pose(value)
         hand = ROBOT.hand_closed if shut else ROBOT.hand_open
@@ -49,7 +49,7 @@ class Robot:
             tip_force=np.full((2, 3), force),
             wrench=np.zeros(6),
             tool_pose=poses.pose(np.array(at)),
-            tips=np.array([at, at]) + np.array([[0, 0, 0.008], [0, 0, -0.008]]),
+            tips=np.array([at, at]) + np.array([[0, 0, apart / 2], [0, 0, -apart / 2]]),
             objects=pose[None],
             velocities=np.zeros((1, 6)),
         )
@@ -92,6 +92,21 @@ def test_it_goes_along_with_fingers_that_hold_its_handle(fixture, way):
     for value in np.linspace(way, 0.0, 9):  # let go: it stays
         found = robot.sees(0.0, robot.grasp(value), force=0.0)
     assert found == pytest.approx(way, abs=1e-6)
+
+
+def test_it_stays_where_fingers_slip_off_it_and_close_on_one_another():
+    robot = Robot()
+    robot.sees(0.0)
+    for value in (0.0, 0.01, 0.02):
+        robot.sees(0.0, robot.grasp(value), force=1.0)
+    robot.sees(0.0, robot.grasp(0.02), force=0.0, apart=0.005)  # for an instant they touch nothing
+    for value in (0.03, 0.05, 0.1):
+        found = robot.sees(0.0, robot.grasp(value), force=1.0, apart=0.002)
+    assert found == pytest.approx(0.02, abs=1e-6)
+    robot.sees(0.0, robot.grasp(0.02), apart=0.05)
+    for value in (0.02, 0.03, 0.04):  # taken again
+        found = robot.sees(0.0, robot.grasp(value), force=1.0)
+    assert found == pytest.approx(0.04, abs=1e-6)
 
 
 def test_fingers_elsewhere_move_nothing():
