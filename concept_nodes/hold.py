@@ -126,7 +126,14 @@ class Hold(ConceptModel[HoldMemory]):
 
     def command(self, action: Array, seen: Seen, memory: HoldMemory) -> Command:
         """A little beyond where it began."""
+        return self._commanded(memory, self.advance(action, seen, memory))
+
+    def carry_out(self, action: Array, seen: Seen, memory: HoldMemory) -> tuple[Command, HoldMemory]:
+        """Both, of one step."""
         after = self.advance(action, seen, memory)
+        return self._commanded(memory, after), after
+
+    def _commanded(self, memory: HoldMemory, after: HoldMemory) -> Command:
         return Command(tool=poses.shifted(memory.start, after.pushed[:, None] * memory.along))
 
     def advance(self, action: Array, seen: Seen, memory: HoldMemory) -> HoldMemory:

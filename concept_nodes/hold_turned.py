@@ -128,7 +128,16 @@ class HoldTurned(ConceptModel[HoldTurnedMemory]):
 
     def command(self, action: Array, seen: Seen, memory: HoldTurnedMemory) -> Command:
         """A little beyond the stop."""
+        return self._commanded(seen, self.advance(action, seen, memory))
+
+    def carry_out(
+        self, action: Array, seen: Seen, memory: HoldTurnedMemory
+    ) -> tuple[Command, HoldTurnedMemory]:
+        """Both, of one step."""
         after = self.advance(action, seen, memory)
+        return self._commanded(seen, after), after
+
+    def _commanded(self, seen: Seen, after: HoldTurnedMemory) -> Command:
         return Command(tool=self._tool(seen, after, after.pushed / after.reach))
 
     def advance(self, action: Array, seen: Seen, memory: HoldTurnedMemory) -> HoldTurnedMemory:

@@ -188,8 +188,15 @@ class PressButton(ConceptModel[PressMemory]):
 
     def command(self, action: Array, seen: Seen, memory: PressMemory) -> Command:
         """Make a fist and come, press, and draw back."""
-        xp, begun = array_namespace(seen.tool), seen.elapsed >= memory.come.duration
+        return self._commanded(seen, memory, self.advance(action, seen, memory))
+
+    def carry_out(self, action: Array, seen: Seen, memory: PressMemory) -> tuple[Command, PressMemory]:
+        """Both, of one step."""
         after = self.advance(action, seen, memory)
+        return self._commanded(seen, memory, after), after
+
+    def _commanded(self, seen: Seen, memory: PressMemory, after: PressMemory) -> Command:
+        xp, begun = array_namespace(seen.tool), seen.elapsed >= memory.come.duration
         (first, arm), (then, joints) = (
             at_times(memory.come, seen.elapsed),
             at_times(memory.down, after.progress),

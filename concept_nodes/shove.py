@@ -315,7 +315,14 @@ class Shove(ConceptModel[ShoveMemory]):
 
     def command(self, action: Array, seen: Seen, memory: ShoveMemory) -> Command:
         """Come behind the thing, move it, and draw back."""
+        return self._commanded(seen, memory, self.advance(action, seen, memory))
+
+    def carry_out(self, action: Array, seen: Seen, memory: ShoveMemory) -> tuple[Command, ShoveMemory]:
+        """Both, of one step."""
         after = self.advance(action, seen, memory)
+        return self._commanded(seen, memory, after), after
+
+    def _commanded(self, seen: Seen, memory: ShoveMemory, after: ShoveMemory) -> Command:
         xp = array_namespace(seen.tool)
         coming, arm = at_times(memory.path, self._since(seen))
         across = _across(memory.along)

@@ -186,7 +186,14 @@ class Slid(ConceptModel[SlidMemory]):
 
     def command(self, action: Array, seen: Seen, memory: SlidMemory) -> Command:
         """Where the path is, and lower; the hand keeps its grip."""
+        return self._commanded(memory, self.advance(action, seen, memory))
+
+    def carry_out(self, action: Array, seen: Seen, memory: SlidMemory) -> tuple[Command, SlidMemory]:
+        """Both, of one step."""
         after = self.advance(action, seen, memory)
+        return self._commanded(memory, after), after
+
+    def _commanded(self, memory: SlidMemory, after: SlidMemory) -> Command:
         tool = sample(memory.path, after.progress)
         down = constant([0.0, 0.0, -1.0], tool) * after.lowered[:, None]
         return Command(tool=poses.shifted(tool, down))
