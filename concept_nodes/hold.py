@@ -16,13 +16,14 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
-from bt_tasksim.concept_nodes.stops import no_way_named, ways_in
+from bt_tasksim.concept_nodes.stops import gaps, no_way_named, ways_in
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS, SECONDS
 from bt_tasksim.core.world import Command
+from bt_tasksim.scene.walls import CLOSE
 
 PRESSED = Form(
     "{object} is pressed with {force:.1f}, {held:.1f} of {duration:.1f} held",
@@ -37,6 +38,8 @@ GIVES_WAY = register_reason(
 YIELDS, QUICKEST, SMOOTH = 0.0008, 0.01, 0.3
 """Metres per second for each newton that is missing, at most so many; and the share of each reading of the
 force in the smoothed one."""
+STEEP = 0.5
+"""Upward part of a direction from which on what is pressed that way is not pressed against a wall."""
 
 
 class HoldMemory(NamedTuple):
@@ -164,9 +167,17 @@ class Hold(ConceptModel[HoldMemory]):
         return poses.clip(self.duration - memory.held, 0.0, self.duration)
 
     def sufficient_cost(self, known: Known, memory: HoldMemory) -> Array:
-        """1 unless the object touches something besides the hand."""
-        xp, like = array_namespace(known.hidden.tool_pose), known.hidden.tool_pose[:, 0]
-        return xp.where(known.supported(self.target), xp.zeros_like(like), xp.ones_like(like))
+        """The true gap to the stop, over what counts as touching; 1 at least unless it is between two things.
+
+        What is pressed up or down has no wall beside it: there it has to touch something besides the hand.
+        """
+        xp, nothing = array_namespace(known.hidden.tool_pose), known.hidden.tool_pose[:, 0] * 0.0
+        steep = self.direction is not None and abs(self.direction[2]) > STEEP
+        apart = nothing
+        if self.against is not None or not steep:
+            apart = gaps(known.world, known.hidden.objects, self.target, self.against) / CLOSE
+        between = known.supported(self.target) & (known.hand_force(self.target) > 0.0)
+        return xp.where(between, apart, xp.maximum(apart, nothing + 1.0))
 
     def explain(self, seen: Seen, memory: HoldMemory) -> Statement:
         """What is felt, and for how long it has been so."""

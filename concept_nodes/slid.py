@@ -62,6 +62,8 @@ LIGHT, BARELY = 0.3, 0.1
 YIELDED = 0.006
 """Metres below where the support should be to which it presses on: what slips in the hand is not followed any
 farther, since fingers would come down on the support."""
+GOOD = 0.03
+"""Metres from where it should end that are tolerable."""
 HIGH = 0.15
 """Metres above its support from which something may come down on it to slide."""
 
@@ -259,9 +261,13 @@ class Slid(ConceptModel[SlidMemory]):
         return poses.norm((memory.path.table[:, -1, :3] - seen.tool[:, :3])[:, :2])
 
     def sufficient_cost(self, known: Known, memory: SlidMemory) -> Array:
-        """1 unless the object touches what it slides on."""
-        xp, like = array_namespace(known.hidden.tool_pose), known.hidden.tool_pose[:, 0]
-        return xp.where(known.supported(self.target), xp.zeros_like(like), xp.ones_like(like))
+        """What `missed` says of where it truly is; 1 at least unless it touches what it slides on."""
+        xp, missed = array_namespace(known.hidden.tool_pose), self.missed(known)
+        return xp.where(known.supported(self.target), missed, xp.maximum(missed, xp.ones_like(missed)))
+
+    def missed(self, known: Known) -> Array:
+        """How far ``(N,)`` the object truly is from where it should end, over what is tolerable."""
+        raise NotImplementedError
 
     def explain(self, seen: Seen, memory: SlidMemory) -> Statement:
         """What is left of the way, and what is felt."""

@@ -22,13 +22,14 @@ from bt_tasksim.concept.parameters import (
     Position,
 )
 from bt_tasksim.concept.presentation import Presentation
-from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.destination import destination
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
-from bt_tasksim.concept_nodes.slid import Slid, level, not_level
+from bt_tasksim.concept_nodes.slid import GOOD, Slid, level, not_level
 from bt_tasksim.concept_nodes.standing import reference_frame
 from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
+from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 
@@ -101,6 +102,22 @@ class Slide(Slid):
             end = level(self.direction, self.distance, now) + xp.zeros_like(now)
         points = [*(end + constant(via, now) for via in self.via), end]
         return [xp.concat([point[:, :2], xp.zeros_like(point[:, 2:])], axis=-1) for point in points]
+
+    def missed(self, known: Known) -> Array:
+        """How far its middle truly is from its goal, seen from above; 0 where nobody knows where it was."""
+        now = known.object(self.target)[:, :3]
+        if self.to is not None:
+            there = self.to in known.world.place_columns
+            goal = (known.place(self.to).pose if there else known.object(self.to))[:, :3]
+        elif self.position is not None:
+            goal = 0.0 * now + constant(self.position, now)
+        elif known.began is None:
+            goal = now
+        else:
+            assert self.direction is not None and self.distance is not None
+            before = Known(known.began, known.world).object(self.target)[:, :3]
+            goal = before + level(self.direction, self.distance, now)
+        return poses.norm((now - goal)[:, :2]) / GOOD
 
     def aim(self, view: WorldView) -> Aim | None:
         """To where it ends, where that is said."""

@@ -21,11 +21,11 @@ from bt_tasksim.concept.parameters import (
     PlaceName,
 )
 from bt_tasksim.concept.presentation import Presentation
-from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.shoved_way import touching_now
-from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, not_level
-from bt_tasksim.concept_nodes.stops import nearest_stop, no_way_named, way_in, ways_in
+from bt_tasksim.concept_nodes.slid import GOOD, Slid, SlidMemory, not_level
+from bt_tasksim.concept_nodes.stops import CLEAR, gaps, nearest_stop, no_way_named, way_in, ways_in
 from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
@@ -89,6 +89,17 @@ class SlideOff(Slid):
         ways = [poses.shifted(view.objects[self.target], share * self.distance * along) for share in SHARES]
         supports = touching_now(view, self.target).union(support_of(view, self.target)[0])
         return Aim(np.array(ways), "be slid off a stop", supports, along=True)
+
+    def missed(self, known: Known) -> Array:
+        """What is missing of a clear gap to what it leaves, or of its way, over what is tolerable."""
+        if self.off is not None:
+            gap = gaps(known.world, known.hidden.objects, self.target, self.off)
+            return poses.clip(1.0 - gap / CLEAR, 0.0, 1.0)
+        now = known.object(self.target)[:, :3]
+        if known.began is None:  # nobody knows where it was
+            return now[:, 0] * 0.0
+        way = now - Known(known.began, known.world).object(self.target)[:, :3]
+        return poses.clip(self.distance - poses.norm(way[:, :2]), 0.0, math.inf) / GOOD
 
     def _ended(self, seen: Seen, memory: SlidMemory) -> Array:
         """It has come its way, and the tool is there."""

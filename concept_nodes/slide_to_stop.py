@@ -14,12 +14,12 @@ from bt_tasksim.concept.demonstrated import straight_words
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
 from bt_tasksim.concept.presentation import Presentation
-from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.shoved_way import free_until
 from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, not_level
 from bt_tasksim.concept_nodes.standing import supports_of
-from bt_tasksim.concept_nodes.stops import UP, no_way_named, way_in, ways_in
+from bt_tasksim.concept_nodes.stops import UP, gaps, no_way_named, way_in, ways_in
 from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
@@ -28,6 +28,7 @@ from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import SECONDS
 from bt_tasksim.planning.reference_motion import position
+from bt_tasksim.scene.walls import CLOSE
 
 NO_STOP = register_reason(
     "no_stop",
@@ -127,6 +128,10 @@ class SlideToStop(Slid):
         creeps, presses = (xp.full_like(speed, most) for most in (CREEPS, PRESSES))
         most = xp.where(memory.met, presses, xp.where(near, creeps, speed + creeps))
         return xp.minimum(most / xp.maximum(speed, most), xp.ones_like(speed))
+
+    def missed(self, known: Known) -> Array:
+        """The true gap to the stop, over what counts as touching."""
+        return gaps(known.world, known.hidden.objects, self.target, self.against) / CLOSE
 
     def planned(self, memory: SlidMemory) -> Array | float:
         """How long what it goes slowly takes, twice: it waits where it does not press."""

@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.parameters import Metres, ObjectName, PlaceName
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.destination import destination
 from bt_tasksim.concept_nodes.holding import holding
-from bt_tasksim.concept_nodes.stops import nearest_stop
-from bt_tasksim.concept_nodes.view import views
+from bt_tasksim.concept_nodes.stops import CLEAR, gaps
 from bt_tasksim.concept_nodes.whereabouts import Estimates
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Statement
-from bt_tasksim.core.poses import Array, array_namespace, host
+from bt_tasksim.core.poses import Array, host
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES
 from bt_tasksim.scene.spatial_laws import is_on
@@ -29,8 +26,6 @@ BESIDE = Form(
     {"distance": METRES, "height": METRES},
 )
 LET_GO = ", and not in the hand"
-FAR = 10.0
-"""Metres that things are taken to be apart where there is no wall."""
 TOUCHES = 0.01
 """Metres above a surface up to which something may seem to be that is pressed on it."""
 
@@ -49,13 +44,10 @@ class _FromWalls(Condition):
     def _gap(self, seen: Seen) -> Array:
         """Metres ``(N,)`` to the nearest of them."""
 
-        def find() -> list[float]:
-            found = (nearest_stop(view, self.target, self.other) for view in views(seen))
-            return [FAR if stop is None else max(stop.gap, 0.0) for stop in found]
+        def find() -> Array:
+            return gaps(seen.world, seen.objects, self.target, self.other)
 
-        gaps = seen.once(("stop", self.target, self.other), find)
-        like = seen.tool
-        return array_namespace(like).asarray(np.array(gaps), dtype=like.dtype, device=like.device)
+        return seen.once(("stop", self.target, self.other), find)
 
 
 @register("concept")
@@ -117,7 +109,7 @@ class ClearOf(_FromWalls):
 
     target: ObjectName
     other: PlaceName | None = None
-    gap: Metres = 0.02
+    gap: Metres = CLEAR
 
     relation = "clear_of"
     rests_on_place = False

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -10,54 +11,69 @@ from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
+from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.poses import Array, constant
-from bt_tasksim.planning.surroundings import things_of
-from bt_tasksim.planning.things import Thing, box_corners
-from bt_tasksim.scene.outlines import Slab, hull, nearest_way
-from bt_tasksim.scene.relations.against import beside
+from bt_tasksim.core.transfer import fetched
+from bt_tasksim.core.world import Obstacle, WorldModel
+from bt_tasksim.planning.surroundings import pieces_of
+from bt_tasksim.planning.things import box_corners
+from bt_tasksim.scene.outlines import Slab, hull
+from bt_tasksim.scene.walls import Wall, nearest_wall
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
-class Stop(NamedTuple):
-    """The nearest wall of a thing.
-
-    Attributes:
-        gap: Metres to it; negative where they seem to overlap.
-        towards: Level unit vector ``(3,)`` in which the thing comes to it.
-    """
-
-    gap: float
-    towards: Array
+FAR = 10.0
+"""Metres that things are taken to be apart where there is no wall."""
+CLEAR = 0.02
+"""Metres from walls from which on a thing is clear of them."""
 
 
-def nearest_stop(view: WorldView, target: str, other: str | None = None) -> Stop | None:
-    """The nearest wall beside a thing, as far as is seen and known; None where there is none.
-
-    What is below it is none, see `bt_tasksim.scene.relations.against`.
+def nearest_stop(view: WorldView, target: str, other: str | None = None) -> Wall | None:
+    """The nearest wall beside a thing, as far as is seen and known, see `bt_tasksim.scene.walls`.
 
     Args:
         view: The world.
         target: The thing.
         other: Another object, or a place: then the fixture that it belongs to; by default anything.
+
+    Returns:
+        None where there is none.
     """
-    things = things_of(view.world, view.objects)
-    mine = [slab for thing in things if thing.name == target for slab in _slabs(thing)]
-    if not mine:
-        return None
-    named = None if other is None else whose(view, other)
-    others = [thing for thing in things if thing.name != target and named in (None, thing.name)]
-    around = [slab for thing in others for slab in _slabs(thing)]
-    ways = [nearest_way(part.outline, wall.outline) for part in mine for wall in beside(mine, around)]
-    if not ways:
-        return None
-    gap, way = min(ways, key=lambda found: round(found[0], 9))
-    return Stop(round(gap, 9), np.append(np.round(way, 9), 0.0))
+    return _nearest(view.world, view.objects, target, other)
 
 
-def whose(view: WorldView, name: str) -> str:
+def gaps(world: WorldFacts, objects: Array, target: str, other: str | None) -> Array:
+    """Metres ``(N,)`` from a thing to the nearest wall beside it; 0 where they overlap, `FAR` without one.
+
+    Args:
+        world: What is known of the worlds.
+        objects: Poses ``(N, objects, 7)``: estimated, or true.
+        target: The thing.
+        other: As of `nearest_stop`.
+    """
+    found = []
+    for k, rows in enumerate(np.asarray(fetched([objects])[0], float)):
+        model = world.model_of(k)
+        named = {each.name: rows[world.columns[each.name]] for each in model.objects}
+        stop = _nearest(model, named, target, other)
+        found.append(FAR if stop is None else max(stop.gap, 0.0))
+    return constant(np.array(found), objects)
+
+
+def _nearest(world: WorldModel, objects: Mapping[str, Array], target: str, other: str | None) -> Wall | None:
+    """See `nearest_stop`. The outlines of what is not asked about are not made."""
+    named = None if other is None else whose(world, other)
+    walls = [_standing(box) for box in world.obstacles if named in (None, box.fixture or "furniture")]
+    for name in objects:
+        if name != target and named in (None, name):
+            walls += _slabs(world, objects, name)
+    return nearest_wall(_slabs(world, objects, target), walls)
+
+
+def whose(world: WorldModel, name: str) -> str:
     """The name under which an object, or the fixture of a place, is kept clear of."""
-    place = view.world.places.get(name)
+    place = world.places.get(name)
     return name if place is None else place.fixture or "furniture"
 
 
@@ -113,10 +129,24 @@ def _gap(view: WorldView, target: str, other: str | None) -> float:
     return 0.0 if found is None else found.gap
 
 
-def _slabs(thing: Thing) -> list[Slab]:
-    pieces = thing.pieces if thing.size is None else [box_corners(thing.size)]
-    found = []
-    for piece in pieces:
-        corners = poses.transform(thing.pose, piece)
-        found.append(Slab(hull(corners[:, :2]), float(corners[:, 2].min()), float(corners[:, 2].max())))
-    return found
+def _slabs(world: WorldModel, objects: Mapping[str, Array], name: str) -> list[Slab]:
+    """Parts of an object from above, where it is; none where it was never seen."""
+    pose = objects.get(name)
+    if pose is None or not bool(np.isfinite(pose).all()):
+        return []
+    return [_slab(poses.transform(poses.unit_pose(pose), piece)) for piece in pieces_of(world.object(name))]
+
+
+def _slab(corners: Array) -> Slab:
+    return Slab(hull(corners[:, :2]), float(corners[:, 2].min()), float(corners[:, 2].max()))
+
+
+def _standing(box: Obstacle) -> Slab:
+    """A box of furniture from above, which stays as it is."""
+    pose = np.asarray(box.pose, float)
+    return _box(tuple(pose.tolist()), tuple(box.size))
+
+
+@lru_cache(maxsize=1024)
+def _box(pose: tuple[float, ...], size: tuple[float, float, float]) -> Slab:
+    return _slab(poses.transform(np.array(pose), box_corners(size)))

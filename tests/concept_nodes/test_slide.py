@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from py_trees.common import Status
 
-from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes import (
     Against,
     ClearOf,
@@ -223,6 +223,27 @@ def test_conditions_say_of_a_block_at_a_rim_what_goals_do(aside, against, clear)
         assert parts("goal relation")[relation]().evaluate(goal, truly).reached == wanted
         assert condition.holds(seen).tolist() == [wanted]
     assert ClearOf.value("block").holds(seen).tolist() == [clear]
+
+
+@pytest.mark.parametrize(("aside", "held", "costs"), [(0.0, 1.0, 0.0), (0.005, 1.0, 5 / 3), (0.0, 0.0, 0.0)])
+def test_costs_of_stops_are_true_gaps_and_not_that_the_board_is_touched(aside, held, costs):
+    view, _ = on_the_ledge(aside)
+    hidden = SimpleNamespace(
+        objects=np.array([[view.objects["block"]]]),
+        tool_pose=view.tool[None],
+        support=np.ones((1, 1, 2), bool),
+        hand_force=np.array([[held]]),
+    )
+    known = Known(hidden, WorldFacts.of([view.world]))
+    for model in (SlideToStop.value("block", against="ledge"), SlideToStop.value("block", direction=FORWARD)):
+        assert model.sufficient_cost(known, None)[0] == pytest.approx(costs, abs=1e-3)
+    hold = Hold.value("block", against="ledge").sufficient_cost(known, None)[0]
+    assert hold == pytest.approx(max(costs, 1.0 - held), abs=1e-3)
+    off = SlideOff.value("block", off="ledge").sufficient_cost(known, None)[0]
+    assert off == pytest.approx(1.0 - aside / ClearOf.gap, abs=1e-3)
+    there = view.objects["block"][:2] + np.array([0.06, 0.0])
+    slide = Slide.value("block", position=(*there, 0.0)).sufficient_cost(known, None)[0]
+    assert slide == pytest.approx(2.0)
 
 
 def test_trees_from_goals_slide_things_against_and_off_their_stops():

@@ -5,19 +5,14 @@ It may touch from any side; what is below it is no wall. In the hand it may stil
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES
-from bt_tasksim.scene.outlines import Slab, distance, fixture_slabs
+from bt_tasksim.scene.outlines import Slab, fixture_slabs
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, lean
 from bt_tasksim.scene.specs import Goal
+from bt_tasksim.scene.walls import CLOSE, nearest_wall
 
-CLOSE = 0.003
-"""Metres from it within which a thing is against a wall."""
-WALL = 0.005
-"""Metres by which a wall is higher than the foot of what is against it, at least."""
 IS_AGAINST = register_reason("is_against", "{object} is against {place}, {gap} apart", gap=METRES)
 NOT_AGAINST = register_reason("not_against", "{object} is {gap} from the walls of {place}", gap=METRES)
 NO_WALL = register_reason("no_wall", "{place} has nothing that {object} could be against")
@@ -41,15 +36,8 @@ class IsAgainst(GoalRelation):
 
 def gap_to_walls(goal: Goal, final: FinalState) -> float | None:
     """Metres from a goal's object to the nearest wall of its place; None where that has none."""
-    parts = final.parts(goal.object)
-    walls = beside(parts, _walls(goal, final))
-    return min((distance(part.outline, wall.outline) for part in parts for wall in walls), default=None)
-
-
-def beside(parts: Sequence[Slab], around: Sequence[Slab]) -> list[Slab]:
-    """Of what is around a thing, its walls: they are as high as it somewhere, and not what it stands on."""
-    foot, head = min(part.low for part in parts), max(part.high for part in parts)
-    return [wall for wall in around if wall.high > foot + WALL and wall.low < head]
+    found = nearest_wall(final.parts(goal.object), _walls(goal, final))
+    return None if found is None else found.gap
 
 
 def _walls(goal: Goal, final: FinalState) -> tuple[Slab, ...]:
