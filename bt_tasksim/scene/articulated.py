@@ -98,7 +98,10 @@ def _root(path: Path) -> Element:
     for limit in root.iter("limit"):
         if _number(limit.get("lower")) > _number(limit.get("upper")):
             raise InputError(f"fixture file '{path}': a joint's 'lower' limit is above its 'upper' one")
-    if root.tag == "robot":  # links that are fixed to others keep their names
+    if root.tag == "robot":  # links that are fixed to others keep their names, and shapes have different ones
+        for link in root.iter("link"):
+            for k, shape in enumerate(link.iter("collision")):
+                shape.set("name", f"{link.get('name', '')} {shape.get('name', '')} {k}")
         own = Element("mujoco")
         own.append(Element("compiler", {"fusestatic": "false", "discardvisual": "true"}))
         root.append(own)
