@@ -125,13 +125,7 @@ def box_turns() -> Array:
 
 def _nearest_heading(now: Array, up: Array) -> Array:
     """Of the rotations that bring an object's z axis along ``up (3,)`` the one nearest to ``now (4,)``."""
-    axis = poses.rotate(now, UP)
-    turn = np.cross(axis, up)
-    length, along = float(np.linalg.norm(turn)), float(axis @ up)
-    if length < 1e-9:
-        turn = np.zeros(3) if along > 0.0 else np.pi * poses.rotate(now, np.array([1.0, 0.0, 0.0]))
-    else:
-        turn = turn * (np.arctan2(length, along) / length)
+    turn = poses.shortest_turn(poses.rotate(now, UP), up, poses.rotate(now, np.array([1.0, 0.0, 0.0])))
     found: Array = poses.quat_multiply(poses.from_rotation_vector(turn), now)
     return found
 

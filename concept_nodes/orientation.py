@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from bt_tasksim.concept.condition import Condition
 from bt_tasksim.concept.parameters import Direction, ObjectName, PlaceName, Radians
 from bt_tasksim.concept.seen import Seen
@@ -21,8 +19,6 @@ from bt_tasksim.scene.specs import Goal
 
 TURNED_BY = Form("{object} is {angle:.0f} from how it should be turned", {"angle": RADIANS})
 UP = (0.0, 0.0, 1.0)
-SAME = 1e-9
-"""Sine of the angle between directions that are the same, or opposite."""
 
 
 class _HeldTurned(Condition):
@@ -142,20 +138,5 @@ def missing_lean(now: Array, axis: tuple[float, float, float]) -> Array:
         now: Poses ``(N, 7)`` of the things.
         axis: The axis, in their frame.
     """
-    xp = array_namespace(now)
     up = poses.rotate(now[:, 3:], constant(axis, now) + 0.0 * now[:, :3])
-    about = poses.cross(up, constant(UP, now) + 0.0 * up)
-    length = poses.norm(about)
-    small = length <= SAME
-    angle = xp.atan2(length, up[:, 2])
-    aside = poses.rotate(now[:, 3:], constant(_across(axis), now) + 0.0 * up)
-    turn = about * (angle / xp.where(small, xp.ones_like(length), length))[:, None]
-    return xp.where(small[:, None], angle[:, None] * aside, turn)
-
-
-def _across(axis: tuple[float, float, float]) -> Array:
-    """A unit vector ``(3,)`` at right angles to another one."""
-    least = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    across = np.cross(np.array(axis), least)
-    found: Array = across / np.linalg.norm(across)
-    return found
+    return poses.shortest_turn(up, constant(UP, now) + 0.0 * up)

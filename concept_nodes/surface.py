@@ -69,14 +69,7 @@ def upright(frame: Array, now: Array, cubic: Array | None = None) -> Array:
     up, should = poses.z_axis(now[:, 3:]), poses.z_axis(frame[:, 3:])
     if cubic is not None:
         up = xp.where(cubic[:, None], _highest_axis(now, should), up)
-    axis = poses.cross(up, should)
-    length = poses.norm(axis)
-    small = length <= 1e-9
-    angle = xp.atan2(length, poses.dot(up, should)) / xp.where(small, xp.ones_like(length), length)
-    tilt = axis * xp.where(small, xp.zeros_like(length), angle)[:, None]
-    over = small & (poses.dot(up, should) < 0.0)
-    half = math.pi * poses.rotate(now[:, 3:], constant([1.0, 0.0, 0.0], now))
-    tilt = xp.where(over[:, None], half, tilt)
+    tilt = poses.shortest_turn(up, should, poses.rotate(now[:, 3:], constant([1.0, 0.0, 0.0], now)))
     return poses.quat_multiply(poses.from_rotation_vector(tilt), now[:, 3:])
 
 

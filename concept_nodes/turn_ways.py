@@ -64,14 +64,7 @@ def _about(now: Array, axis: Array, direction: Array) -> Array:
 
     All around; the one that is the shortest turn from a rotation ``(4,)`` is among them.
     """
-    is_now = poses.rotate(now, axis)
-    about = np.cross(is_now, direction)
-    length, along = float(np.linalg.norm(about)), float(is_now @ direction)
-    if length < NOTHING:
-        across = np.cross(is_now, np.eye(3)[int(np.argmin(np.abs(is_now)))])
-        turn = np.zeros(3) if along > 0.0 else np.pi * across / np.linalg.norm(across)
-    else:
-        turn = about * (np.arctan2(length, along) / length)
+    turn = poses.shortest_turn(poses.rotate(now, axis), direction)
     first = poses.quat_multiply(poses.from_rotation_vector(turn), now)
     angles = 2.0 * np.pi * np.arange(AROUND) / AROUND
     found: Array = poses.quat_multiply(poses.from_rotation_vector(angles[:, None] * direction), first[None])

@@ -22,6 +22,8 @@ Array = Any
 """An array of the Python array API standard, such as ``numpy.ndarray`` or ``torch.Tensor``."""
 
 _EPS = 1e-12
+_SAME = 1e-9
+"""Sine of the angle between directions that are the same, or opposite."""
 _UP = [0.0, 0.0, 1.0]
 
 
@@ -310,6 +312,33 @@ def interpolate(a: Array, b: Array, fraction: Array) -> Array:
     rotation = quat_multiply(a[..., 3:], from_rotation_vector(share * turn))
     position = a[..., :3] + share * (b[..., :3] - a[..., :3])
     return xp.concat([position, rotation], axis=-1)
+
+
+def shortest_turn(a: Array, b: Array, aside: Array | None = None) -> Array:
+    """Rotation vectors ``(..., 3)`` of the shortest turns of unit vectors ``(..., 3)`` onto others, radians.
+
+    Args:
+        a: The unit vectors.
+        b: Where they are to point.
+        aside: Unit vectors at right angles to ``a`` about which those turn that point straight away from
+            ``b``; by default some.
+    """
+    xp = array_namespace(a, b)
+    about = cross(a, b)
+    length = norm(about)
+    same = length <= _SAME
+    angle = xp.atan2(length, dot(a, b))
+    turn = about * (angle / xp.where(same, xp.ones_like(length), length))[..., None]
+    return xp.where(same[..., None], angle[..., None] * (_across(a) if aside is None else aside), turn)
+
+
+def _across(a: Array) -> Array:
+    """Unit vectors ``(..., 3)`` at right angles to others."""
+    xp = array_namespace(a)
+    x, y, z = (xp.abs(a[..., k : k + 1]) for k in range(3))
+    along_x, along_y, along_z = (constant(axis, a) for axis in _AXES.tolist())
+    least = xp.where(y <= z, along_y, along_z)
+    return unit(cross(a, xp.where((x <= y) & (x <= z), along_x, least)))
 
 
 def frame_from_axes(z: Array, y: Array) -> Array:

@@ -134,15 +134,9 @@ def _along_approach(errors: Array, configuration: ActorConfiguration) -> Array:
     for i, actor in enumerate(configuration.objects):
         towards = access.get(actor.on)
         if towards is not None:
-            out[i] = poses.rotate(_shortest_turn(_DOWN, towards), errors[i])
+            turn = poses.shortest_turn(_DOWN, np.asarray(towards))
+            out[i] = poses.rotate(poses.from_rotation_vector(turn), errors[i])
     return out
-
-
-def _shortest_turn(a: Array, b: Array) -> Array:
-    """Unit quaternion ``(4,)`` of the shortest turn from one unit vector ``(3,)`` to another."""
-    q = np.array([1.0 + float(a @ b), *poses.cross(a, b)])
-    length = float(np.linalg.norm(q))
-    return q / length if length > 1e-9 else np.array([0.0, 1.0, 0.0, 0.0])
 
 
 _DOWN = np.array([0.0, 0.0, -1.0])

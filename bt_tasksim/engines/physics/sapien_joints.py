@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.poses import Array
 from bt_tasksim.scene.configuration import ObjectActor
 from bt_tasksim.scene.joint_inertia import inertia_about, value_of
 from bt_tasksim.scene.joints import Joint
@@ -109,7 +107,8 @@ def add_part(
     link_entity.add_component(link)
     link_entity.name = actor.name
     still.joint.type = "fixed"
-    axis = shortest_turn(np.array(joint.axis))
+    x, z = np.eye(3)[0], np.eye(3)[2]
+    axis = poses.from_rotation_vector(poses.shortest_turn(x, np.array(joint.axis), z))
     link.joint.type = KINDS[joint.kind]
     at = poses.pose(joint.origin, axis)
     link.joint.set_pose_in_parent(_pose(poses.multiply(np.array(joint.zero), at)))
@@ -127,13 +126,6 @@ def add_part(
     articulation.set_qpos(np.array([value], np.float32))
     articulation.set_qvel(np.zeros(1, np.float32))
     return JointedBody(link, root, joint, inertia_about(actor, joint))
-
-
-def shortest_turn(axis: Array) -> Array:
-    """Rotation ``(4,)`` that brings x onto a unit vector ``(3,)``."""
-    w, x, y, z = 1.0 + float(axis[0]), 0.0, -float(axis[2]), float(axis[1])
-    length = math.sqrt(w * w + y * y + z * z)
-    return np.array([w, x, y, z]) / length if length > 1e-9 else np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def _pose(pose: Any) -> sapien.Pose:

@@ -132,6 +132,23 @@ def test_frame_from_axes(z, y):
 
 
 @law
+@given(quaternions(), st.sampled_from([1.0, -1.0, 0.0]), vectors)
+def test_the_shortest_turn_of_a_direction_onto_another(q, same, v):
+    """Also of what points the same way already, or straight away."""
+    a, other = (poses.rotate(q, np.array(axis)) for axis in ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
+    assume(np.linalg.norm(v) > 0.1)
+    b = same * a if same else poses.unit(v)
+    for turn in (poses.shortest_turn(a, b), poses.shortest_turn(a, b, other)):
+        assert np.allclose(poses.rotate(poses.from_rotation_vector(turn), a), b, atol=1e-8)
+        assert np.linalg.norm(turn) == pytest.approx(
+            np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b), abs=1e-8
+        )
+        assert abs(turn @ a) < 1e-7
+    if same < 0.0:
+        assert np.allclose(turn, np.pi * other, atol=1e-7)
+
+
+@law
 @given(any_pose(), any_pose(), fraction)
 def test_interpolation(a, b, f):
     assert same_pose(poses.interpolate(a, b, 0.0), a)
@@ -171,6 +188,7 @@ FUNCTIONS = {
     "to_matrix": (poses.to_matrix, Q),
     "from_matrix": (lambda q: poses.from_matrix(poses.to_matrix(q)), Q),
     "frame_from_axes": (poses.frame_from_axes, V, V),
+    "shortest_turn": (lambda a, b: poses.shortest_turn(poses.unit(a), poses.unit(b)), V, V),
     "interpolate": (lambda a, b: poses.interpolate(a, b, abs(a[..., 0]) / 3.0), P, P),
     "interpolate by one share": (lambda a, b: poses.interpolate(a, b, 0.3), P, P),
     "z_axis": (poses.z_axis, Q),
