@@ -40,6 +40,12 @@ NO_STOP = register_reason(
     value=METRES,
     limit=METRES,
 )
+JAMMED = register_reason(
+    "button_jammed",
+    "{object} jams: before the end of its way it resists with {value}, more than {limit}",
+    value=NEWTONS,
+    limit=NEWTONS,
+)
 PRESSING = Form(
     "{object} is pressed in by {value}, {force} at the wrist", {"value": METRES, "force": NEWTONS}
 )
@@ -57,6 +63,13 @@ LEVEL = 0.002
 """Metres from the foremost point of a fist that leans within which others are at its front, too."""
 HARD = 1.1
 """Times `press` from which a force counts as the stop's at once; a softer one is felt twice."""
+END, MOST_OF = 0.004, 0.65
+"""Metres before the end of the button's way from which on a hard contact is its stop, and the share of a
+short way that this may be: what soft fingers do is seen too small by up to 3 mm."""
+JAMS = 2.0
+"""Times `press` from which a force counts as that of something that jams, before that."""
+SAMPLES_DOWN = 12
+"""Postures on the way from before the button to beyond its stop."""
 SHUTS, FIST = 1.0, 0.96
 """Seconds in which the hand becomes a fist, and how far it closes: its fingers need not press each other."""
 BACK = 3.0
@@ -162,12 +175,17 @@ class PressButton(ConceptModel[PressMemory]):
             for tool in tools:
                 before = poses.shifted(tool, -self.standoff * axis)
                 deep = poses.shifted(tool, (high - low + deeper) * axis)
+                gone = np.linspace(0.0, self.standoff + high - low + deeper, SAMPLES_DOWN)
+                comes = (
+                    gone <= self.standoff
+                )  # beyond that the fist is at the button, and at what is around it
                 for start in coming.postures(before):
-                    joints = on.arm.along(start, np.linspace(before, deep, 12)[1:])
+                    joints = on.arm.along(start, np.linspace(before, deep, SAMPLES_DOWN)[1:])
                     if joints is None:
                         continue
-                    if not on.clear(np.concatenate([start[None], joints])[:-3]):
-                        touch = on.collisions.touches(joints[-4])
+                    coming_on = np.concatenate([start[None], joints])[comes]
+                    if not on.clear(coming_on):
+                        touch = on.collisions.touches(coming_on[-1])
                         why = f"{touch[0][0]} would touch {touch[0][1]}" if touch else ""
                         continue
                     there = coming.search_posture(start[None], Pace(self.speed))
@@ -185,6 +203,12 @@ class PressButton(ConceptModel[PressMemory]):
         """How far ``(N,)`` the button is taken to be pressed in, metres."""
         law = seen.model(self.target).joints
         return law.value(seen.object(self.target)) - law.limits[:, 0]
+
+    def _at_end(self, seen: Seen) -> Array:
+        """Whether ``(N,)`` the button is near the end of its way, where what stops it is its stop."""
+        limits = seen.model(self.target).joints.limits
+        way = limits[:, 1] - limits[:, 0]
+        return way - self._depth(seen) <= poses.clip(MOST_OF * way, 0.0, END)
 
     def command(self, action: Array, seen: Seen, memory: PressMemory) -> Command:
         """Make a fist and come, press, and draw back."""
@@ -213,6 +237,7 @@ class PressButton(ConceptModel[PressMemory]):
         begun, before = seen.elapsed >= memory.come.duration, memory.felt >= 2
         against, one = self._against(seen, memory), xp.ones_like(memory.felt)
         more = xp.where(against > HARD * self.press, 2 * one, xp.where(against > self.press, one, 0 * one))
+        more = xp.where(self._at_end(seen), more, 0 * one)
         felt = xp.where(before, memory.felt, xp.where(more > 0, memory.felt + more, 0 * one))
         felt = xp.where(begun, felt, 0 * one)
         here, ahead = (position(memory.down, memory.progress + dt) for dt in (0.0, period))
@@ -233,14 +258,20 @@ class PressButton(ConceptModel[PressMemory]):
         return searched_for(memory.come) + 2.0 * searched_for(memory.down)
 
     def limits(self, seen: Seen, memory: PressMemory) -> tuple[Limit, ...]:
-        """The force at the wrist; and the fist is at the end of its way, and has felt no stop."""
+        """The force at the wrist; something jams; the fist is at the end of its way, and has felt no stop."""
         limits = seen.model(self.target).joints.limits
-        most = limits[:, 1] - limits[:, 0]
+        most, against, names = (
+            limits[:, 1] - limits[:, 0],
+            self._against(seen, memory),
+            {"object": self.target},
+        )
+        before = (seen.elapsed >= memory.come.duration) & (memory.felt < 1) & ~self._at_end(seen)
         deeper = YIELDING if seen.robot.many_fingers else DEEPER
-        over = (memory.deepest >= 1.0) & (memory.felt < 2) & (self._against(seen, memory) < self.press)
+        over = (memory.deepest >= 1.0) & (memory.felt < 2) & (before | (against < self.press))
         return (
             strain(seen, self.force_limit),
-            Limit(NO_STOP, most + deeper, most, {"object": self.target}, counts=over),
+            Limit(JAMMED, against, JAMS * self.press, names, counts=before),
+            Limit(NO_STOP, most + deeper, most, names, counts=over),
         )
 
     def done(self, seen: Seen, memory: PressMemory) -> Array:

@@ -5,12 +5,22 @@ import pytest
 from draws import successes
 from py_trees.common import Status
 
-from bt_tasksim.concept_nodes import AdjustDrawer, CloseDrawer, Grasp, OpenDoor, OpenDrawer, Pick, Release
+from bt_tasksim.concept_nodes import (
+    AdjustDrawer,
+    CloseDrawer,
+    Grasp,
+    OpenDoor,
+    OpenDrawer,
+    Pick,
+    PressButton,
+    Release,
+)
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.concept_nodes.limits import WRIST_STRAINED
 from bt_tasksim.concept_nodes.on_joint import JAMMED, NOT_THERE
 from bt_tasksim.concept_nodes.press_button import AROUND, FIST, LEANS, LEVEL, _fists
+from bt_tasksim.concept_nodes.press_button import JAMMED as BUTTON_JAMS
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import NO_WAY
 from bt_tasksim.core.resources import asset
@@ -99,6 +109,24 @@ def test_controls_are_worked(name):
     source = load_source(name)
     (result,) = successes(Runner(source.build(), source.scene, EngineOptions()).run, range(3, 6), n=1)
     assert result.status == Status.SUCCESS and result.verdict.penetration < 0.002
+
+
+STUCK = """
+name: bell
+pose: [0.5, 0.0, 0.0, 1, 0, 0, 0]
+boxes: [{position: [0, 0, 0.1], size: [0.2, 0.2, 0.2]}]
+places: []
+parts:
+  - {name: button, joint: slide, axis: [0, 0, -1], limits: [0, 0.015], mass: 0.1, friction: 300.0,
+     boxes: [{position: [0, 0, 0.21], size: [0.05, 0.05, 0.04]}]}
+"""
+
+
+def test_what_stops_a_button_before_the_end_of_its_way_is_not_its_stop(tmp_path):
+    fixture = tmp_path / "bell.yaml"
+    fixture.write_text(STUCK)
+    result = ran(PressButton("button"), fixture=str(fixture), goal=Goal("button", relation="open"))
+    assert result.status == Status.FAILURE and result.outcome.is_a(BUTTON_JAMS)
 
 
 @pytest.mark.parametrize("robot", ["panda", "xarm7_ability"])
