@@ -21,7 +21,7 @@ from bt_tasksim.concept_nodes.closer import TOUCHING
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.insertion import hole_of
 from bt_tasksim.concept_nodes.insertion_way import ROWS
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
@@ -189,7 +189,7 @@ class Extract(ConceptModel[ExtractMemory]):
     def advance(self, action: Array, seen: Seen, memory: ExtractMemory) -> ExtractMemory:
         """Come on as the wrist allows, and yield to what presses from aside."""
         xp, period = array_namespace(seen.tool), seen.world.control_period
-        force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+        force = force_at_tool(seen)
         along = poses.dot(force, memory.outward)
         speed = self.speed * poses.clip(seen.elapsed / SOFTLY, 0.0, 1.0)
         near = poses.clip((memory.full - memory.way) / (SOFTLY * self.speed), 0.1, 1.0)

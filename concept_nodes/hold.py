@@ -15,7 +15,7 @@ from bt_tasksim.concept.parameters import Direction, Newtons, ObjectName, PlaceN
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, strain
 from bt_tasksim.concept_nodes.stops import gaps, no_way_named, ways_in
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
@@ -186,4 +186,4 @@ class Hold(ConceptModel[HoldMemory]):
 
 def _force_against(seen: Seen, along: Array) -> Array:
     """Force ``(N,)`` against directions ``(N, 3)``, N."""
-    return -poses.dot(poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3]), along)
+    return -poses.dot(force_at_tool(seen), along)

@@ -28,7 +28,7 @@ from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.insertion import places_to_try
 from bt_tasksim.concept_nodes.insertion_edges import Edges, away, edges_of, held_up_at, wrench_of
 from bt_tasksim.concept_nodes.insertion_way import ROWS, STANDOFF, WayIn, ends_in, sides_of, way_in
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
@@ -391,7 +391,7 @@ class Insert(ConceptModel[InsertMemory]):
 
     def done(self, seen: Seen, memory: InsertMemory) -> Array:
         """It is where it should end, or near it and at the stop."""
-        force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+        force = force_at_tool(seen)
         stops = self._push(force, memory.weight[:, :3], memory) > 0.5 * self.press
         missing = self._missing(seen, memory)
         return memory.begun & ((missing <= self.tolerance) | (stops & (missing <= NEAR)))

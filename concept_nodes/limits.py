@@ -5,7 +5,7 @@ from __future__ import annotations
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.core.outcomes import register_reason
-from bt_tasksim.core.poses import Array, clip, norm
+from bt_tasksim.core.poses import Array, clip, norm, rotate
 from bt_tasksim.core.units import NEWTONS
 
 FAR = 0.5
@@ -39,3 +39,8 @@ def strain(seen: Seen, limit: float) -> Limit:
 def force_at_wrist(seen: Seen) -> Array:
     """Magnitude ``(N,)`` of the force at the wrist, N."""
     return norm(seen.wrench[:, :3])
+
+
+def force_at_tool(seen: Seen) -> Array:
+    """Forces ``(N, 3)`` at the wrist in the robot base frame, N."""
+    return rotate(seen.tool[:, 3:], seen.wrench[:, :3])

@@ -19,7 +19,7 @@ from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
 from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
 from bt_tasksim.concept_nodes.joint_force import force_against
 from bt_tasksim.concept_nodes.joint_way import JointWay, gone_anyhow, keeps_clear, pivots
-from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
@@ -317,7 +317,7 @@ class OnJoint(ConceptModel[JointMemory]):
             share = xp.where(memory.felt > 0, xp.zeros_like(share), share)
         progress = memory.progress + period * share
         far = abs(asked - now) > BEHIND[self.turns]
-        force_there, along = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3]), self._along(seen, memory)
+        force_there, along = force_at_tool(seen), self._along(seen, memory)
         aside = force_there - poses.dot(force_there, along)[:, None] * along
         against = force_against(seen, self.target, self._ahead(seen, memory))
         minds = poses.clip(1.0 - UNFELT / poses.clip(poses.norm(aside), 1e-9, math.inf), 0.0, 1.0)

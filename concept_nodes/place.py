@@ -31,7 +31,7 @@ from bt_tasksim.concept_nodes.closer import DROPPED, HIGHER, PUT_DOWN, TOUCHING,
 from bt_tasksim.concept_nodes.destination import destination, standing_pose
 from bt_tasksim.concept_nodes.drops import preferred_options
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, gentler, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, gentler, strain
 from bt_tasksim.concept_nodes.spots import spots_beside, spots_on, supports_beside
 from bt_tasksim.concept_nodes.standing import aside_options, supports_of, tipped
 from bt_tasksim.concept_nodes.surface import (
@@ -502,7 +502,7 @@ class Place(ConceptModel[PlaceMemory]):
         """Force ``(N,)`` in N against the direction of placing."""
 
         def against() -> Array:
-            force = poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+            force = force_at_tool(seen)
             return -poses.dot(force, poses.constant(self.direction, force))
 
         return seen.once(("force", *self.direction), against, by_world=True)

@@ -17,7 +17,7 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING, with_room
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
-from bt_tasksim.concept_nodes.limits import force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
@@ -197,7 +197,7 @@ class PressButton(ConceptModel[PressMemory]):
 
     def _against(self, seen: Seen, memory: PressMemory) -> Array:
         """Force ``(N,)`` against the way, N."""
-        return -poses.dot(poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3]), memory.axis) - memory.baseline
+        return -poses.dot(force_at_tool(seen), memory.axis) - memory.baseline
 
     def _depth(self, seen: Seen) -> Array:
         """How far ``(N,)`` the button is taken to be pressed in, metres."""

@@ -27,7 +27,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.destination import destination
 from bt_tasksim.concept_nodes.holding import BETWEEN, REACH, holding, not_held, tool_distance
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.shoved_way import GAP, ShovedWay, shoved_way
 from bt_tasksim.concept_nodes.surface import carrying
 from bt_tasksim.concept_nodes.touching import touched
@@ -390,7 +390,7 @@ class Shove(ConceptModel[ShoveMemory]):
 
     def _felt(self, seen: Seen) -> Array:
         """Newtons ``(N,)`` that hold the tool up."""
-        return poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])[:, 2]
+        return force_at_tool(seen)[:, 2]
 
     def _lowering(self, firm: Array, touched: Array) -> Array:
         """Metres per second ``(N,)`` at which the tool goes down: to the thing, then as it presses."""

@@ -17,7 +17,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING
 from bt_tasksim.concept_nodes.hand_conditions import height_above
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, strain
 from bt_tasksim.concept_nodes.shoved_way import touching_now
 from bt_tasksim.concept_nodes.standing import supports_of
 from bt_tasksim.concept_nodes.surface import carrying
@@ -281,7 +281,7 @@ class Slid(ConceptModel[SlidMemory]):
 
     def _force(self, seen: Seen) -> Array:
         """Force at the wrist ``(N, 3)``, robot base frame, N."""
-        return poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+        return force_at_tool(seen)
 
 
 ENDED = 3

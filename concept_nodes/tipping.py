@@ -21,7 +21,7 @@ from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING, VERY_CLOSE, with_r
 from bt_tasksim.concept_nodes.contents import spilling_none
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
-from bt_tasksim.concept_nodes.limits import strain
+from bt_tasksim.concept_nodes.limits import force_at_tool, strain
 from bt_tasksim.concept_nodes.standing import headings
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.turning import followed_anyhow, swung
@@ -342,7 +342,7 @@ class Tipping(ConceptModel[TipMemory]):
 
     def _force(self, seen: Seen) -> Array:
         """Force ``(N,)`` upwards at the wrist, N."""
-        return poses.rotate(seen.tool[:, 3:], seen.wrench[:, :3])[:, 2]
+        return force_at_tool(seen)[:, 2]
 
 
 def long_axis(model: ObjectModel) -> int | None:
