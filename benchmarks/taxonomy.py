@@ -22,7 +22,7 @@ from bt_tasksim.concept_nodes.contact_cones import MEASURED, padded
 from bt_tasksim.concept_nodes.taxonomy import STATES, contact_state, contact_states
 
 Floats = NDArray[np.float64]
-LEAST_PER_SECOND = 10_000
+LEAST_PER_SECOND, MOST = 10_000, 1_000_000
 BORDER = 0.08
 """Sine of the angle, and share, within which a set is near a border between two classes."""
 MOST_FACES, MOST_POINTS = 6, 4
@@ -142,6 +142,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--sets", type=int, default=10_000, help="how many random ones")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args(arguments)
+    if options.seed < 0 or not 1 <= options.sets <= MOST:
+        parser.error(f"--seed should not be negative, and --sets lie between 1 and {MOST}")
     rng = np.random.default_rng(options.seed)
     exact = [random_faces(rng) for _ in range(options.sets)]
     given = [measured(each, rng, MEASURED / 2) for each in exact]

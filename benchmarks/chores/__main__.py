@@ -25,8 +25,9 @@ from benchmarks import sealed
 from benchmarks.chores.chore import KINDS
 from benchmarks.chores.draw import Task, task
 from bt_tasksim import EngineOptions, Runner
-from bt_tasksim.core.errors import BtTasksimError, BtTasksimWarning
+from bt_tasksim.core.errors import BtTasksimError, BtTasksimWarning, InputError
 from bt_tasksim.core.identity import identity
+from bt_tasksim.scene.configuration import check_seed
 from bt_tasksim.training.evaluation import episode
 from bt_tasksim.training.evaluation_outcomes import EpisodeOutcome, wilson
 
@@ -55,6 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     usual = {"tree": "obvious", "engines": "sapien", "noise": "fine"}
     name = "-".join(["chores", asked.robot, *(v for k, v in vars(asked).items() if usual.get(k, v) != v)])
     try:
+        for seed in asked.only or ():
+            check_seed(seed)
+        if asked.episodes < 1:
+            raise InputError(f"'--episodes' should be at least 1, found {asked.episodes}")
         if asked.only:
             sealed.check_looked_at(asked.only, f"chores/{name}")
             _said(list(_played(asked.only, asked)), name)

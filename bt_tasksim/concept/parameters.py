@@ -53,12 +53,15 @@ Vector = tuple[float, float, float]
 MOST = 1e6
 """What no length, angle, force or speed of a robot comes near, and motions are still computed with."""
 
+SLOWEST = 1e-4
+"""Metres per second: slower, and nothing would ever get there."""
+
 Metres = Annotated[float, Quantity("m", low=0.0, high=MOST)]
 Offset = Annotated[float, Quantity("m", low=-MOST, high=MOST)]
 Radians = Annotated[float, Quantity("rad", low=-MOST, high=MOST)]
 Seconds = Annotated[float, Quantity("s", low=0.0)]
 Newtons = Annotated[float, Quantity("N", low=0.0, high=MOST)]
-MetresPerSecond = Annotated[float, Quantity("m/s", low=0.0, high=MOST)]
+MetresPerSecond = Annotated[float, Quantity("m/s", low=SLOWEST, high=MOST)]
 Ratio = Annotated[float, Quantity("1", low=0.0, high=1.0)]
 Direction = Annotated[Vector, Quantity("1", "vector", unit_vector=True)]
 Axis = Annotated[Vector, Quantity("1", "vector", unit_vector=True, two_sided=True)]
@@ -205,7 +208,7 @@ def _number(value: Any, quantity: Quantity) -> float:
     number = float(value)
     if not math.isfinite(number):
         raise ValueError("it is not finite")
-    if number < quantity.low == 0.0 and quantity.high >= MOST:
+    if number < quantity.low and quantity.high >= MOST > -quantity.low:
         raise ValueError(f"it should not be below {quantity.low:g}")
     if number > quantity.high >= MOST:
         raise ValueError(f"it should not be above {quantity.high:g}")

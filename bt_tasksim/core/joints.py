@@ -18,6 +18,8 @@ from bt_tasksim.core.poses import Array, array_namespace
 
 SLIDES, TURNS = "slide", "hinge"
 KINDS = (SLIDES, TURNS)
+SHORTEST = 1e-3
+"""The least that a part can go, metres or radians."""
 LONGEST = {SLIDES: 2.0, TURNS: 6.0}
 """Metres or radians that a part can go at most; of what turns nearly round, estimates would not tell one end
 from the other."""
@@ -37,6 +39,8 @@ def check_way(kind: str, limits: tuple[float, float], value: tuple[float, float]
     (low, high), unit = limits, "m" if kind == SLIDES else "rad"
     if not low < high:
         raise InputError(f"'limits' should be the lower one first, found {low:g} and {high:g}")
+    if high - low < SHORTEST:
+        raise InputError(f"'limits' should be at least {SHORTEST:g} {unit} apart, found {high - low:g}")
     if high - low > LONGEST[kind]:
         raise InputError(f"'limits' should be at most {LONGEST[kind]:g} {unit} apart, found {high - low:g}")
     if not low <= value[0] <= value[1] <= high:

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from bt_tasksim.core.errors import BtTasksimError, InputError, NoDrawError
+from bt_tasksim.core.files import check_writable
 from bt_tasksim.demos_decomp.log import Demonstration, Log
 from bt_tasksim.demos_decomp.log_file import write_log
 from bt_tasksim.demos_decomp.synthetic import TaskLabel
@@ -83,6 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if asked.episodes < 1:
             raise InputError(f"'--episodes' should be at least 1, found {asked.episodes}")
+        check_writable(asked.out)
         source = load_source(asked.tree, asked.robot, None)
         seeds = range(asked.seed, asked.seed + TRIES * asked.episodes)
         shown = itertools.islice(performed(source, seeds, engines=asked.engines), asked.episodes)

@@ -95,9 +95,8 @@ def _root(path: Path) -> Element:
                 f"fixture file '{path}': furniture is made of links, joints and shapes, and "
                 f"'{shown(element.tag)}' is none of them: leave it out, or write out what it makes"
             )
-    for limit in root.iter("limit"):
-        if _number(limit.get("lower")) > _number(limit.get("upper")):
-            raise InputError(f"fixture file '{path}': a joint's 'lower' limit is above its 'upper' one")
+    for joint in root.iter("joint"):
+        _check_limits(joint, path)
     if root.tag == "robot":  # links that are fixed to others keep their names, and shapes have different ones
         for link in root.iter("link"):
             for k, shape in enumerate(link.iter("collision")):
@@ -108,12 +107,25 @@ def _root(path: Path) -> Element:
     return root
 
 
-def _number(text: str | None) -> float:
-    """What an attribute says; 0 where it is not given or no number, which MuJoCo then refuses."""
+def _check_limits(joint: Element, path: Path) -> None:
+    """Check that a joint's limits are in order: MuJoCo takes others for none."""
+    limit = joint.find("limit")
+    if joint.get("type") in ("revolute", "prismatic"):  # URDF
+        given = [] if limit is None else [limit.get("lower", "0"), limit.get("upper", "0")]
+    else:
+        given = (joint.get("range") or "").split()
+        if not given:
+            return
     try:
-        return float(text or 0.0)
+        low, high = (float(text) for text in given)
     except ValueError:
-        return 0.0
+        low, high = math.nan, math.nan
+    if not low < high:
+        said = f"'{shown(joint.get('name', ''))}' {shown(' '.join(given))}".strip()
+        raise InputError(
+            f"fixture file '{path}': the limits of a joint should be two numbers, the lower one first, found "
+            f"{said}: a joint that cannot move is a fixed one"
+        )
 
 
 class _Reader:

@@ -116,7 +116,7 @@ class PartEntry(Model):
     """Lowest and highest value, m or rad; 0 is where the boxes are given."""
     boxes: Annotated[tuple[BoxEntry, ...], Field(strict=False, min_length=1, max_length=100)]
     """What it is made of, in the fixture's frame where it is shut."""
-    mass: Annotated[Number, Field(gt=0.0, le=200.0)] = 1.0
+    mass: Annotated[Number, Field(ge=1e-6, le=200.0)] = 1.0
     """kg."""
     friction: Annotated[NotNegative, Field(le=500.0)] = 0.0
     """What it takes to move it, N or Nm."""
@@ -124,7 +124,7 @@ class PartEntry(Model):
     """N or Nm for each m or rad a second."""
     stiffness: Annotated[NotNegative, Field(le=1e4)] = 0.0
     """Of its spring, N/m or Nm/rad."""
-    rest: Number = 0.0
+    rest: Annotated[Number, Field(ge=-100.0, le=100.0)] = 0.0
     """Value at which the spring is at rest, m or rad."""
     latch: Annotated[NotNegative, Field(le=500.0)] = 0.0
     """What a latch holds it shut with, N or Nm."""

@@ -196,6 +196,12 @@ class Scene:
             if spot.name in places or spot.name in moving:
                 raise FieldError(f"two places are called '{spot.name}': rename the spot", "spots", i, "name")
             places.add(spot.name)
+        if TOOL in moving:
+            raise FieldError(
+                f"a part of a fixture is called '{TOOL}', which is the robot's own: give the fixture another "
+                f"'name'",
+                "fixtures",
+            )
         for name in specs:
             if name == TOOL:
                 raise FieldError(

@@ -113,7 +113,10 @@ def test_in_scenes_and_scene_files(write, tmp_path):
         (MJCF.replace("</mujoco>", ""), "no XML that can be read"),
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><robot>&b;</robot>", "no XML that can be read"),
         ("<html/>", "neither URDF nor MJCF"),
-        (URDF.replace('upper="1.5"', 'upper="-1.5"'), "'lower' limit is above"),
+        (URDF.replace('upper="1.5"', 'upper="-1.5"'), "the lower one first"),
+        (URDF.replace('upper="1.5"', 'upper="0"'), "the lower one first"),
+        (MJCF.replace('"-90 90"', '"90 0"'), "the lower one first, found '' 90 0"),
+        (MJCF.replace('"-90 90"', '"0 nan"'), "the lower one first"),
         (MJCF.replace("<worldbody>", "<worldbody><replicate count='99999'/>"), "'replicate' is none of them"),
         (
             MJCF.replace("<worldbody>", "<asset><mesh name='m' file='a.stl'/></asset><worldbody>"),
