@@ -13,7 +13,8 @@ def memory_in_head(concept):
     for owner in concept.__mro__:
         for base in vars(owner).get("__orig_bases__", ()):
             if typing.get_origin(base) is ConceptModel:
-                return typing.get_args(base)[0]
+                said = typing.get_args(base)[0]
+                return getattr(said, "__default__", said)  # of a family of concepts: the usual one
     return None
 
 
