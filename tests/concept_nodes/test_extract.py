@@ -17,15 +17,15 @@ from bt_tasksim.trees.load import load_source
 def test_a_peg_comes_out_of_its_hole(engines):
     source = load_source("extract")
     runner = Runner(source.build(), source.scene, EngineOptions(engines=engines))
-    (result,) = successes(runner.run, range(5), n=1)
-    assert result.verdict.outcome.cause.reason.name == "stands"
+    for result in successes(runner.run, range(3), n=2):
+        assert result.verdict.outcome.cause.reason.name == "stands"
 
 
 @pytest.mark.physical
 def test_a_book_goes_into_its_row():
     source = load_source("insert_book")
-    (result,) = successes(Runner(source.build(), source.scene).run, range(5), n=1)
-    assert result.verdict.outcome.cause.reason.name == "is_inserted"
+    for result in successes(Runner(source.build(), source.scene).run, range(3), n=2):
+        assert result.verdict.outcome.cause.reason.name == "is_inserted"
 
 
 def test_nothing_is_pulled_out_of_what_is_no_hole():

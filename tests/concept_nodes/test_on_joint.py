@@ -18,20 +18,23 @@ from bt_tasksim.concept_nodes import (
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.concept_nodes.limits import WRIST_STRAINED
-from bt_tasksim.concept_nodes.on_joint import JAMMED, NOT_THERE
+from bt_tasksim.concept_nodes.on_joint import JAMMED, NOT_THERE, JointMemory
 from bt_tasksim.concept_nodes.press_button import AROUND, FIST, LEANS, LEVEL, _fists
 from bt_tasksim.concept_nodes.press_button import JAMMED as BUTTON_JAMS
 from bt_tasksim.core import poses
-from bt_tasksim.core.outcomes import NO_WAY
+from bt_tasksim.core.outcomes import GOAL_LOST, NO_WAY
 from bt_tasksim.core.resources import asset
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.hand_collision import hand_pieces
+from bt_tasksim.planning.reference_motion import plan
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene
 from bt_tasksim.trees import same_tree, sequence, tidy, tree_from_xml, tree_to_xml
 from bt_tasksim.trees.load import load_source
+from tests.bt_tasksim.scene.states import drawn, state
+from tests.concept_nodes.test_agreement_with_goals import seen_exactly
 
 CUP = {"cup": ObjectSpec(kinds=("cup",), on="table", centre=(-0.1, -0.25), area=(0.0, 0.0))}
 
@@ -79,13 +82,46 @@ def test_what_cannot_be_done_is_refused(leaf, reason):
     assert result.status == Status.FAILURE and result.outcome.is_a(reason)
 
 
-def test_a_drawer_that_is_stuck_is_given_up_before_anything_breaks(tmp_path):
-    fixture = stiff(tmp_path, 300.0)
-    result = ran(Grasp("drawer"), OpenDrawer("drawer", distance=0.15), fixture=fixture)
+@pytest.mark.parametrize(
+    ("force_limit", "reasons"),
+    [(50.0, (WRIST_STRAINED, NOT_THERE[False])), (200.0, (GOAL_LOST,))],
+    ids=["it pulls no harder than it may", "the fingers slip off"],
+)
+def test_a_drawer_that_is_stuck_is_given_up_before_anything_breaks(tmp_path, force_limit, reasons):
+    pulls = OpenDrawer("drawer", distance=0.15, force_limit=force_limit)
+    result = ran(Grasp("drawer"), pulls, fixture=stiff(tmp_path, 300.0))
     assert result.status == Status.FAILURE
-    assert any(
-        result.outcome.is_a(why) for why in (JAMMED[False], NOT_THERE[False], WRIST_STRAINED, NOT_HELD)
+    assert any(result.outcome.is_a(why) for why in reasons), result.outcome.sentence
+
+
+def test_a_part_that_stays_far_behind_the_hand_is_jammed():
+    """The hand goes on with no force at the wrist, and the drawer is seen where it was."""
+    configuration, model = drawn(Scene(fixtures=[FixtureSpec("chest")], goal=Goal("drawer", relation="shut")))
+    pulls = OpenDrawer.value(target="drawer", distance=0.15)
+    seen = seen_exactly(model, state(configuration))
+    seen.observation.wrench = np.zeros((1, 6))
+    tool, part = seen.tool, seen.object("drawer")
+    law, nothing = seen.model("drawer").joints, np.zeros(1)
+    there = poses.multiply(law.pose(np.array([0.15])), poses.relative(part, tool))
+    memory = JointMemory(
+        plan([tool, there], 0.1),
+        poses.relative(tool, part),
+        np.array([0.15]),
+        nothing,
+        tool[:, :3],
+        np.zeros(1, bool),
+        np.zeros((1, 3)),
+        nothing,
+        np.zeros(1, int),
+        nothing,
+        nothing,
     )
+    for _ in range(100):
+        memory = pulls.advance(None, seen, memory)
+        broken = [each.reason for each in pulls.limits(seen, memory) if np.all(each.applies)]
+        if broken:
+            break
+    assert broken == [JAMMED[False]]
 
 
 def test_a_way_that_the_arm_cannot_go_is_refused_before_it_is_begun():

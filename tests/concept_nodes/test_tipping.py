@@ -103,5 +103,5 @@ def test_what_stands_is_laid_down_and_tipped_up_again():
         TipUp("tall"),
         Release("tall"),
     )
-    (result,) = successes(Runner(tree, scene).run, range(20, 25), n=1)
-    assert result.verdict.penetration < 0.002
+    for result in successes(Runner(tree, scene).run, range(20, 23), n=2):
+        assert result.verdict.penetration < 0.002
