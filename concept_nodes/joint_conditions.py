@@ -13,7 +13,7 @@ from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.transfer import fetched
 from bt_tasksim.core.units import METRES, RADIANS
-from bt_tasksim.scene.relations.joint_goals import OPEN, SHUT
+from bt_tasksim.scene.joint_laws import opened, set_to, shut
 from bt_tasksim.scene.specs import Goal
 
 Opening = Annotated[float, Quantity("m or rad", low=-MOST, high=MOST)]
@@ -23,8 +23,6 @@ MOVES = Form("{object} {how}")
 WAYS = {None: "moves on no joint", False: "slides", True: "turns"}
 SLACK = (0.006, math.radians(2.5))
 """Metres and radians by which a part may be off a value that is asked for."""
-SHUT_BY = (SHUT["slide"], SHUT["hinge"])
-"""Metres and radians by which a part that counts as shut may be open."""
 
 
 @register("concept")
@@ -77,7 +75,7 @@ class IsOpen(Condition):
 
     Args:
         target: The part.
-        by: How far at least, metres or radians; by default most of its way.
+        by: How far at least, metres or radians, from its value 0; by default most of its way.
     """
 
     target: ObjectName
@@ -92,9 +90,8 @@ class IsOpen(Condition):
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        low, high = limits_of(seen, self.target)
-        wanted = low + OPEN * (high - low) if self.by is None else self.by - allowed(seen, self.target, SLACK)
-        return seen.model(self.target).jointed & (value_of(seen, self.target) >= wanted)
+        model, slack = seen.model(self.target), allowed(seen, self.target, SLACK)
+        return model.jointed & opened(value_of(seen, self.target), model.joints.limits, self.by, slack).so
 
     def explain(self, seen: Seen) -> Statement:
         """How far it is open."""
@@ -103,7 +100,7 @@ class IsOpen(Condition):
 
 @register("concept")
 class IsShut(Condition):
-    """Is a part of furniture shut, as far as is seen?
+    """Is a part of furniture shut, which is at its lower limit, as far as is seen?
 
     Args:
         target: The part.
@@ -120,9 +117,8 @@ class IsShut(Condition):
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        low, _ = limits_of(seen, self.target)
-        off = value_of(seen, self.target) - low
-        return seen.model(self.target).jointed & (off <= allowed(seen, self.target, SHUT_BY))
+        model = seen.model(self.target)
+        return model.jointed & shut(value_of(seen, self.target), model.joints.limits, model.joint_turns).so
 
     def explain(self, seen: Seen) -> Statement:
         """How far it is open."""
@@ -135,7 +131,7 @@ class JointAt(Condition):
 
     Args:
         target: The part.
-        at: How far, metres or radians.
+        at: How far, metres or radians, from its value 0.
     """
 
     target: ObjectName
@@ -150,8 +146,8 @@ class JointAt(Condition):
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        off = abs(value_of(seen, self.target) - self.at)
-        return seen.model(self.target).jointed & (off <= allowed(seen, self.target, SLACK))
+        asked = set_to(value_of(seen, self.target), self.at, allowed(seen, self.target, SLACK))
+        return seen.model(self.target).jointed & asked.so
 
     def explain(self, seen: Seen) -> Statement:
         """How far it is open."""

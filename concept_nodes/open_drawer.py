@@ -9,8 +9,9 @@ from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, ObjectName
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.joint_values import open_by
 from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
 
@@ -20,7 +21,7 @@ class OpenDrawer(OnJoint):
 
     Args:
         target: The drawer.
-        distance: How far it is open in the end, from where it is shut; by default all the way.
+        distance: How far it is open in the end, from its value 0; by default all the way.
         speed: Peak speed of the tool.
         press: Force against the motion by which a stop is felt.
         force_limit: Force at the wrist at which the task is broken off.
@@ -56,7 +57,4 @@ class OpenDrawer(OnJoint):
 
     def wanted(self, now: Array, limits: Array) -> Array:
         """See `OnJoint.wanted`: what is farther open stays so."""
-        if self.distance is None:
-            return limits[:, 1]
-        xp = array_namespace(now)
-        return xp.minimum(xp.maximum(now, self.distance + 0.0 * now), limits[:, 1])
+        return open_by(self.distance, now, limits)

@@ -15,7 +15,7 @@ class OpenLid(OpenDoor):
 
     Args:
         target: The lid.
-        angle: How far it is open in the end, from where it is shut; by default all the way. What is open by
+        angle: How far it is open in the end, from its value 0; by default all the way. What is open by
             less than upright falls shut when it is let go.
         speed: Peak speed of the tool.
         press: Force against the motion by which a stop is felt.

@@ -9,8 +9,9 @@ from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, Radians
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.joint_values import at_value
 from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
 
@@ -23,7 +24,7 @@ class TurnKnob(OnJoint):
 
     Args:
         target: The knob.
-        angle: How far it is turned in the end, from its lowest stop.
+        angle: How far it is turned in the end, from its value 0.
         speed: Peak speed of the tool.
         press: Force against the motion by which a stop is felt.
         force_limit: Force at the wrist at which the task is broken off.
@@ -52,5 +53,4 @@ class TurnKnob(OnJoint):
 
     def wanted(self, now: Array, limits: Array) -> Array:
         """See `OnJoint.wanted`."""
-        xp = array_namespace(now)
-        return xp.minimum(xp.maximum(limits[:, 0], self.angle + 0.0 * now), limits[:, 1])
+        return at_value(self.angle, now, limits)

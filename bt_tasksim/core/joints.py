@@ -1,7 +1,7 @@
 """Parts of furniture that slide or turn: how far they are open, and where they are then.
 
-A joint's value is 0 where it is shut, in metres for one that slides and radians for one that turns. All laws
-are for ``N`` joints at once.
+A joint's value counts from 0, where it is as its fixture gives it, in metres for one that slides and radians
+for one that turns. It is shut at its lower limit, which is 0 for most. All laws are for ``N`` joints at once.
 """
 
 from __future__ import annotations

@@ -5,22 +5,19 @@ Such a part may be held at the end: who opens a door often keeps it in the hand.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.joints import JointModel, Joints
 from bt_tasksim.core.outcomes import Reason, register_reason
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS, Unit
+from bt_tasksim.scene.joint_laws import ValueAsked, opened, set_to, shut
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
 from bt_tasksim.scene.specs import Goal
-
-OPEN = 0.8
-"""Share of its way by which a part has to be open where a goal does not say how far."""
-SHUT = {"slide": 0.005, "hinge": math.radians(2.0)}
-"""Metres or radians within which a part is shut."""
 
 
 def _pair(name: str, sentence: str) -> dict[str, Reason]:
@@ -47,8 +44,8 @@ class JointGoal(GoalRelation):
     may_be_held = True
 
     @staticmethod
-    def joint(goal: Goal, final: FinalState) -> tuple[JointModel, float]:
-        """The part's joint, and how far it truly is open.
+    def joint(goal: Goal, final: FinalState) -> tuple[JointModel, Array]:
+        """The part's joint, and how far ``(1,)`` it truly is open.
 
         Raises:
             InputError: The goal's object is none.
@@ -59,7 +56,7 @@ class JointGoal(GoalRelation):
                 f"the goal '{goal.relation}' is one of parts of fixtures, such as a drawer, and "
                 f"'{goal.object}' is a free object"
             )
-        return joint, float(Joints.of([joint]).value(final.pose(goal.object)[None])[0])
+        return joint, Joints.of([joint]).value(final.pose(goal.object)[None])
 
     @staticmethod
     def tolerance(goal: Goal, joint: JointModel) -> float:
@@ -68,11 +65,24 @@ class JointGoal(GoalRelation):
 
     @staticmethod
     def placement(
-        reached: bool, reason: Reason, goal: Goal, joint: JointModel, value: float, off: float, wanted: float
+        asked: ValueAsked,
+        reasons: tuple[Mapping[str, Reason], ...],
+        goal: Goal,
+        joint: JointModel,
+        value: Array,
     ) -> Placement:
-        """The answer; what is missing stands as an error of position or of angle."""
-        outcome = reason(object=goal.object, value=value, wanted=wanted)
-        nothing = float(np.nan)
+        """The answer; what is missing stands as an error of position or of angle.
+
+        Args:
+            asked: What is asked and what is so ``(1,)``.
+            reasons: By kind of joint, where it is not so, and where it is.
+            goal: The goal.
+            joint: The part's joint.
+            value: How far it is open ``(1,)``.
+        """
+        reached, off, nothing = bool(asked.so[0]), float(asked.off[0]), float(np.nan)
+        reason = reasons[reached][joint.kind]
+        outcome = reason(object=goal.object, value=float(value[0]), wanted=float(asked.wanted[0]))
         return Placement(reached, outcome, nothing if joint.turns else off, off if joint.turns else nothing)
 
 
@@ -83,12 +93,8 @@ class Open(JointGoal):
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""
         joint, value = self.joint(goal, final)
-        low, high = joint.limits
-        wanted = low + OPEN * (high - low) if goal.value is None else goal.value
-        off = max(wanted - value, 0.0)
-        reached = off <= self.tolerance(goal, joint) if goal.value is not None else off <= 0.0
-        reason = (IS_OPEN if reached else NOT_OPEN)[joint.kind]
-        return self.placement(reached, reason, goal, joint, value, off, wanted)
+        asked = opened(value, np.array([joint.limits]), goal.value, self.tolerance(goal, joint))
+        return self.placement(asked, (NOT_OPEN, IS_OPEN), goal, joint, value)
 
 
 @register("goal relation", "shut")
@@ -98,10 +104,8 @@ class Shut(JointGoal):
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""
         joint, value = self.joint(goal, final)
-        off, allowed = value - joint.limits[0], SHUT[joint.kind]
-        reached = off <= allowed
-        reason = (IS_SHUT if reached else NOT_SHUT)[joint.kind]
-        return self.placement(reached, reason, goal, joint, value, off, allowed)
+        asked = shut(value, np.array([joint.limits]), np.array([joint.turns]))
+        return self.placement(asked, (NOT_SHUT, IS_SHUT), goal, joint, value)
 
 
 @register("goal relation", "set")
@@ -113,7 +117,5 @@ class SetTo(JointGoal):
         joint, value = self.joint(goal, final)
         if goal.value is None:
             raise InputError(f"the goal 'set' of '{goal.object}' needs a 'value', how far it should be open")
-        off = abs(value - goal.value)
-        reached = off <= self.tolerance(goal, joint)
-        reason = (IS_SET if reached else NOT_SET)[joint.kind]
-        return self.placement(reached, reason, goal, joint, value, off, goal.value)
+        asked = set_to(value, goal.value, self.tolerance(goal, joint))
+        return self.placement(asked, (NOT_SET, IS_SET), goal, joint, value)
