@@ -106,6 +106,9 @@ BEYOND = 0.03
 """Metres by which the pusher may come farther than it should have to."""
 BACK, UP = 0.4, 0.6
 """Seconds in which it goes back, and then up."""
+ROCKS, STILL = math.radians(8.0), 2.0
+"""Radians by which it may lean in the end otherwise than at the begin; and seconds after it has drawn back
+for which what rocks may come to rest."""
 TIPPED = math.radians(25.0)
 """Radians of tilt from which on what is pushed tips over."""
 LEVEL = 0.02
@@ -435,8 +438,19 @@ class Shove(ConceptModel[ShoveMemory]):
             Limit(PASSED_BY, behind, LAGS, names, counts=memory.ended < 0.0),
             Limit(DRIFTED, abs(aside), DRIFTS, names, counts=memory.ended < 0.0),
             Limit(NOT_BROUGHT, self._missed(seen, memory), self.tolerance, names, counts=late),
+            Limit(TIPS, self._rocks(seen, memory), ROCKS, names, counts=memory.ended >= BACK + UP + STILL),
             *(self._lost(seen) if self.tool is not None else ()),
         )
+
+    def _rocks(self, seen: Seen, memory: ShoveMemory) -> Array:
+        """Radians ``(N,)`` by which the thing leans otherwise than at the begin, whichever way it faces."""
+        now, before = (
+            poses.rotate(q, constant([0.0, 0.0, 1.0], q))[:, 2]
+            for q in (seen.object(self.target)[:, 3:], memory.start[:, 3:])
+        )
+        xp = array_namespace(now)
+        lean, leant = (xp.acos(poses.clip(up, -1.0, 1.0)) for up in (now, before))
+        return abs(lean - leant)
 
     def _lost(self, seen: Seen) -> tuple[Limit, ...]:
         assert self.tool is not None
@@ -444,7 +458,8 @@ class Shove(ConceptModel[ShoveMemory]):
 
     def done(self, seen: Seen, memory: ShoveMemory) -> Array:
         """The pusher has drawn back, and the thing is where it should be."""
-        return (memory.ended >= BACK + UP) & (self._missed(seen, memory) <= self.tolerance)
+        still = self._rocks(seen, memory) <= ROCKS
+        return (memory.ended >= BACK + UP) & still & (self._missed(seen, memory) <= self.tolerance)
 
     def _missed(self, seen: Seen, memory: ShoveMemory) -> Array:
         """Metres ``(N,)`` that the thing's middle is beside its goal, seen from above."""
