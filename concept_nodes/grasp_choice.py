@@ -197,7 +197,8 @@ class Chooser:
         if not self._fits(goal, hand):
             return None
         lines = None if self._slide else _straight([*way, goal], hand.coming, at)
-        if lines is not None and self._has_reach(way[-1], hand.coming, lines[0][-1]):
+        leads = lines is not None and self._leads_along(lines[-1][-1], goal, hand)
+        if lines is not None and leads and self._has_reach(way[-1], hand.coming, lines[0][-1]):
             # An arm that is hurried through a turn of its elbow falls behind, and overshoots the grasp.
             hurried = any(hurries(at.arm, line, self._pace) for line in lines)
             coming, on = lines
@@ -209,6 +210,11 @@ class Chooser:
         begins = self._begins(goal, hand, at)
         found = None if begins is None else self._come(goal, begins, hand, at)
         return None if found is None else found._replace(usual=True)
+
+    def _leads_along(self, joints: Array, goal: Array, hand: Opening) -> bool:
+        """Whether the arm, with these joints at a grasp, goes along all ways that lead on from there."""
+        along = [aim for aim in self._aims if isinstance(aim, ServedAlong)]
+        return all(aim.goes_on(joints, self._closed(goal), hand.coming.hand) for aim in along)
 
     def _opening(self, width: float) -> Opening:
         """The hand that comes about what is ``width`` metres wide."""

@@ -34,8 +34,8 @@ SHORT = (0.0, 0.4, 0.8)
 UP = np.array([0.0, 0.0, 1.0])
 APART = 0.02
 """Metres between places on a thing's way at which it is looked at."""
-FINE = 0.005
-"""The same where it is asked where it meets something."""
+FINE, FINEST = 0.005, 0.0005
+"""The same where it is asked where it meets something; and how exactly that is said."""
 RAISED, SEARCHED = 0.05, 2
 """Metres by which a way over things goes higher than its ends; and to how many stances a way is searched for
 where none comes there straight."""
@@ -132,12 +132,20 @@ def free_until(view: WorldView, target: str, down: Array, way: Array) -> float:
     collisions = _flying(view, target, frozenset(), without=(target,), closer=TOUCHING)
     here = poses.shifted(view.objects[target], down)
     now = {name for _, name in collisions.touches(here)}
-    count = max(2, int(np.ceil(np.linalg.norm(way) / FINE)) + 1)
-    for share in np.linspace(0.0, 1.0, count).tolist():
-        touches = {name for _, name in collisions.touches(poses.shifted(here, share * way))}
-        if touches - now:
-            return max(float(share) - 1.0 / (count - 1), 0.0)
-    return 1.0
+    length = float(np.linalg.norm(way))
+    count = max(2, int(np.ceil(length / FINE)) + 1)
+
+    def meets(share: float) -> bool:
+        return bool({name for _, name in collisions.touches(poses.shifted(here, share * way))} - now)
+
+    met = next((share for share in np.linspace(0.0, 1.0, count).tolist() if meets(share)), None)
+    if met is None:
+        return 1.0
+    free: float = max(met - 1.0 / (count - 1), 0.0)
+    while (met - free) * length > FINEST:
+        middle = (met + free) / 2
+        free, met = (free, middle) if meets(middle) else (middle, met)
+    return free
 
 
 def _flying(

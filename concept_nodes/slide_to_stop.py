@@ -98,7 +98,8 @@ class SlideToStop(Slid):
         if share >= 1.0:
             return None
         now = poses.shifted(view.objects[self.target], ABOVE * UP)
-        way = [poses.shifted(now, part * share * self.distance * along) for part in SHARES]
+        beyond = share * self.distance + BEYOND
+        way = [poses.shifted(now, part * beyond * along) for part in SHARES]
         supports = self._touches(view).union(support_of(view, self.target)[0])
         return Aim(np.array(way), "be slid against a stop", supports, along=True)
 
@@ -163,6 +164,10 @@ def _slow(memory: SlidMemory) -> Array:
 
 SHARES = (0.25, 0.5, 0.75, 1.0)
 """Shares of its way up to there at which the arm has to be able to be."""
+BEYOND = 0.004
+"""Metres beyond where it meets something at which the hand has to be clear of that, so that no finger is in
+front of the object: of things and of how they lie in the hand some is not known.
+"""
 ABOVE = 0.003
 """Metres above its support at which it is looked at where it meets something."""
 BEFORE, CREEPS, PRESSES = 0.025, 0.015, 0.005

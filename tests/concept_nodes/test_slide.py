@@ -23,6 +23,7 @@ from bt_tasksim.concept_nodes import (
 )
 from bt_tasksim.concept_nodes.hold import GIVES_WAY
 from bt_tasksim.concept_nodes.holding import NOT_HELD
+from bt_tasksim.concept_nodes.shoved_way import free_until
 from bt_tasksim.concept_nodes.slid import LIGHT, NOT_FELT
 from bt_tasksim.concept_nodes.slide_to_stop import NO_STOP
 from bt_tasksim.concept_nodes.stops import nearest_stop
@@ -173,6 +174,29 @@ def test_the_nearest_wall_is_the_rim_and_not_the_board_below(aside, heading):
         stop = nearest_stop(view, "block", other)
         assert stop.gap == pytest.approx(aside, abs=1e-6)
         assert stop.towards == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
+
+
+@settings(max_examples=10, deadline=None)
+@given(aside=st.floats(0.01, 0.12), heading=st.floats(-0.8, 0.8))
+def test_where_it_meets_the_rim_is_known_to_a_millimetre(aside, heading):
+    view, _ = on_the_ledge(aside, heading)
+    free = 0.2 * free_until(view, "block", np.array([0.0, 0.0, 0.003]), np.array([0.2, 0.0, 0.0]))
+    assert aside - 0.001 < free < aside + 1e-6
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize("seed", [1, 2])
+def test_no_grasp_is_taken_with_which_a_finger_would_meet_the_rim_first(seed):
+    turned = (np.pi / 4, np.pi / 4)
+    scene = Scene(
+        fixtures=["ledge"],
+        objects={"block": ObjectSpec(("box",), on="ledge", size=((0.05, 0.05, 0.06),) * 2, yaw=turned)},
+        goal=Goal("block", "ledge", relation="held_against"),
+    )
+    slide = SlideToStop("block", direction=(1.0, 0.0, 0.0), distance=0.25, against="ledge")
+    with Runner(sequence("turned", Grasp("block"), slide), scene) as runner:
+        result = runner.run(seed)
+    assert result.success if result.status == Status.SUCCESS else "no grasp of block serves" in result.why
 
 
 def test_what_has_no_wall_beside_it_holds_nothing_up():
