@@ -22,6 +22,7 @@ from bt_tasksim.scene.fixtures import check_parameters, load_fixture
 from bt_tasksim.scene.goal_functions import GoalFunction, Judge
 from bt_tasksim.scene.parts import draw_parts
 from bt_tasksim.scene.placing import draw_fixtures
+from bt_tasksim.scene.relations import relation_named
 from bt_tasksim.scene.specs import FixtureSpec, Goal, HandStart, ObjectSpec, SpotSpec, object_spec
 from bt_tasksim.scene.starts import check_hollows, draw_order
 
@@ -185,6 +186,7 @@ class Scene:
         places, containers = {p.name for p in furniture}, [p.name for p in furniture if p.container]
         holes = [p.name for p in furniture if p.kind == HOLE]
         moving = self._part_names()
+        moving_parts = {part.name: part for name in self.fixtures for part in load_fixture(name).parts}
         if twice := {name for name in moving if name in places or moving.count(name) > 1}:
             raise FieldError(
                 f"two things of the fixtures are called '{min(twice)}': give one of the fixtures a 'name' of "
@@ -233,6 +235,8 @@ class Scene:
             if isinstance(goal, Goal):
                 where = ("goal",) if len(self.goals) == 1 else ("goals", i)
                 _require("goal", goal.object, {*specs, *moving}, (*where, "object"))
+                if fault := relation_named(goal.relation).fault(goal, moving_parts.get(goal.object)):
+                    raise FieldError(fault, *where)
                 if goal.place:
                     _require("goal", goal.place, {*places, *specs, *moving}, (*where, "place"))
                 if goal.relation in ("inserted", "out_of") and goal.place not in holes:

@@ -15,6 +15,7 @@ from bt_tasksim.core.outcomes import Outcome
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import Hidden, ObjectModel, PlaceModel, WorldModel
 from bt_tasksim.scene.configuration import ActorConfiguration
+from bt_tasksim.scene.fixtures import FixturePart
 from bt_tasksim.scene.geometry import Shape
 from bt_tasksim.scene.hollows import NOTHING
 from bt_tasksim.scene.outlines import Slab, rectangle, slabs, whole_outline
@@ -191,6 +192,16 @@ class GoalRelation(abc.ABC):
     """The object may be in the hand at the end, or let go."""
     needs_place: ClassVar[bool] = True
     """A goal names a place or an object besides."""
+
+    def fault(self, goal: Goal, part: FixturePart | None) -> str:
+        """What is wrong with a goal before anything runs, in one sentence; empty where nothing is.
+
+        Args:
+            goal: The goal.
+            part: The part of a fixture that it is about, as it is in the middle of all draws; None of a free
+                object.
+        """
+        return ""
 
     @abc.abstractmethod
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:

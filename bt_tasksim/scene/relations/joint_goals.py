@@ -10,11 +10,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from bt_tasksim.core.errors import InputError
-from bt_tasksim.core.joints import JointModel, Joints
+from bt_tasksim.core.joints import SLIDES, JointModel, Joints
 from bt_tasksim.core.outcomes import Reason, register_reason
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS, Unit
+from bt_tasksim.scene.fixtures import FixturePart
 from bt_tasksim.scene.joint_laws import ValueAsked, opened, set_to, shut
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
 from bt_tasksim.scene.specs import Goal
@@ -37,11 +38,33 @@ IS_SET = _pair("set", "{object} stands at {value}, and should at {wanted}")
 NOT_SET = _pair("not_set", "{object} stands at {value}, and not at {wanted}")
 
 
+MAY_BE = 0.5
+"""Share of its way by which a part that is drawn may go farther than the one in the middle of all draws."""
+
+
 class JointGoal(GoalRelation):
     """A goal of a part of a fixture."""
 
     needs_place = False
     may_be_held = True
+
+    def fault(self, goal: Goal, part: FixturePart | None) -> str:
+        """See `GoalRelation.fault`: it is no part, or cannot come there."""
+        if part is None:
+            return (
+                f"the goal '{goal.relation}' is one of parts of fixtures, such as a drawer, and "
+                f"'{goal.object}' is a free object"
+            )
+        if goal.value is None:
+            return ""
+        (low, high), unit = part.limits, METRES if part.kind == SLIDES else RADIANS
+        room = MAY_BE * (high - low)
+        if low - room <= goal.value <= high + room:
+            return ""
+        return (
+            f"the goal '{goal.relation}' of '{goal.object}' asks for {unit.text(goal.value)}, and it goes "
+            f"from {unit.text(low)} to {unit.text(high)}"
+        )
 
     @staticmethod
     def joint(goal: Goal, final: FinalState) -> tuple[JointModel, Array]:
@@ -112,10 +135,15 @@ class Shut(JointGoal):
 class SetTo(JointGoal):
     """Open by ``value``, up to the goal's tolerance."""
 
+    def fault(self, goal: Goal, part: FixturePart | None) -> str:
+        """See `GoalRelation.fault`."""
+        if goal.value is None:
+            return f"the goal 'set' of '{goal.object}' needs a 'value', how far it should be open"
+        return super().fault(goal, part)
+
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""
         joint, value = self.joint(goal, final)
-        if goal.value is None:
-            raise InputError(f"the goal 'set' of '{goal.object}' needs a 'value', how far it should be open")
+        assert goal.value is not None, "see `fault`"
         asked = set_to(value, goal.value, self.tolerance(goal, joint))
         return self.placement(asked, (NOT_SET, IS_SET), goal, joint, value)

@@ -12,11 +12,11 @@ import math
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import RADIANS
+from bt_tasksim.scene.fixtures import FixturePart
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, turn
 from bt_tasksim.scene.specs import Goal
 
@@ -54,10 +54,13 @@ class _Turned(GoalRelation):
 class Turned(_Turned):
     """See the file."""
 
+    def fault(self, goal: Goal, part: FixturePart | None) -> str:
+        """See `GoalRelation.fault`."""
+        said = f"the goal 'turned' of '{goal.object}' needs a 'value', by how many radians"
+        return said if goal.value is None else ""
+
     def off(self, goal: Goal, final: FinalState) -> float:
         """See `_Turned.off`."""
-        if goal.value is None:
-            raise InputError(f"the goal 'turned' of '{goal.object}' needs a 'value', by how many radians")
         should = poses.quat_multiply(_turn(goal), final.start(goal.object)[3:])
         return _between(should, goal, final)
 

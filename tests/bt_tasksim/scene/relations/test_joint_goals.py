@@ -62,3 +62,18 @@ def test_what_is_no_part_or_has_no_value_is_refused():
         judged(DOOR, Goal("cup", relation="shut"), 0.0)
     with pytest.raises(InputError, match="needs a 'value'"):
         judged(DOOR, Goal("door", relation="set"), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        (Goal("cup", relation="shut"), "'cup' is a free object"),
+        (Goal("drawer", relation="set"), "needs a 'value'"),
+        (Goal("drawer", relation="open", value=50.0), "asks for 50000 mm, and it goes from 0 mm to"),
+        (Goal("drawer", relation="open", value=-100.0), "it goes from 0 mm to"),
+        (Goal("cup", relation="turned"), "needs a 'value', by how many radians"),
+    ],
+)
+def test_goals_that_cannot_be_are_refused_before_anything_runs(goal, words):
+    with pytest.raises(InputError, match=words):
+        Scene(fixtures=["chest"], objects={"cup": "on table"}, goal=goal)
