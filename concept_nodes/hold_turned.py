@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bt_tasksim.concept.contact import ContactChange, ContactState
-from bt_tasksim.concept.limit import Limit
-from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Newtons, ObjectName, Seconds
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
-from bt_tasksim.concept_nodes.hold import GIVES_WAY, PRESSED, QUICKEST, SMOOTH, YIELDS
-from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
+from bt_tasksim.concept_nodes.holding import NOT_HELD, off_handle
+from bt_tasksim.concept_nodes.joint_conditions import value_of
 from bt_tasksim.concept_nodes.joint_force import arm_of, force_against, lever_of
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
+from bt_tasksim.concept_nodes.joint_values import nearer_stop
+from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.concept_nodes.pressing import Pressing
 from bt_tasksim.core import poses
-from bt_tasksim.core.outcomes import Possible, Statement, register_reason
+from bt_tasksim.core.outcomes import Possible, register_reason
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import RADIANS
@@ -65,7 +64,7 @@ class HoldTurnedMemory(NamedTuple):
 
 
 @register("concept")
-class HoldTurned(ConceptModel[HoldTurnedMemory]):
+class HoldTurned(Pressing[HoldTurnedMemory]):
     """Press a lever, or anything on a hinge, against the stop at which it stands (keeps FT, rotation).
 
     The force is that of the torque about the hinge, at the hand; near the axis, as on a knob, at 50 mm from
@@ -86,29 +85,18 @@ class HoldTurned(ConceptModel[HoldTurnedMemory]):
     most: Newtons = 20.0
     force_limit: Newtons = FORCE_LIMIT
 
-    maintains = (HOLDING,)
     contact = ContactChange(ContactState.FT, ContactState.FT, "rotation")
     presentation = Presentation(
         colour="#57489b",
         spoken=r"(?:keep|hold) .* (?:turned|down|shut)",
         sayings=("keep the {} turned", "I hold the {} down"),
     )
-    default_timeout = 15.0
-    default_tolerance = 0.03
-
-    @classmethod
-    def describe_task(cls, parameters: Mapping[str, Any]) -> str:
-        """For how long."""
-        return f"for {float(parameters['duration']):.1f} s" if "duration" in parameters else ""
-
-    def contradiction(self) -> str:
-        """Limits in their order."""
-        return "" if self.least < self.most else "'least' should be less than 'most'"
 
     def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
         """It must be on a hinge, in the hand, and at a stop."""
         model, away = seen.model(self.target), off_handle(seen, self.target)
-        off = abs(self._stop(seen)[0] - self._value(seen))
+        now = value_of(seen, self.target)
+        off = abs(nearer_stop(now, model.joints.limits)[0] - now)
         turns = model.jointed & model.joint_turns
         return (
             NO_PART.where(~model.jointed, object=self.target),
@@ -119,87 +107,20 @@ class HoldTurned(ConceptModel[HoldTurnedMemory]):
 
     def begin(self, seen: Seen) -> HoldTurnedMemory:
         """Where the hand is about the hinge, and what is felt."""
-        value, (_, way) = self._value(seen), self._stop(seen)
+        value = value_of(seen, self.target)
+        _, way = nearer_stop(value, seen.model(self.target).joints.limits)
         nothing = array_namespace(value).zeros_like(value)
         grip = poses.relative(seen.tool, seen.object(self.target))
         start = HoldTurnedMemory(value, way, grip, nothing, nothing, nothing, nothing)
         felt = force_against(seen, self.target, way)
         return start._replace(reach=arm_of(seen, self.target), pressed=felt)
 
-    def command(self, action: Array, seen: Seen, memory: HoldTurnedMemory) -> Command:
-        """A little beyond the stop."""
-        return self._commanded(seen, self.advance(action, seen, memory))
+    def felt(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """See `Pressing.felt`."""
+        return force_against(seen, self.target, memory.way)
 
-    def carry_out(
-        self, action: Array, seen: Seen, memory: HoldTurnedMemory
-    ) -> tuple[Command, HoldTurnedMemory]:
-        """Both, of one step."""
-        after = self.advance(action, seen, memory)
-        return self._commanded(seen, after), after
-
-    def _commanded(self, seen: Seen, after: HoldTurnedMemory) -> Command:
-        return Command(tool=self._tool(seen, after, after.pushed / after.reach))
-
-    def advance(self, action: Array, seen: Seen, memory: HoldTurnedMemory) -> HoldTurnedMemory:
-        """Lead the force to the middle of its limits, to more off the stop, and count the time."""
-        xp, period = array_namespace(seen.tool), seen.world.control_period
-        pressed = memory.pressed + SMOOTH * (force_against(seen, self.target, memory.way) - memory.pressed)
-        back = -self._beyond(seen, memory)
-        middle = (self.least + self.most) / 2 + PRESSES_ON * poses.clip(back - BACK, 0.0, math.inf)
-        middle = poses.clip(middle, 0.0, MOSTLY * self.most)
-        speed = poses.clip(YIELDS * (middle - pressed), -QUICKEST, QUICKEST)
-        within = (pressed >= self.least) & (pressed <= self.most) & (back <= OFF)
-        held = xp.where(within, memory.held + period, xp.zeros_like(memory.held))
-        return memory._replace(pushed=memory.pushed + period * speed, pressed=pressed, held=held)
-
-    def done(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
-        """It has been pressed for long enough."""
-        return memory.held >= self.duration
-
-    def limits(self, seen: Seen, memory: HoldTurnedMemory) -> tuple[Limit, ...]:
-        """The force at the wrist; and there is a stop."""
-        gone = self._beyond(seen, memory)
-        return strain(seen, self.force_limit), Limit(GIVES_WAY, gone, self.tolerance, {"object": self.target})
-
-    def maintained(self, goal: str, seen: Seen, memory: HoldTurnedMemory) -> Array:
-        """The handle may still be in the hand."""
-        return at_handle(seen, self.target)
-
-    def necessary_cost(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
-        """Seconds that are left."""
-        return poses.clip(self.duration - memory.held, 0.0, self.duration)
-
-    def sufficient_cost(self, known: Known, memory: HoldTurnedMemory) -> Array:
-        """How far the part truly is from its stop, over what counts as there."""
-        law = known.world.object(self.target).joints
-        stop = self._end(law.limits, memory.way)
-        return abs(law.value(known.object(self.target)) - stop) / AT_STOP
-
-    def explain(self, seen: Seen, memory: HoldTurnedMemory) -> Statement:
-        """What is felt, and for how long it has been so."""
-        return PRESSED(object=self.target, force=memory.pressed, held=memory.held, duration=self.duration)
-
-    def _value(self, seen: Seen) -> Array:
-        return seen.model(self.target).joints.value(seen.object(self.target))
-
-    def _stop(self, seen: Seen) -> tuple[Array, Array]:
-        """The nearer stop ``(N,)``, radians, and the sign ``(N,)`` of the turn onto it."""
-        now, limits = self._value(seen), seen.model(self.target).joints.limits
-        xp = array_namespace(now)
-        way = xp.where(2.0 * now > limits[:, 0] + limits[:, 1], xp.ones_like(now), -xp.ones_like(now))
-        return self._end(limits, way), way
-
-    @staticmethod
-    def _end(limits: Array, way: Array) -> Array:
-        return array_namespace(way).where(way > 0.0, limits[:, 1], limits[:, 0])
-
-    def _tool(self, seen: Seen, memory: HoldTurnedMemory, beyond: Array | float) -> Array:
-        """Tool poses ``(N, 7)`` so many radians beyond where it began."""
-        part = seen.model(self.target).joints.pose(memory.value + memory.way * beyond)
-        return poses.multiply(part, poses.inverse(memory.grip))
-
-    def _beyond(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
-        """Metres ``(N,)`` that the hand has gone beyond the stop: along its way, or by what it has turned.
+    def gone(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """See `Pressing.gone`: along its way, or by what it has turned.
 
         Where it is on the axis it has no way, and where it slips on the part it does not turn.
         """
@@ -209,3 +130,28 @@ class HoldTurned(ConceptModel[HoldTurnedMemory]):
         gone = law.shift(memory.value, self._tool(seen, memory, 0.0)[:, :3], seen.tool[:, :3])
         away = poses.norm(lever_of(seen, self.target))
         return xp.maximum(memory.way * gone * away, memory.way * turned * memory.reach)
+
+    def led_to(self, seen: Seen, memory: HoldTurnedMemory) -> tuple[Array, Array]:
+        """See `Pressing.led_to`: more off the stop, where a spring turns it, and where it does not count."""
+        back = -self.gone(seen, memory)
+        wanted = (self.least + self.most) / 2 + PRESSES_ON * poses.clip(back - BACK, 0.0, math.inf)
+        return poses.clip(wanted, 0.0, MOSTLY * self.most), back <= OFF
+
+    def commanded(self, seen: Seen, after: HoldTurnedMemory) -> Command:
+        """A little beyond the stop."""
+        return Command(tool=self._tool(seen, after, after.pushed / after.reach))
+
+    def maintained(self, goal: str, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """The handle may still be in the hand."""
+        return at_handle(seen, self.target)
+
+    def sufficient_cost(self, known: Known, memory: HoldTurnedMemory) -> Array:
+        """How far the part truly is from its stop, over what counts as there."""
+        law, xp = known.world.object(self.target).joints, array_namespace(memory.way)
+        stop = xp.where(memory.way > 0.0, law.limits[:, 1], law.limits[:, 0])
+        return abs(law.value(known.object(self.target)) - stop) / AT_STOP
+
+    def _tool(self, seen: Seen, memory: HoldTurnedMemory, beyond: Array | float) -> Array:
+        """Tool poses ``(N, 7)`` so many radians beyond where it began."""
+        part = seen.model(self.target).joints.pose(memory.value + memory.way * beyond)
+        return poses.multiply(part, poses.inverse(memory.grip))

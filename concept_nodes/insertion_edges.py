@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
+from bt_tasksim.concept_nodes.limits import force_at_tool, torque_at_tool
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant
 
@@ -61,10 +62,7 @@ def edges_of(seen: Seen, target: str, hole: str, end: Array) -> Edges:
 
 def wrench_of(seen: Seen) -> Array:
     """Force and torque ``(N, 6)`` at the tool, robot base frame, N and Nm."""
-    turn, xp = seen.tool[:, 3:], array_namespace(seen.tool)
-    return xp.concat(
-        [poses.rotate(turn, seen.wrench[:, :3]), poses.rotate(turn, seen.wrench[:, 3:])], axis=-1
-    )
+    return array_namespace(seen.tool).concat([force_at_tool(seen), torque_at_tool(seen)], axis=-1)
 
 
 def held_up_at(tool: Array, now: Array, load: Array, inward: Array, edges: Edges) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept_nodes.limits import force_at_tool, torque_at_tool
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace
 
@@ -35,10 +36,8 @@ def force_against(seen: Seen, target: str, way: Array) -> Array:
         way: Sign ``(N,)`` in which its value changes.
     """
     at, axis = _axis(seen, target)
-    force, torque = (
-        poses.rotate(seen.tool[:, 3:], part) for part in (seen.wrench[:, :3], seen.wrench[:, 3:])
-    )
-    about = torque + poses.cross(seen.tool[:, :3] - at, force)
+    force = force_at_tool(seen)
+    about = torque_at_tool(seen) + poses.cross(seen.tool[:, :3] - at, force)
     turning = poses.dot(about, axis) / arm_of(seen, target)
     turns = seen.model(target).joint_turns
     return -way * array_namespace(way).where(turns, turning, poses.dot(force, axis))

@@ -44,3 +44,8 @@ def force_at_wrist(seen: Seen) -> Array:
 def force_at_tool(seen: Seen) -> Array:
     """Forces ``(N, 3)`` at the wrist in the robot base frame, N."""
     return rotate(seen.tool[:, 3:], seen.wrench[:, :3])
+
+
+def torque_at_tool(seen: Seen) -> Array:
+    """Torques ``(N, 3)`` at the wrist in the robot base frame, Nm."""
+    return rotate(seen.tool[:, 3:], seen.wrench[:, 3:])

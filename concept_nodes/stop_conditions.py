@@ -75,7 +75,7 @@ class Against(_FromWalls):
 
 
 @register("concept")
-class HeldAgainst(_FromWalls):
+class HeldAgainst(Against):
     """Does the hand hold the object against a wall of a place's fixture, or the side of another object?
 
     Args:
@@ -84,17 +84,12 @@ class HeldAgainst(_FromWalls):
         tolerance: How far apart they may seem to be.
     """
 
-    target: ObjectName
-    other: PlaceName
-    tolerance: Metres = 0.006
-
     relation = "held_against"
     in_hand = True
-    rests_on_place = False
 
     def holds(self, seen: Seen) -> Array:
         """See `Condition.holds`."""
-        return holding(seen, self.target) & (self._gap(seen) <= self.tolerance)
+        return holding(seen, self.target) & super().holds(seen)
 
 
 @register("concept")

@@ -9,8 +9,10 @@ from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, Radians
 from bt_tasksim.concept.presentation import Presentation
+from bt_tasksim.concept_nodes.joint_values import nearer_stop
 from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core import poses
+from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
 
@@ -49,7 +51,5 @@ class TurnOffStop(OnJoint):
 
     def wanted(self, now: Array, limits: Array) -> Array:
         """See `OnJoint.wanted`."""
-        xp, low, high = array_namespace(now), limits[:, 0], limits[:, 1]
-        from_low = xp.minimum(low + self.angle, high)
-        from_high = xp.maximum(high - self.angle, low)
-        return xp.where(now - low <= high - now, from_low, from_high)
+        stop, way = nearer_stop(now, limits)
+        return poses.clip(stop - way * self.angle, limits[:, 0], limits[:, 1])

@@ -182,11 +182,12 @@ class Scene:
 
     def _check_names(self, specs: Mapping[str, ObjectSpec]) -> None:
         """Every name that is used is one of the scene, and means one thing."""
-        furniture = [p for f in self.fixtures for p in load_fixture(f).places]
+        fixtures = [load_fixture(fixture) for fixture in self.fixtures]
+        furniture = [place for fixture in fixtures for place in fixture.places]
         places, containers = {p.name for p in furniture}, [p.name for p in furniture if p.container]
         holes = [p.name for p in furniture if p.kind == HOLE]
-        moving = self._part_names()
-        moving_parts = {part.name: part for name in self.fixtures for part in load_fixture(name).parts}
+        parts = [part for fixture in fixtures for part in fixture.parts]
+        moving, moving_parts = [part.name for part in parts], {part.name: part for part in parts}
         if twice := {name for name in moving if name in places or moving.count(name) > 1}:
             raise FieldError(
                 f"two things of the fixtures are called '{min(twice)}': give one of the fixtures a 'name' of "

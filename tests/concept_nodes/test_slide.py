@@ -21,8 +21,8 @@ from bt_tasksim.concept_nodes import (
     SlideOff,
     SlideToStop,
 )
-from bt_tasksim.concept_nodes.hold import GIVES_WAY
 from bt_tasksim.concept_nodes.holding import NOT_HELD
+from bt_tasksim.concept_nodes.pressing import GIVES_WAY
 from bt_tasksim.concept_nodes.shoved_way import free_until
 from bt_tasksim.concept_nodes.slid import LIGHT, NOT_FELT
 from bt_tasksim.concept_nodes.slide_to_stop import NO_STOP
