@@ -20,7 +20,7 @@ from bt_tasksim.concept.context import one_world
 from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.seen import Seen
-from bt_tasksim.core import plugins, poses
+from bt_tasksim.core import plugins, poses, real_time
 from bt_tasksim.core.bundles import parts, taken
 from bt_tasksim.core.world import Command, Hidden, Observation
 from bt_tasksim.execution.runner import Runner
@@ -68,6 +68,13 @@ def parts_are_forgotten() -> Iterator[None]:
     """What a test announces or loads as a plugin is not there for the next one."""
     with plugins.scratch():
         yield
+
+
+@pytest.fixture(autouse=True)
+def loops_in_real_time_are_closed() -> Iterator[None]:
+    """A loop left open holds settings of the whole process, and the objects of all tests before it."""
+    yield
+    assert real_time.loops_open() == 0, "a loop in real time was left open"
 
 
 SCENE = Scene(

@@ -53,7 +53,17 @@ class _Interpreter:
                 gc.unfreeze()
 
 
+    def loops(self) -> int:
+        with self._lock:
+            return self._loops
+
+
 _INTERPRETER = _Interpreter()
+
+
+def loops_open() -> int:
+    """How many loops of this process are open."""
+    return _INTERPRETER.loops()
 
 
 class RealTime(Closing):

@@ -1,7 +1,8 @@
 """The project's own software Vulkan driver, for machines on which SAPIEN finds no render device.
 
 ``tools/fetch_vulkan_driver.py`` puts Mesa's lavapipe and the libraries it needs into a folder; this module
-makes a running Python process use that folder. It imports nothing but the standard library.
+makes a running Python process use that folder. It imports nothing but the standard library, and SAPIEN where
+it is asked for the device.
 """
 
 from __future__ import annotations
@@ -52,6 +53,26 @@ def use_software_driver() -> bool:
     if not (os.environ.get("VK_DRIVER_FILES") or os.environ.get("VK_ICD_FILENAMES")):
         os.environ["VK_DRIVER_FILES"] = driver
     return os.environ.get("VK_DRIVER_FILES") == driver
+
+
+def render_device() -> str:
+    """Name the device that everything in this process draws with, for `sapien.Device`.
+
+    SAPIEN draws with one device a process, and takes a processor by its name for another one than the same
+    processor found by itself: whoever draws beside somebody else has to name it alike.
+
+    Returns:
+        "cuda", or "cpu" where no such device can draw. ManiSkill takes both as a render backend.
+
+    Raises:
+        ImportError: There is no SAPIEN.
+    """
+    import sapien
+
+    try:
+        return "cuda" if sapien.Device("cuda").can_render() else "cpu"
+    except RuntimeError:
+        return "cpu"
 
 
 def _load_libraries(folder: Path) -> None:

@@ -176,8 +176,8 @@ class GoalFields(Model):
     object: Text
     place: Reference
     relation: str
-    position_tolerance: AboveZero
-    angle_tolerance: Annotated[AboveZero, Field(le=math.pi)]
+    position_tolerance: AboveZero | None
+    angle_tolerance: Annotated[AboveZero, Field(le=math.pi)] | None
     height: AboveZero
     when: str
     distance: AboveZero

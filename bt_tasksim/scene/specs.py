@@ -282,6 +282,10 @@ class HandStart:
             )
 
 
+TOLERANCES = ("position_tolerance", "angle_tolerance")
+"""Fields of a goal that a relation may have its own default of."""
+
+
 @known_arguments("a goal")
 @dataclass(frozen=True, init=False)
 class Goal:
@@ -303,8 +307,9 @@ class Goal:
             (it rests with its longest axis upright, or level), ``turned``, ``oriented`` and ``pointing_up``
             (it hangs in the hand, turned by ``value`` about ``axis`` from how it stood or from how a place or
             another object is turned, or with its own ``axis`` upwards), or one of your own.
-        position_tolerance: Metres.
-        angle_tolerance: Radians; pi for any heading and any way up.
+        position_tolerance: Metres; None for the relation's own, 0.03 of most and 0.01 of parts of fixtures.
+        angle_tolerance: Radians; pi for any heading and any way up. None for the relation's own, 10 degrees of
+            most and 5 of parts of fixtures.
         height: Metres, for ``lifted``.
         when: ``end``: true at the end of the run. ``once``: true at some moment of it. ``kept``: true for
             ``duration`` of it without a break.
@@ -336,8 +341,8 @@ class Goal:
         object: str,
         place: str = "",
         relation: str = "on",
-        position_tolerance: float = 0.03,
-        angle_tolerance: float = float(np.deg2rad(10.0)),
+        position_tolerance: float | None = None,
+        angle_tolerance: float | None = None,
         height: float = 0.3,
         when: str = "end",
         distance: float = 0.10,
@@ -397,8 +402,9 @@ class Goal:
                 "duration",
             )
         given = {"object": object, "place": place, "relation": relation, "when": when}
+        own = {name: getattr(relations[relation], name, getattr(type(self), name)) for name in TOLERANCES}
         for name, kept in {**given, **{name: getattr(fields, name) for name in lengths}}.items():
-            super().__setattr__(name, kept)
+            super().__setattr__(name, own.get(name) if kept is None else kept)
 
     def __str__(self) -> str:
         """In words: ``cup on lower_board``."""

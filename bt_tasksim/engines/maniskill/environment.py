@@ -15,7 +15,7 @@ from bt_tasksim.core.plain import shown
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.maniskill.schema import EnvironmentFile
 from bt_tasksim.engines.physx import start_physx
-from bt_tasksim.engines.vulkan import use_software_driver
+from bt_tasksim.engines.vulkan import render_device, use_software_driver
 
 CONTROL_MODE = "pd_joint_pos"
 """ManiSkill's controller that takes joint positions."""
@@ -153,7 +153,7 @@ def _open(file: EnvironmentFile, robot: str, drawn: bool) -> Any:
                 reward_mode="none",
                 control_mode=CONTROL_MODE,
                 sim_backend="physx_cpu",
-                render_backend="cpu" if drawn else "none",
+                render_backend=render_device() if drawn else "none",
                 robot_uids=robot,
             )
         except RuntimeError as error:

@@ -23,7 +23,7 @@ from bt_tasksim.engines.kinematics.pinocchio import PinocchioKinematics
 from bt_tasksim.engines.physx import start_physx
 from bt_tasksim.engines.rendering import materials
 from bt_tasksim.engines.rendering.sapien_camera import SceneCamera
-from bt_tasksim.engines.vulkan import use_software_driver
+from bt_tasksim.engines.vulkan import render_device, use_software_driver
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.robot.urdf_visuals import LinkVisual, load_visuals
 from bt_tasksim.scene import meshes
@@ -62,7 +62,7 @@ class SapienRendering(RenderingEngine):
         start_physx()
         render.set_log_level("error")
         try:
-            self._system = render.RenderSystem()
+            self._system = render.RenderSystem(sapien.Device(render_device()))
             self._scene = sapien.Scene([self._system])
         except RuntimeError as error:
             raise MachineError(

@@ -192,6 +192,10 @@ class GoalRelation(abc.ABC):
     """The object may be in the hand at the end, or let go."""
     needs_place: ClassVar[bool] = True
     """A goal names a place or an object besides."""
+    position_tolerance: ClassVar[float] = Goal.position_tolerance
+    """Metres that a goal allows where it does not say."""
+    angle_tolerance: ClassVar[float] = Goal.angle_tolerance
+    """Radians that a goal allows where it does not say."""
 
     def fault(self, goal: Goal, part: FixturePart | None) -> str:
         """What is wrong with a goal before anything runs, in one sentence; empty where nothing is.

@@ -31,6 +31,8 @@ NOT_INSERTED = register_reason(
 class Inserted(GoalRelation):
     """See the file; `Goal.position_tolerance` is how far it may be from the stop."""
 
+    position_tolerance = 0.01
+
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""
         found = in_hole(final.whereabouts, goal.object, goal.place)

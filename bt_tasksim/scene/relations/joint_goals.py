@@ -5,6 +5,7 @@ Such a part may be held at the end: who opens a door often keeps it in the hand.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -47,6 +48,8 @@ class JointGoal(GoalRelation):
 
     needs_place = False
     may_be_held = True
+    position_tolerance = 0.01
+    angle_tolerance = math.radians(5.0)
 
     def fault(self, goal: Goal, part: FixturePart | None) -> str:
         """See `GoalRelation.fault`: it is no part, or cannot come there."""

@@ -56,7 +56,7 @@ def test_ways_to_write_a_goal(goal, fields):
         (lambda: Goal("cup", on="table", when="always"), "'end', 'once' or 'kept', found 'always'"),
         (lambda: Goal("cup", on="table", distance=math.nan), "'distance' should be .* finite"),
         (lambda: Goal("cup", on="table", height=-1), "'height' should be positive"),
-        (lambda: Goal("cup", on="table", position_tolerance=None), "'position_tolerance' should be a number"),
+        (lambda: Goal("cup", on="table", position_tolerance="1"), "'position_tolerance' should be a number"),
         (lambda: Goal(None, on="table"), "'object' should be text"),
         (lambda: Goal("cup", on=5), "'on' should be text"),
         (lambda: Goal("cup", "table", relation=None), "'relation' should be text"),

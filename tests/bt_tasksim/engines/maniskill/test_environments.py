@@ -15,6 +15,7 @@ from bt_tasksim.core.world import Command
 from bt_tasksim.engines.maniskill.environment import Environment
 from bt_tasksim.engines.maniskill.files import load_environment_file
 from bt_tasksim.engines.maniskill.robot import Controls
+from bt_tasksim.engines.rendering.sapien import SapienRendering
 from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.trees import sequence
@@ -243,6 +244,25 @@ def test_pictures_are_maniskills_own():
     with pytest.raises(InputError, match="render_camera"):
         drawn.pipeline.render("render_camara")
     drawn.pipeline.close()
+
+
+@pytest.mark.parametrize("first", ["ours", "maniskill"])
+def test_both_draw_in_one_process(first):
+    """SAPIEN draws with one device a process, and knows the same one by several names."""
+    drawn = []
+
+    def draw(who):
+        if who == "ours":
+            drawn.append(SapienRendering())
+        else:
+            drawn.append(runner(sequence("wait", Wait(0.1)), rendering=True))
+            drawn[-1].run(0)
+            assert drawn[-1].pipeline.render("overview", size=(32, 32)).colour.shape == (32, 32, 3)
+
+    for who in sorted(("ours", "maniskill"), key=first.__ne__):
+        draw(who)
+    for one in drawn:
+        one.close()
 
 
 OWN = """

@@ -45,9 +45,13 @@ def judged(fixture, goal, value, force=0.0):
         (DRAWER, {"relation": "shut"}, 0.006, NOT_SHUT["slide"]),
         (DOOR, {"relation": "shut"}, 0.03, IS_SHUT["hinge"]),
         (DOOR, {"relation": "shut"}, 0.04, NOT_SHUT["hinge"]),
-        (DRAWER, {"relation": "set", "value": 0.1, "position_tolerance": 0.01}, 0.109, IS_SET["slide"]),
-        (DRAWER, {"relation": "set", "value": 0.1, "position_tolerance": 0.01}, 0.111, NOT_SET["slide"]),
-        (DOOR, {"relation": "set", "value": 0.7}, 0.8, IS_SET["hinge"]),
+        (DOOR, {"relation": "set", "value": 1.0}, 0.92, IS_SET["hinge"]),
+        (DOOR, {"relation": "set", "value": 1.0}, 0.90, NOT_SET["hinge"]),
+        (DRAWER, {"relation": "set", "value": 0.1}, 0.109, IS_SET["slide"]),
+        (DRAWER, {"relation": "set", "value": 0.1}, 0.111, NOT_SET["slide"]),
+        (DRAWER, {"relation": "open", "value": 0.12}, 0.111, IS_OPEN["slide"]),
+        (DRAWER, {"relation": "open", "value": 0.12}, 0.109, NOT_OPEN["slide"]),
+        (DOOR, {"relation": "set", "value": 0.7}, 0.78, IS_SET["hinge"]),
     ],
 )
 @pytest.mark.parametrize("force", [0.0, 5.0])
