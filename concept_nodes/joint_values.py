@@ -1,20 +1,8 @@
-"""Values of a part's joint at which tasks end; they count from 0, and stay within the joint's limits."""
+"""Values of a part's joint at which tasks end; they count from 0."""
 
 from __future__ import annotations
 
 from bt_tasksim.core.poses import Array, array_namespace
-
-
-def at_value(asked: float, now: Array, limits: Array) -> Array:
-    """The value ``(N,)`` that is asked for.
-
-    Args:
-        asked: It, metres or radians.
-        now: The present one ``(N,)``.
-        limits: Lowest and highest ``(N, 2)``.
-    """
-    xp = array_namespace(now)
-    return xp.minimum(xp.maximum(limits[:, 0], asked + 0.0 * now), limits[:, 1])
 
 
 def open_by(asked: float | None, now: Array, limits: Array) -> Array:
@@ -25,7 +13,7 @@ def open_by(asked: float | None, now: Array, limits: Array) -> Array:
         now: The present value ``(N,)``.
         limits: Lowest and highest ``(N, 2)``.
     """
-    return limits[:, 1] if asked is None else array_namespace(now).maximum(at_value(asked, now, limits), now)
+    return limits[:, 1] if asked is None else array_namespace(now).maximum(asked + 0.0 * now, now)
 
 
 def nearer_stop(now: Array, limits: Array) -> tuple[Array, Array]:

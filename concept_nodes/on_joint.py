@@ -58,6 +58,16 @@ def _form(turns: bool) -> Form:
 
 JAMMED = _by_kind("jammed", "{object} does not follow the hand: it is {value} behind, more than {limit}")
 NOT_THERE = _by_kind("stopped_short", "{object} stopped {value} from where it should be, more than {limit}")
+TOO_FAR = {
+    turns: register_reason(
+        f"beyond_the_way_{'turning' if turns else 'sliding'}",
+        "{object} should come to {wanted}, and it goes from {low} to {high} only",
+        wanted=unit,
+        low=unit,
+        high=unit,
+    )
+    for turns, unit in UNITS.items()
+}
 STANDS = {turns: _form(turns) for turns in UNITS}
 FORCE_LIMIT = 50.0
 """N at the wrist: what a stiff drawer takes, and well below what tears a handle off."""
@@ -147,7 +157,7 @@ class OnJoint(ConceptModel[JointMemory]):
     default_timeout = 20.0
 
     def wanted(self, now: Array, limits: Array) -> Array:
-        """The value ``(N,)`` at which it should end.
+        """The value ``(N,)`` at which it should end, whether the part goes as far or not.
 
         Args:
             now: The present one ``(N,)``.
@@ -166,12 +176,17 @@ class OnJoint(ConceptModel[JointMemory]):
         return False
 
     def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
-        """The part must move as this task has it, and its handle be in the hand."""
+        """The part must move as this task has it, and as far, and its handle be in the hand."""
         model = seen.model(self.target)
-        away = off_handle(seen, self.target)
+        away, limits = off_handle(seen, self.target), model.joints.limits
+        low, high = limits[:, 0], limits[:, 1]
+        wanted = self.wanted(self._value(seen), limits)
+        beyond = abs(wanted - poses.clip(wanted, low, high)) > TOLERANCE[self.turns]
+        names = {"object": self.target, "wanted": wanted, "low": low, "high": high}
         return (
             NO_PART.where(~model.jointed, object=self.target),
             OTHER_PART[self.turns].where(model.joint_turns != self.turns, object=self.target),
+            TOO_FAR[self.turns].where(beyond, **names),
             NOT_HELD.where(~at_handle(seen, self.target), object=self.target, distance=away),
         )
 
@@ -183,7 +198,7 @@ class OnJoint(ConceptModel[JointMemory]):
         """
         xp, now = array_namespace(seen.tool), self._value(seen)
         limits = seen.model(self.target).joints.limits
-        (goals, values) = (np.asarray(v, float) for v in fetched([self.wanted(now, limits), now]))
+        (goals, values) = (np.asarray(v, float) for v in fetched([self._end(now, limits), now]))
         found = [self._way(view, values[k], goals[k]) for k, view in enumerate(views(seen))]
         path = plan([seen.tool], self.speed, samples=SAMPLES)
         path = with_routes(
@@ -264,13 +279,17 @@ class OnJoint(ConceptModel[JointMemory]):
         way = JointWay(view, self.target)
         joint = view.model(self.target).joint
         assert joint is not None
-        goal = float(self.wanted(np.array([way.now]), np.array([joint.limits]))[0])
+        goal = float(self._end(np.array([way.now]), np.array([joint.limits]))[0])
         if self.wholly:
             goal = way.now + SHARES[-1] * (goal - way.now)
         unit = UNITS[self.turns]
         words = f"be taken from {unit.text(way.now)} to {unit.text(goal)}"
         beyond = self.stops * BEYOND[self.turns]
         return Aim(way.poses(way.now, goal + beyond), words, way.beside, along=True, carried=way.carried)
+
+    def _end(self, now: Array, limits: Array) -> Array:
+        """The wanted value ``(N,)``, as far as the part goes."""
+        return poses.clip(self.wanted(now, limits), limits[:, 0], limits[:, 1])
 
     def _law(self, seen: Seen) -> Joints:
         return seen.model(self.target).joints

@@ -11,7 +11,6 @@ from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, 
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept_nodes.joint_values import nearer_stop
 from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
-from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
@@ -52,4 +51,4 @@ class TurnOffStop(OnJoint):
     def wanted(self, now: Array, limits: Array) -> Array:
         """See `OnJoint.wanted`."""
         stop, way = nearer_stop(now, limits)
-        return poses.clip(stop - way * self.angle, limits[:, 0], limits[:, 1])
+        return stop - way * self.angle

@@ -18,7 +18,7 @@ from bt_tasksim.concept_nodes import (
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.concept_nodes.limits import WRIST_STRAINED
-from bt_tasksim.concept_nodes.on_joint import JAMMED, NOT_THERE, JointMemory
+from bt_tasksim.concept_nodes.on_joint import JAMMED, NOT_THERE, TOO_FAR, JointMemory
 from bt_tasksim.concept_nodes.press_button import AROUND, FIST, LEANS, LEVEL, _fists
 from bt_tasksim.concept_nodes.press_button import JAMMED as BUTTON_JAMS
 from bt_tasksim.core import poses
@@ -73,6 +73,8 @@ def test_a_drawer_is_opened_adjusted_and_shut_again(engines):
     [
         (OpenDrawer("drawer"), NOT_HELD),
         (OpenDoor("drawer"), OTHER_PART[True]),
+        (OpenDrawer("drawer", distance=0.6), TOO_FAR[False]),
+        (AdjustDrawer("drawer", distance=0.6), TOO_FAR[False]),
         (OpenDrawer("cup"), NO_PART),
         (Pick("drawer"), NOT_HELD),
     ],
