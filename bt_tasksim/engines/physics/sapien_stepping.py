@@ -125,6 +125,8 @@ class SapienWorld:
     def drive_to(self, position: list[float], velocity: list[float]) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`."""
         hand = self.robot.drive_to(position, velocity)
+        if hand.opens:
+            self._twist.let_go()
         if hand.fast:
             self._watch = WATCHED
         if hand.fast and hand.opens and any(self._touch.hand_force):

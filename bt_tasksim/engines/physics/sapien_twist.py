@@ -66,6 +66,14 @@ class Twist:
         """Something is held."""
         return self._held >= 0
 
+    def let_go(self) -> None:
+        """Nothing is held until the next look: what was read of the pads does not hold while they part.
+
+        Until then they may be long off the thing, and what no longer touches it would turn it. A lid between
+        open fingers was thrown shut at 4 rad/s.
+        """
+        self._held = -1
+
     def look(self, tip_force: Sequence[Sequence[float]], hand_force: Sequence[float]) -> None:
         """What is held, and how firmly, for the next steps.
 
