@@ -71,6 +71,17 @@ def parts_are_forgotten() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
+def modules_are_forgotten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What a test imports from its own folder is not there for the next one."""
+    path, folder = list(sys.path), str(tmp_path_factory.getbasetemp())
+    yield
+    sys.path[:] = path
+    for name, module in list(sys.modules.items()):
+        if (getattr(module, "__file__", None) or "").startswith(folder):
+            del sys.modules[name]
+
+
+@pytest.fixture(autouse=True)
 def loops_in_real_time_are_closed() -> Iterator[None]:
     """A loop left open holds settings of the whole process, and the objects of all tests before it."""
     yield

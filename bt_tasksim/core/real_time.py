@@ -52,7 +52,6 @@ class _Interpreter:
             if not self._frozen_by_others:
                 gc.unfreeze()
 
-
     def loops(self) -> int:
         with self._lock:
             return self._loops

@@ -115,6 +115,7 @@ def test_a_real_robot_gets_guard_and_clock(plugin, command):
     result = runner.run(0)
     assert result.status.name == "SUCCESS" and result.timing is not None
     assert runner.pipeline.physics.engine.held == "the run is over"
+    runner.close()
     code, told, _ = command("robot_engine", "--engines", "echo")
     assert code == 0 and told["engines"] == "echo" and told["perception"] == "tracked"
     unsafe = replace(load_robot("panda"), safety=None)
