@@ -134,11 +134,11 @@ class GoalEntry(Model):
     relation: Annotated[Text, known_values(_relations, "relation", OWN)] = "on"
     """`on`, `anywhere` on it, `inside`, `beside`, `lifted` in the hand above where it stood, or your own."""
     position_tolerance: Annotated[Number, Field(gt=0.0, le=10.0)] | None = None
-    """How far from the place's origin the object may be, or from the value a part, m; by default 0.03, and 0.01
-    of parts of fixtures and what is inserted."""
+    """How far from the place's origin the object may be, or from the value a part, m; by default 0.03, and
+    0.01 of parts of fixtures and what is inserted."""
     angle_tolerance: Annotated[Number, Field(gt=0.0, le=math.pi)] | None = None
-    """How far it may be tilted, or turned from the place's heading, or from the value a part, rad; by default 10
-    degrees, and 5 of parts of fixtures."""
+    """How far it may be tilted, or turned from the place's heading, or from the value a part, rad; by
+    default 10 degrees, and 5 of parts of fixtures."""
     height: Annotated[Number, Field(gt=0.0, le=10.0)] = 0.3
     """Of `lifted`: how far above where it stood, m."""
     when: Literal["end", "once", "kept"] = "end"

@@ -308,8 +308,8 @@ class Goal:
             (it hangs in the hand, turned by ``value`` about ``axis`` from how it stood or from how a place or
             another object is turned, or with its own ``axis`` upwards), or one of your own.
         position_tolerance: Metres; None for the relation's own, 0.03 of most and 0.01 of parts of fixtures.
-        angle_tolerance: Radians; pi for any heading and any way up. None for the relation's own, 10 degrees of
-            most and 5 of parts of fixtures.
+        angle_tolerance: Radians; pi for any heading and any way up. None for the relation's own, 10 degrees
+            of most and 5 of parts of fixtures.
         height: Metres, for ``lifted``.
         when: ``end``: true at the end of the run. ``once``: true at some moment of it. ``kept``: true for
             ``duration`` of it without a break.
