@@ -53,7 +53,7 @@ QUICK = {
     "benchmarks.any_tree.grasp_risk": "--episodes 2 --seed 23000",
     "benchmarks.planning": "--quick",
     "benchmarks.batch": "--quick --worlds 2 --episodes 2 --trees 20",
-    "benchmarks.cluster": "--times 1 --episodes 12",
+    "benchmarks.cluster": "--times 1 --episodes 4",
     "benchmarks.chores": "--episodes 1 --seed 910000 --kinds carry --oracle 0",
     "benchmarks.concepts": "--only grasp_then_pick --robots panda --engines sapien --episodes 1 --workers 1",
     "benchmarks.decomposition": "--seeds 1",
