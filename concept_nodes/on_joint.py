@@ -38,11 +38,19 @@ UNITS: Mapping[bool, Unit] = {False: METRES, True: RADIANS}
 """Of what a part does, by whether it turns."""
 
 
-def _by_kind(name: str, sentence: str) -> dict[bool, Reason]:
-    """A reason for what slides and one for what turns, which have other units."""
+def _by_kind(name: str, sentence: str, *numbers: str) -> dict[bool, Reason]:
+    """A reason for what slides and one for what turns, which have other units.
+
+    Args:
+        name: Of both.
+        sentence: With fields for the object and for numbers.
+        numbers: Names of the numbers, ``value`` and ``limit`` by default.
+    """
     return {
         turns: register_reason(
-            f"{name}_{'turning' if turns else 'sliding'}", sentence, value=unit, limit=unit
+            f"{name}_{'turning' if turns else 'sliding'}",
+            sentence,
+            **dict.fromkeys(numbers or ("value", "limit"), unit),
         )
         for turns, unit in UNITS.items()
     }
@@ -58,16 +66,11 @@ def _form(turns: bool) -> Form:
 
 JAMMED = _by_kind("jammed", "{object} does not follow the hand: it is {value} behind, more than {limit}")
 NOT_THERE = _by_kind("stopped_short", "{object} stopped {value} from where it should be, more than {limit}")
-TOO_FAR = {
-    turns: register_reason(
-        f"beyond_the_way_{'turning' if turns else 'sliding'}",
-        "{object} should come to {wanted}, and it goes from {low} to {high} only",
-        wanted=unit,
-        low=unit,
-        high=unit,
-    )
-    for turns, unit in UNITS.items()
-}
+TOO_FAR = _by_kind(
+    "beyond_the_way",
+    "{object} should come to {wanted}, and it goes from {low} to {high} only",
+    *("wanted", "low", "high"),
+)
 STANDS = {turns: _form(turns) for turns in UNITS}
 FORCE_LIMIT = 50.0
 """N at the wrist: what a stiff drawer takes, and well below what tears a handle off."""
@@ -179,10 +182,10 @@ class OnJoint(ConceptModel[JointMemory]):
         """The part must move as this task has it, and as far, and its handle be in the hand."""
         model = seen.model(self.target)
         away, limits = off_handle(seen, self.target), model.joints.limits
-        low, high = limits[:, 0], limits[:, 1]
-        wanted = self.wanted(self._value(seen), limits)
-        beyond = abs(wanted - poses.clip(wanted, low, high)) > TOLERANCE[self.turns]
-        names = {"object": self.target, "wanted": wanted, "low": low, "high": high}
+        now = self._value(seen)
+        wanted = self.wanted(now, limits)
+        beyond = abs(wanted - self._end(now, limits)) > TOLERANCE[self.turns]
+        names = {"object": self.target, "wanted": wanted, "low": limits[:, 0], "high": limits[:, 1]}
         return (
             NO_PART.where(~model.jointed, object=self.target),
             OTHER_PART[self.turns].where(model.joint_turns != self.turns, object=self.target),

@@ -73,11 +73,11 @@ def parts_are_forgotten() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def modules_are_forgotten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """What a test imports from its own folder is not there for the next one."""
-    path, folder = list(sys.path), str(tmp_path_factory.getbasetemp())
+    path, known, folder = list(sys.path), set(sys.modules), str(tmp_path_factory.getbasetemp())
     yield
     sys.path[:] = path
-    for name, module in list(sys.modules.items()):
-        if (getattr(module, "__file__", None) or "").startswith(folder):
+    for name in set(sys.modules) - known:
+        if (getattr(sys.modules[name], "__file__", None) or "").startswith(folder):
             del sys.modules[name]
 
 

@@ -307,7 +307,8 @@ class Goal:
             (it rests with its longest axis upright, or level), ``turned``, ``oriented`` and ``pointing_up``
             (it hangs in the hand, turned by ``value`` about ``axis`` from how it stood or from how a place or
             another object is turned, or with its own ``axis`` upwards), or one of your own.
-        position_tolerance: Metres; None for the relation's own, 0.03 of most and 0.01 of parts of fixtures.
+        position_tolerance: Metres; None for the relation's own, 0.03 of most, 0.01 of parts of fixtures
+            and of what is inserted.
         angle_tolerance: Radians; pi for any heading and any way up. None for the relation's own, 10 degrees
             of most and 5 of parts of fixtures.
         height: Metres, for ``lifted``.

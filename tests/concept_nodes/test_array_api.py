@@ -98,7 +98,7 @@ SEEDS = (1, 2)
 """Draws of which the objects differ in kind and size."""
 EACH = 1
 """Situations of each concept in each draw."""
-PLANNED = 2
+PLANNED = 6
 """Of these, so many are asked to begin again and again: a plan takes seconds where there is hardly a way."""
 CLOSE = 1e-7
 """The square root of a difference that rounds off may be as much."""

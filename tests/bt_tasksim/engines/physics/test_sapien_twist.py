@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from py_trees.common import Status
 
 from bt_tasksim.core import poses
 from bt_tasksim.engines.physics.sapien_twist import Twist
+from bt_tasksim.execution.runner import Runner
 from bt_tasksim.robot.description import Pads
+from bt_tasksim.trees.load import load_source
 
 STILL, Y, STEP = [1.0, 0.0, 0.0, 0.0], np.array([0.0, 1.0, 0.0]), 0.01
 PADS = Pads(friction=1.2, patch_radius=0.02, min_patch_radius=0.01)
@@ -95,3 +98,30 @@ def test_nothing_is_held_by_one_finger_or_by_fingers_on_one_another(tips, force)
     assert twist.holds
     twist.look(tips, force)
     assert not twist.holds
+
+
+def test_nothing_is_held_by_pads_that_part_until_they_are_read_again():
+    twist, (_, thing) = held()
+    turned(thing, Y, 0.1)
+    twist.let_go()
+    assert not twist.holds
+    twist.look(FIRMLY, [0.0, 60.0])
+    twist.resist(STEP)
+    assert np.allclose(thing.torques[0], 0.0, atol=1e-12), "it is held as it is then"
+
+
+@pytest.mark.physical
+@pytest.mark.parametrize("seed", [620003, 620007])
+def test_a_lid_that_is_let_go_beyond_its_highest_point_is_not_thrown_back(seed):
+    """It turned between the pads as it was opened, and they part within a period of the robot's."""
+    source, seen = load_source("open_lid"), []
+
+    def record(step):
+        (pose,) = step.pipeline.hidden().objects
+        seen.append((poses.tilt(pose[3:]), bool(step.observation.contacts.any())))
+
+    assert Runner(source.build(), source.scene).run(seed, record=record).status == Status.SUCCESS
+    angles, touched = np.array(seen).T
+    last = int(np.flatnonzero(touched)[-1])
+    assert angles[last] > np.radians(93.0)
+    assert angles[last:].min() > angles[last] - np.radians(1.0)
