@@ -144,7 +144,7 @@ def test_an_engine_from_outside_is_served_to_another_process(plugin):
         runner = Runner(draw_back(), SCENE, options)
         assert runner.pipeline.served == {"physics": "ideal"}
         assert runner.run(0).status.name == "SUCCESS"
-        runner.pipeline.close()
+        runner.close()
     finally:
         server.kill()
         server.communicate()

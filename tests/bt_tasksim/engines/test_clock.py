@@ -93,7 +93,7 @@ def test_a_simulation_in_real_time_takes_its_time_and_is_the_same_otherwise():
         began = time.monotonic()
         result = runner.run(3, record=lambda step, seen=seen: seen.append(step.observation.tool_pose))
         results.append((result, np.array(seen), time.monotonic() - began))
-        runner.pipeline.close()
+        runner.close()
     (free, fast, _), (paced, slow, took) = results
     assert free.timing is None and isinstance(paced.timing, Timing)
     assert paced.timing.period == 0.05 and paced.timing.ticks >= 12 and took >= 0.6

@@ -48,7 +48,7 @@ def episode(seed, **options):
         result = runner.run(seed, record=lambda step: seen.append((step.pipeline.state, step.observation)))
         return seen, result, runner.pipeline.hidden()
     finally:
-        runner.pipeline.close()
+        runner.close()
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +129,7 @@ def test_an_episode_that_begins_with_the_hand_above_the_object(kinematics, physi
         runner = Runner(source.build(), source.scene, EngineOptions(**options))
         runner.reset(world)
         states.append(runner.pipeline.state)
-        runner.pipeline.close()
+        runner.close()
     assert same(states[0].joint_position, states[1].joint_position)
     assert not same(states[0].joint_position, np.concatenate([runner.robot.rest, runner.robot.hand_open]))
 

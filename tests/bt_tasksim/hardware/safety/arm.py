@@ -249,7 +249,7 @@ def main() -> None:
     except BtTasksimError as error:
         print("error", error, flush=True)
     finally:
-        runner.pipeline.close()
+        runner.close()
 
 
 if __name__ == "__main__":

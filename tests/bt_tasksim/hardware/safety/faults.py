@@ -162,7 +162,7 @@ def _in_process(arm: ArmProcess, fault: str, wait: float) -> Seen:
         leaf.trouble, leaf.lasts = lambda tool: tool, 0.3
         return _after(arm, said, running, lambda: runner.run(0).status.name == "SUCCESS")
     finally:
-        runner.pipeline.close()
+        runner.close()
 
 
 def _by_signal(arm: ArmProcess, fault: str, wait: float) -> Seen:
@@ -188,7 +188,7 @@ def _by_signal(arm: ArmProcess, fault: str, wait: float) -> Seen:
         try:
             return runner.run(0).status.name == "SUCCESS"
         finally:
-            runner.pipeline.close()
+            runner.close()
 
     running = [] if "[]" in out or fault.endswith("runner") else [out]
     return _after(arm, f"{out} {err}", running, again, told)

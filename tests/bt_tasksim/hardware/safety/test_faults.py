@@ -62,7 +62,7 @@ def test_a_robot_that_dies_ends_the_run():
         with pytest.raises(MachineError, match=r"cannot reach the robot: .*refused"):
             runner.run(0)
     finally:
-        runner.pipeline.close()
+        runner.close()
         arm.close()
 
 
@@ -94,7 +94,7 @@ def test_after_a_stop_nothing_starts_again_without_a_new_run(arm):
         runner.run(0)
     physics.engine.emergency.held_down = lambda: False
     assert runner.run(0).success
-    runner.pipeline.close()
+    runner.close()
 
 
 def test_an_emergency_stop_while_a_run_begins_counts(arm):
@@ -112,7 +112,7 @@ def test_an_emergency_stop_while_a_run_begins_counts(arm):
     assert arm.stopped()["commands"] == 0 and leaf.ended == []
     engine.reset, leaf.lasts = reset, 0.2
     assert runner.run(0).success
-    runner.pipeline.close()
+    runner.close()
 
 
 def test_the_watchdog_watches_the_way_to_the_start_and_rests_then(arm):
@@ -133,7 +133,7 @@ def test_the_watchdog_watches_the_way_to_the_start_and_rests_then(arm):
     engine.reset = lambda configuration, heartbeat: (reset(configuration, heartbeat), heartbeat())
     leaf.lasts, leaf.model.begin = 0.3, lambda seen: (time.sleep(0.4), seen.tool.copy())[1]
     assert runner.run(0).success, "a leaf may plan before its first command"
-    runner.pipeline.close()
+    runner.close()
 
 
 def test_a_watchdog_that_had_to_stop_the_arm_is_replaced(arm):
@@ -150,7 +150,7 @@ def test_a_watchdog_that_had_to_stop_the_arm_is_replaced(arm):
     assert arm.stopped()["latched"] == "the runner asked for it" and runner.pipeline.hold_delivered
     first, physics.engine.hold = physics.watchdog.pid, hold
     assert runner.run(0).success and physics.watchdog.pid != first
-    runner.pipeline.close()
+    runner.close()
 
 
 def test_that_nobody_could_tell_the_arm_is_said(arm):
@@ -170,7 +170,7 @@ def test_that_nobody_could_tell_the_arm_is_said(arm):
     outcome = runner.run(0).outcome
     assert outcome.is_a(SAFETY_STOP) and outcome.names["arm"].startswith("nobody could tell the arm")
     physics.engine.hold = hold
-    runner.pipeline.close()
+    runner.close()
 
 
 def test_nothing_moves_where_the_period_does_not_suit_the_limits(arm):
@@ -178,7 +178,7 @@ def test_nothing_moves_where_the_period_does_not_suit_the_limits(arm):
     with pytest.raises(InputError, match="every 100 ms cannot expire"):
         runner.reset(replace(SCENE.sample(0), control_frequency=10))
     assert arm.tell()["latched"] == "no run has begun"
-    runner.pipeline.close()
+    runner.close()
 
 
 def test_a_command_that_was_held_up_after_its_checks_is_not_sent(arm):
@@ -188,7 +188,7 @@ def test_a_command_that_was_held_up_after_its_checks_is_not_sent(arm):
     physics.guard.command = lambda target: (time.sleep(0.07 * (leaf.context.now > 0.3)), command(target))[1]
     result = runner.run(0)
     assert result.reason == "checked_late"
-    runner.pipeline.close()
+    runner.close()
 
 
 @pytest.mark.parametrize(("wrench", "here"), [(90.0, True), (np.nan, False)])
@@ -205,7 +205,7 @@ def test_an_arm_that_pushes_against_something_stops_where_it_is(arm, wrench, her
     result = runner.run(0)
     assert result.reason == ("force_limit" if here else "not_finite")
     assert arm.stopped()["here"] is here
-    runner.pipeline.close()
+    runner.close()
 
 
 def test_a_run_that_ends_well_holds_and_says_how_well_it_kept_time(arm):
@@ -217,7 +217,7 @@ def test_a_run_that_ends_well_holds_and_says_how_well_it_kept_time(arm):
     assert told["latched"] == "the run is over" and told["refused"] == 0
     assert result.timing.ticks == result.control_steps == told["commands"]
     assert result.timing.latency_median is not None and result.timing.latency_median < 0.1
-    runner.pipeline.close()
+    runner.close()
 
 
 def test_a_tree_gets_the_joint_states_that_were_checked(arm):
@@ -235,4 +235,4 @@ def test_a_tree_gets_the_joint_states_that_were_checked(arm):
     result = runner.run(0, record=lambda step: given.append(step.observation.arm_position.tolist()))
     assert result.success, result.why
     assert len(given) > 5 and all(position in checked for position in given)
-    runner.pipeline.close()
+    runner.close()

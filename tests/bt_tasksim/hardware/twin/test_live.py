@@ -276,7 +276,7 @@ def test_wrong_states_are_refused_and_the_run_goes_on(bench: Bench, stranger: An
     finally:
         stop.set()
         thread.join()
-        runner.pipeline.close()
+        runner.close()
     assert result.status.name == "SUCCESS", result.why
     assert sum(sent) > 300
     said = [r.message for r in caplog.records]
@@ -378,7 +378,7 @@ def test_bytes_that_are_no_protocol(bench: Bench) -> None:
         bench.evaluation.load(bench.configuration)
         assert runner.run(0).status.name == "SUCCESS"
     finally:
-        runner.pipeline.close()
+        runner.close()
 
 
 def test_topics_of_objects_end_with_their_world(bench: Bench) -> None:
