@@ -183,13 +183,12 @@ class OnJoint(ConceptModel[JointMemory]):
         model = seen.model(self.target)
         away, limits = off_handle(seen, self.target), model.joints.limits
         now = self._value(seen)
-        wanted = self.wanted(now, limits)
-        beyond = abs(wanted - self._end(now, limits)) > TOLERANCE[self.turns]
-        names = {"object": self.target, "wanted": wanted, "low": limits[:, 0], "high": limits[:, 1]}
+        names = {"object": self.target, "wanted": self.wanted(now, limits)}
+        names |= {"low": limits[:, 0], "high": limits[:, 1]}
         return (
             NO_PART.where(~model.jointed, object=self.target),
             OTHER_PART[self.turns].where(model.joint_turns != self.turns, object=self.target),
-            TOO_FAR[self.turns].where(beyond, **names),
+            TOO_FAR[self.turns].where(self._beyond(now, limits), **names),
             NOT_HELD.where(~at_handle(seen, self.target), object=self.target, distance=away),
         )
 
@@ -276,13 +275,16 @@ class OnJoint(ConceptModel[JointMemory]):
         )
 
     def aim(self, view: WorldView) -> Aim | None:
-        """All of the way from where the part is."""
+        """All of the way from where the part is; none where it is asked farther than it goes."""
         if view.model(self.target).joint is None:
             return None
         way = JointWay(view, self.target)
         joint = view.model(self.target).joint
         assert joint is not None
-        goal = float(self._end(np.array([way.now]), np.array([joint.limits]))[0])
+        now, limits = np.array([way.now]), np.array([joint.limits])
+        if bool(self._beyond(now, limits)[0]):
+            return None  # says so itself when its turn comes, which no grasp should be blamed for
+        goal = float(self._end(now, limits)[0])
         if self.wholly:
             goal = way.now + SHARES[-1] * (goal - way.now)
         unit = UNITS[self.turns]
@@ -293,6 +295,10 @@ class OnJoint(ConceptModel[JointMemory]):
     def _end(self, now: Array, limits: Array) -> Array:
         """The wanted value ``(N,)``, as far as the part goes."""
         return poses.clip(self.wanted(now, limits), limits[:, 0], limits[:, 1])
+
+    def _beyond(self, now: Array, limits: Array) -> Array:
+        """Boolean ``(N,)``: the part is asked farther than it goes."""
+        return abs(self.wanted(now, limits) - self._end(now, limits)) > TOLERANCE[self.turns]
 
     def _law(self, seen: Seen) -> Joints:
         return seen.model(self.target).joints

@@ -84,6 +84,11 @@ def test_what_cannot_be_done_is_refused(leaf, reason):
     assert result.status == Status.FAILURE and result.outcome.is_a(reason)
 
 
+def test_no_grasp_is_blamed_for_a_drawer_that_goes_less_far():
+    result = ran(Grasp("drawer"), OpenDrawer("drawer", distance=0.6))
+    assert result.status == Status.FAILURE and result.outcome.is_a(TOO_FAR[False])
+
+
 @pytest.mark.parametrize(
     ("force_limit", "reasons"),
     [(50.0, (WRIST_STRAINED, NOT_THERE[False])), (200.0, (GOAL_LOST,))],
