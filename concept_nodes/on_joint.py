@@ -86,13 +86,13 @@ PATIENCE, LATE = 1.0, 2.5
 """Seconds for which it may be farther behind, and after the way's end until which it may come there."""
 SLOWLY = 0.016
 """Metres of the hand's way before a stop from which on it goes no faster than `GENTLY`."""
-GENTLY = 0.01
-"""Metres per second: what meets its stop at 60 mm/s in the hand of a stiff arm strains the wrist with
-54 N."""
+GENTLY = 0.008
+"""Metres per second: what meets its stop in the hand of a stiff arm presses with up to 20 N more with every
+half millimetre that this goes on."""
 BRAKES = 0.1
 """m/s^2 by which it comes to go so slowly."""
-FELT = 2
-"""Ticks in a row for which a stop must be felt."""
+FELT, FIRMLY = 2, 1.5
+"""Ticks in a row for which a stop must be felt, and how many times `press` are felt at once."""
 ROUND = 0.01
 """Metres from the axis within which a hand turns about itself rather than that it goes somewhere."""
 YIELDS, UNFELT, MOST = 3e-5, 3.0, 0.012
@@ -347,7 +347,6 @@ class OnJoint(ConceptModel[JointMemory]):
         far = abs(asked - now) > BEHIND[self.turns]
         force_there, along = force_at_tool(seen), self._along(seen, memory)
         aside = force_there - poses.dot(force_there, along)[:, None] * along
-        against = force_against(seen, self.target, self._ahead(seen, memory))
         minds = poses.clip(1.0 - UNFELT / poses.clip(poses.norm(aside), 1e-9, math.inf), 0.0, 1.0)
         behind = (
             seen.tool[:, :3] - poses.shifted(at_times(memory.path, memory.progress)[0], memory.offset)[:, :3]
@@ -359,18 +358,24 @@ class OnJoint(ConceptModel[JointMemory]):
         give = xp.where(at_end[:, None], give + short, give)
         offset = memory.offset + give
         offset = offset * poses.clip(MOST / poses.clip(poses.norm(offset), 1e-9, math.inf), 0.0, 1.0)[:, None]
-        ticks = xp.where(against > 1.5 * self.press, FELT + 0 * memory.felt, 1 + 0 * memory.felt)
-        feels = against > self.press
-        at_stop = abs(now - memory.goal) < NEAR[self.turns]
-        felt = feels & at_stop if self.stops else xp.zeros_like(far)
         over = (progress >= memory.path.duration) | (share <= 0.0)
         return memory._replace(
             offset=offset,
             progress=xp.minimum(progress, memory.path.duration),
-            felt=xp.where(felt, memory.felt + ticks, xp.zeros_like(memory.felt)),
+            felt=self._felt(seen, memory),
             behind=xp.where(far, memory.behind + period, xp.zeros_like(memory.behind)),
             late=xp.where(over, memory.late + period, xp.zeros_like(memory.late)),
         )
+
+    def _felt(self, seen: Seen, memory: JointMemory) -> Array:
+        """Ticks ``(N,)`` in a row for which the stop is felt, with this one; a firm one is enough."""
+        xp, nothing = array_namespace(seen.tool), 0 * memory.felt
+        if not self.stops:
+            return nothing
+        against = force_against(seen, self.target, self._ahead(seen, memory))
+        at_stop = abs(self._value(seen) - memory.goal) < NEAR[self.turns]
+        ticks = xp.where(against > FIRMLY * self.press, nothing + FELT, nothing + 1)
+        return xp.where(at_stop & (against > self.press), memory.felt + ticks, nothing)
 
     def command(self, action: Array, seen: Seen, memory: JointMemory) -> Command:
         """Follow the path, aside of it where the hand gives way; it keeps its grip."""
@@ -404,7 +409,7 @@ class OnJoint(ConceptModel[JointMemory]):
         """The value is reached and the hand at rest, or the stop is felt."""
         off = abs(self._value(seen) - memory.goal)
         arrived = (memory.progress >= memory.path.duration) & (off <= TOLERANCE[self.turns])
-        return arrived | (memory.felt >= FELT)
+        return arrived | (self._felt(seen, memory) >= FELT)
 
     def maintained(self, goal: str, seen: Seen, memory: JointMemory) -> Array:
         """The handle may still be in the hand."""
