@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import grasp_features
 from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, EAGER, HASTE, SCALE
@@ -22,6 +20,9 @@ from bt_tasksim.robot.kinematics.hand import standing_side, tips_in_tool
 FEELING = 0.05
 """Speed in m/s at which a programmed grasp feels its way where it has little room: a finger that meets an
 edge at 0.18 m/s presses 78 N before it can be stopped."""
+RIGID = 0.5
+"""Share of that at a part of furniture, which does not give way: a finger that meets a spoke of a valve at
+0.05 m/s presses 66 N."""
 DEEP = 0.04
 """Metres before the grasp from which on fingers may meet an edge."""
 BOUNCING = 0.0015
@@ -35,6 +36,10 @@ YIELDS = 15.0
 or a jaw that swings and presses what it closes on against its support."""
 YIELDING = 0.0008
 """Metres by which it does so in a control period, at twice that force and beyond; it does not come back."""
+PRESSES, OUTSIDE = 5.0, 0.01
+"""Newtons against the approach from which on the wrist tells where a finger stands on something, and metres
+beyond its pad from which on that is beside what it is to take, so that the way out of it is inwards. A finger
+of the Panda is 15 mm thick; one that stands on the rim of what it takes is pressed at its inner edge."""
 SEARCHING = 0.2
 """Share of the largest action with which it then goes aside, 1 mm in a control period, as it goes back: any
 faster, the finger takes the object's rim with it and tips it over."""
@@ -71,12 +76,12 @@ def yielding(seen: Seen, memory: GraspMemory) -> Array:
 def feeling(seen: Seen, memory: GraspMemory, target: str) -> Array:
     """Actions ``(N, 6)`` of a hand that feels its way, see `programmed_motion`."""
     xp = array_namespace(memory.middle)
-    touching = xp.astype(seen.contacts, memory.middle.dtype)
-    outwards = poses.clip(xp.sum(touching * constant(_sides(seen.robot), touching), axis=-1), -1.0, 1.0)
+    outwards = _way_out(seen, memory)
     now, period = seen.elapsed - memory.delay, seen.world.control_period
     ahead = position(memory.path, now + period) - position(memory.path, now)
     near = (poses.norm(seen.tool[:, :3] - memory.goal[:, :3]) < DEEP) | _among(seen, memory, target)
     share = gentler(seen.tool)
+    share = xp.where(seen.model(target).jointed, RIGID * share, share)
     most = FEELING * xp.where(near, share, xp.ones_like(share))
     share = poses.clip(most * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), SLOWEST, 1.0)
     pace = (share - CAREFUL) / EAGER
@@ -90,6 +95,23 @@ def feeling(seen: Seen, memory: GraspMemory, target: str) -> Array:
     return xp.concat([aside + yielding(seen, memory), pace[:, None]], axis=-1)
 
 
+def _way_out(seen: Seen, memory: GraspMemory) -> Array:
+    """In which direction ``(N,)`` along the closing axis a finger comes off what it stands on, -1 to 1, or 0.
+
+    Away from the other finger, unless the torque at the wrist says that its outer edge stands there.
+    """
+    xp = array_namespace(memory.middle)
+    touching = xp.astype(seen.contacts, memory.middle.dtype)
+    pads = constant(_pads(seen.robot), touching)
+    outwards = poses.clip(xp.sum(touching * xp.sign(pads), axis=-1), -1.0, 1.0)
+    along = seen.wrench[:, 2]
+    presses, alone = along < -PRESSES, xp.sum(touching, axis=-1) == 1.0
+    at = seen.wrench[:, 3] / xp.where(presses, along, xp.ones_like(along))
+    pad = xp.sum(touching * pads, axis=-1)
+    beyond_it = (at * xp.sign(pad) - abs(pad)) > OUTSIDE
+    return xp.where(presses & alone & beyond_it, -outwards, outwards)
+
+
 def _among(seen: Seen, memory: GraspMemory, target: str) -> Array:
     """Whether ``(N,)`` the ends of a hand with a jaw that swings may meet the object as it is seen."""
     xp, along = array_namespace(memory.goal), poses.z_axis(memory.goal[:, 3:])
@@ -100,7 +122,7 @@ def _among(seen: Seen, memory: GraspMemory, target: str) -> Array:
     return poses.dot(seen.tool[:, :3] - here[:, :3], along) + beyond(seen.robot) > -top
 
 
-def _sides(robot: RobotDescription) -> Array:
-    """On which side ``(n_tips,)`` along the closing axis each fingertip of the open hand is, -1 or 1."""
-    found: Array = robot.derived("sides", lambda robot: np.sign(tips_in_tool(robot, robot.hand_open)[:, 1]))
+def _pads(robot: RobotDescription) -> Array:
+    """Where along the closing axis ``(n_tips,)`` each fingertip of the open hand is, metres."""
+    found: Array = robot.derived("pads", lambda robot: tips_in_tool(robot, robot.hand_open)[:, 1])
     return found
