@@ -137,8 +137,9 @@ class Chooser:
         firmly: Grasps that the fingers would hardly hold do not count.
         aside: It may be put down a little aside of where it should stand, see `Aim.aside`.
         thoroughly: Nothing has served: more grasps are asked, first those that the arm comes near to, and
-            to what follows with them; a hand comes partly closed where it has no room wide open; and with the
-            least room it may let go a little above where the object should stand.
+            to what follows with them; a hand comes partly closed where it has no room wide open, as to
+            parts of furniture always; and with the least room it may let go a little above where the object
+            should stand.
     """
 
     def __init__(
@@ -293,7 +294,7 @@ class Chooser:
     def _with_room(self, tool: Array, width: float) -> Opening | None:
         """The hand that has room at a grasp ``(7,)`` of what is ``width`` metres wide, if any."""
         hand = self._opening(width)
-        if self._thoroughly and not self._slide and not hand.free(tool):
+        if (self._thoroughly or self._rigid) and not self._slide and not hand.free(tool):
             less = self._opened(partly_opened(self._view.robot, width + 2 * SPARE))
             if less.closure > hand.closure and less.free(tool):
                 return less
