@@ -314,6 +314,27 @@ def test_a_finger_that_stands_on_something_goes_outwards(near):
 
 
 @pytest.mark.parametrize(
+    ("where", "push", "way"),
+    [(0.003, 40.0, 1.0), (0.014, 40.0, -1.0), (0.014, 3.0, 1.0)],
+    ids=["at its inner edge", "at its outer one", "the wrist feels too little to tell"],
+)
+def test_a_finger_comes_off_what_it_stands_on_the_way_that_is_out_of_it(near, where, push, way):
+    """The wrist feels so many newtons at so many metres beyond the finger's pad."""
+    seen, memory = instant(near)
+    memory = memory._replace(tight=np.array([True]))
+    pads = tips_in_tool(near.robot, near.robot.hand_open)[:, 1]
+    for finger, pad in enumerate(pads[:2]):
+        touching = without_contacts(seen, but=finger)
+        lever, force = np.array([0.0, pad + where * np.sign(pad), 0.0]), np.array([0.0, 0.0, -push])
+        felt = dataclasses.replace(
+            touching.observation, wrench=np.concatenate([force, np.cross(lever, force)])[None]
+        )
+        stands = Seen(felt, seen.world, seen.robot, seen.elapsed, seen.later, seen.failures)
+        action = near.model.programmed_motion(stands, memory)
+        assert np.sign(action[0, ACROSS]) == way * np.sign(pad)
+
+
+@pytest.mark.parametrize(
     ("behind", "touched", "closing", "waits"),
     [
         (0.002, True, -1.0, True),

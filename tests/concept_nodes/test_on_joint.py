@@ -101,34 +101,59 @@ def test_a_drawer_that_is_stuck_is_given_up_before_anything_breaks(tmp_path, for
     assert any(result.outcome.is_a(why) for why in reasons), result.outcome.sentence
 
 
-def test_a_part_that_stays_far_behind_the_hand_is_jammed():
-    """The hand goes on with no force at the wrist, and the drawer is seen where it was."""
-    configuration, model = drawn(Scene(fixtures=[FixtureSpec("chest")], goal=Goal("drawer", relation="shut")))
-    pulls = OpenDrawer.value(target="drawer", distance=0.15)
+def hand_on_the_drawer(pressed):
+    """What is seen of a shut drawer while so many newtons press the hand out again, and a way of it there."""
+    made = Scene(fixtures=[FixtureSpec("chest")], goal=Goal("drawer", relation="shut"))
+    configuration, model = drawn(made)
     seen = seen_exactly(model, state(configuration))
-    seen.observation.wrench = np.zeros((1, 6))
     tool, part = seen.tool, seen.object("drawer")
-    law, nothing = seen.model("drawer").joints, np.zeros(1)
-    there = poses.multiply(law.pose(np.array([0.15])), poses.relative(part, tool))
-    memory = JointMemory(
-        plan([tool, there], 0.1),
+    law = seen.model("drawer").joints
+    out = poses.rotate(law.pose(np.zeros(1))[:, 3:], law.axis)
+    force = poses.rotate(poses.quat_conjugate(tool[:, 3:]), pressed * out)
+    seen.observation.wrench = np.concatenate([force, np.zeros((1, 3))], axis=-1)
+    return seen, lambda goal: JointMemory(
+        plan([tool, poses.multiply(law.pose(goal), poses.relative(part, tool))], 0.1),
         poses.relative(tool, part),
-        np.array([0.15]),
-        nothing,
+        goal,
+        np.zeros(1),
         tool[:, :3],
         np.zeros(1, bool),
         np.zeros((1, 3)),
-        nothing,
+        np.zeros(1),
         np.zeros(1, int),
-        nothing,
-        nothing,
+        np.zeros(1),
+        np.zeros(1),
     )
+
+
+def test_a_part_that_stays_far_behind_the_hand_is_jammed():
+    """The hand goes on with no force at the wrist, and the drawer is seen where it was."""
+    pulls = OpenDrawer.value(target="drawer", distance=0.15)
+    seen, remembered = hand_on_the_drawer(0.0)
+    memory = remembered(np.array([0.15]))
     for _ in range(100):
         memory = pulls.advance(None, seen, memory)
         broken = [each.reason for each in pulls.limits(seen, memory) if np.all(each.applies)]
         if broken:
             break
     assert broken == [JAMMED[False]]
+
+
+@pytest.mark.parametrize(
+    ("pressed", "ticks"),
+    [(30.0, 1), (15.0, 2), (5.0, None), (-30.0, None)],
+    ids=["a firm stop at once", "a soft one in two ticks", "friction is none", "nor is what pulls on"],
+)
+def test_a_stop_is_felt(pressed, ticks):
+    """Nothing is pressed for another period against a stop that is firm."""
+    shuts, (seen, remembered) = CloseDrawer.value(target="drawer"), hand_on_the_drawer(pressed)
+    memory = remembered(np.zeros(1))._replace(progress=np.array([-1.0]))  # on its way, not at its end
+    felt = None
+    for tick in range(1, 6):
+        if felt is None and shuts.done(seen, memory):
+            felt = tick
+        memory = shuts.advance(None, seen, memory)
+    assert felt == ticks
 
 
 def test_a_way_that_the_arm_cannot_go_is_refused_before_it_is_begun():
