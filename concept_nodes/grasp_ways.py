@@ -12,6 +12,7 @@ from bt_tasksim.concept_nodes.grasp_aims import Around, Served
 from bt_tasksim.concept_nodes.joint_way import (
     LOOKS,
     SPARE,
+    SUPPLE,
     axis_of,
     gone_along,
     keeps_clear,
@@ -90,7 +91,7 @@ class ServedAlong(Served):
         if pivot and not self._room(goal, hand, pivot):
             return False
         finder, tools = self._finder(goal, hand, pivot), self._along(goal, pivot)
-        found = gone_along(finder, joints, tools, SPARE if self._closer < TOUCHING else 0.0)
+        found = gone_along(finder, joints, tools, *((SPARE, SUPPLE) if self._closer < TOUCHING else ()))
         if found is None:
             return False
         if pivot and not keeps_clear(self._around.view, self._around.target, self._way, found, hand):

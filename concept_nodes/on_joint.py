@@ -108,7 +108,7 @@ TOLERANCE = {False: 0.004, True: math.radians(1.5)}
 """Metres or radians within which a value counts as reached."""
 ACCELERATION = 0.4
 """Peak acceleration of the tool, m/s^2."""
-TURN = 1.0
+TURN = 0.5
 """Peak turning rate of the tool, rad/s."""
 ROOMS = (VERY_CLOSE, TOUCHING)
 """How much closer than usual the arm may come to things, tried one after the other."""

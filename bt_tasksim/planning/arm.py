@@ -125,6 +125,18 @@ class Arm:
             return np.array([self.tool(q) for q in joints])
         return poses_of(self._chain.seen(np.ascontiguousarray(joints.T))[0])
 
+    def supple(self, joints: Array) -> Array:
+        """Metres ``(n,)`` that the tool goes for a radian of the joints ``(n, n_arm)``, where least far.
+
+        The smallest singular value of the Jacobian of the tool's place: next to nothing where the arm is near
+        a singular posture, and as stiff as rock in one direction (T. Yoshikawa, "Manipulability of robotic
+        mechanisms", Int. J. Robotics Research 4(2), 1985).
+        """
+        moves = self._chain.jacobian(self._chain.seen(np.ascontiguousarray(joints.T)))[:, :3]
+        square = np.einsum("jan,jbn->nab", moves, moves)
+        found: Array = np.sqrt(np.maximum(np.linalg.eigvalsh(square)[:, 0], 0.0))
+        return found
+
     def _place(self, joints: Array) -> Array:
         """Where the tool is ``(3,)`` for joints ``(n_arm,)``."""
         data = self._data

@@ -77,6 +77,22 @@ def test_along_a_line_no_joint_jumps(panda):
     assert np.allclose(panda.arm.tools(joints)[:, :3], tools[:, :3], atol=1e-3)
 
 
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_a_supple_posture_moves_its_tool_so_far_in_every_direction(each, seed):
+    """What the tool goes for small motions of the joints, by differences, in many directions."""
+    robot, arm = each.robot, each.arm
+    rng = np.random.default_rng(seed)
+    joints = rng.uniform(robot.arm_lower, robot.arm_upper)
+    step = 1e-5 * np.eye(len(joints))
+    moved = (arm.tools(joints + step)[:, :3] - arm.tools(joints - step)[:, :3]) / 2e-5
+    directions = rng.normal(size=(2000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    goes = np.linalg.norm(directions @ moved.T, axis=1)
+    least = float(arm.supple(joints[None])[0])
+    assert (goes >= least - 1e-5).all() and goes.min() <= least + 0.1
+
+
 def test_a_line_that_leaps_cannot_be_followed(panda):
     start = panda.posture(0.45, -0.4, 0.4)
     assert panda.arm.along(start, panda.pose(0.45, 0.4, 0.4)[None]) is None
