@@ -24,6 +24,10 @@ from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
 
 
+def _ignored(warning: str) -> None:
+    """What MuJoCo warns of is counted in its data, and `MujocoWorld.advance` looks there."""
+
+
 class MujocoBatch(ThreadedBatch[MujocoWorld]):
     """Worlds of MuJoCo.
 
@@ -52,6 +56,8 @@ class MujocoBatch(ThreadedBatch[MujocoWorld]):
             ) from error
         super().__init__(robot, worlds, threads)
         self._mujoco = mujoco
+        if mujoco.get_mju_user_warning() is None:  # else it writes MUJOCO_LOG.TXT where the user stands
+            mujoco.set_mju_user_warning(_ignored)
 
     def _build(self, row: int, configuration: ActorConfiguration, start: Array) -> MujocoWorld:
         return MujocoWorld(self._mujoco, self.robot, configuration, start)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.poses import Array
 from bt_tasksim.engines.body_contacts import BodyContacts
 from bt_tasksim.engines.physics.disturbance import DisturbanceForce
@@ -89,6 +90,8 @@ class MujocoWorld:
         self._mujoco = mujoco
         self.world: World = build_world(mujoco, robot, configuration)
         self.data = mujoco.MjData(self.world.model)
+        kinds = mujoco.mjtWarning
+        self._blown_up = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
         names = [actor.name for actor in configuration.objects]
         self.n_objects, self.n_fixtures = len(names), len(configuration.fixtures)
         self._plan = StepPlan.of(configuration)
@@ -140,6 +143,12 @@ class MujocoWorld:
             self._step(sensed=k >= plan.steps - plan.sensed)
         self._watch = max(self._watch - 1, 0)
         self._periods += 1
+        if any(self.data.warning[kind].number for kind in self._blown_up):
+            after = self._periods * plan.period
+            raise MachineError(
+                f"MuJoCo's simulation has become unstable within {after:.2f} s: speeds or accelerations are "
+                "beyond all bounds; is something far too light or too heavy, or stuck in something else?"
+            )
 
     def note_motion(self, falling: bool, spin: float) -> None:
         """See `bt_tasksim.engines.physics.threaded.SimulatedWorld`.

@@ -261,13 +261,20 @@ def test_a_target_that_is_no_number_is_refused_and_moves_nothing():
     assert np.abs(still.step().joint_position - before).max() < 1e-6
 
 
-def test_a_world_that_blew_up_is_an_error_and_does_not_start_anew(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # MuJoCo logs such a thing to the working directory
+@pytest.mark.parametrize("blow", ["a speed that is no number", "a force beyond all bounds"])
+def test_a_world_that_blew_up_is_an_error_and_does_not_start_anew(tmp_path, monkeypatch, blow):
+    """MuJoCo would go on from what it makes of it, and write to the working folder that something was odd."""
+    monkeypatch.chdir(tmp_path)
     still = Still(scene().sample(0), "mujoco")
     still.step(2)
-    still.physics.simulated.data.qvel[3] = np.inf
-    with pytest.raises(MachineError, match=r"no longer finite after 0.1"):
+    world = still.physics.simulated
+    if blow == "a speed that is no number":
+        world.data.qvel[3] = np.inf
+    else:
+        world.data.xfrc_applied[world.world.object_body[0], 0] = 1e13
+    with pytest.raises(MachineError, match=r"unstable within 0.1|no longer finite after 0.1"):
         still.step()
+    assert not list(tmp_path.iterdir())
 
 
 def test_it_needs_no_other_simulator_and_no_torch():
