@@ -6,12 +6,15 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.outlines import distance, rectangle
 from bt_tasksim.scene.relations import relation_named
+from bt_tasksim.scene.relations.joint_goals import JointGoal
 from bt_tasksim.scene.spatial_laws import SUNK
 from bt_tasksim.scene.specs import Goal
 
@@ -22,6 +25,9 @@ CARRIED = ("on", "anywhere", "inside")
 """Relations in which the reference bears the object."""
 SLENDER = 0.7
 """Share of half a bounding box's shorter side that is surely solid about its middle, of what stands there."""
+
+VALUES = 1001
+"""Values of a joint, from its lower limit to its upper one, at which two goals of a part are asked about."""
 
 
 def check_together(scene: Scene, worlds: Sequence[ActorConfiguration], report: Report) -> None:
@@ -57,7 +63,10 @@ def contradictions(world: ActorConfiguration) -> Iterator[str]:
 
 def _excluded(one: Goal, two: Goal, world: ActorConfiguration) -> str:
     """Why two goals cannot both be reached; empty where nothing says so."""
-    held = [relation_named(goal.relation).in_hand for goal in (one, two)]
+    first_one, second_one = (relation_named(goal.relation) for goal in (one, two))
+    held = [relation.in_hand for relation in (first_one, second_one)]
+    if one.object == two.object and isinstance(first_one, JointGoal) and isinstance(second_one, JointGoal):
+        return _both_ways((first_one, second_one), (one, two), world)
     if one.object != two.object:
         if all(held):
             return "one hand holds one object"
@@ -79,6 +88,19 @@ def _excluded(one: Goal, two: Goal, world: ActorConfiguration) -> str:
     if first.low > second.high or second.low > first.high:
         return f"'{one.place}' and '{two.place}' are at different heights"
     return ""
+
+
+def _both_ways(
+    relations: tuple[JointGoal, JointGoal], goals: tuple[Goal, Goal], world: ActorConfiguration
+) -> str:
+    """One part that is to stand in two ways, of which no value of its joint is both."""
+    part = next(actor for actor in world.objects if actor.name == goals[0].object)
+    joint = part.model().joint
+    if joint is None:
+        return ""
+    values = np.linspace(*joint.limits, VALUES)
+    so = [relation.asked(goal, joint, values).so for relation, goal in zip(relations, goals, strict=True)]
+    return "" if (so[0] & so[1]).any() else f"'{part.name}' cannot stand both ways"
 
 
 class _Region(NamedTuple):

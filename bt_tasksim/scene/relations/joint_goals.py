@@ -5,8 +5,10 @@ Such a part may be held at the end: who opens a door often keeps it in the hand.
 
 from __future__ import annotations
 
+import abc
 import math
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -89,25 +91,19 @@ class JointGoal(GoalRelation):
         """What the goal allows, metres or radians."""
         return goal.angle_tolerance if joint.turns else goal.position_tolerance
 
-    @staticmethod
-    def placement(
-        asked: ValueAsked,
-        reasons: tuple[Mapping[str, Reason], ...],
-        goal: Goal,
-        joint: JointModel,
-        value: Array,
-    ) -> Placement:
-        """The answer; what is missing stands as an error of position or of angle.
+    reasons: ClassVar[tuple[Mapping[str, Reason], ...]]
+    """By kind of joint, where it is not so, and where it is."""
 
-        Args:
-            asked: What is asked and what is so ``(1,)``.
-            reasons: By kind of joint, where it is not so, and where it is.
-            goal: The goal.
-            joint: The part's joint.
-            value: How far it is open ``(1,)``.
-        """
+    @abc.abstractmethod
+    def asked(self, goal: Goal, joint: JointModel, value: Array) -> ValueAsked:
+        """What the goal asks for, and at which of some values ``(N,)`` of the joint it is so."""
+
+    def evaluate(self, goal: Goal, final: FinalState) -> Placement:
+        """See `GoalRelation.evaluate`; what is missing stands as an error of position or of angle."""
+        joint, value = self.joint(goal, final)
+        asked = self.asked(goal, joint, value)
         reached, off, nothing = bool(asked.so[0]), float(asked.off[0]), float(np.nan)
-        reason = reasons[reached][joint.kind]
+        reason = self.reasons[reached][joint.kind]
         outcome = reason(object=goal.object, value=float(value[0]), wanted=float(asked.wanted[0]))
         return Placement(reached, outcome, nothing if joint.turns else off, off if joint.turns else nothing)
 
@@ -116,27 +112,29 @@ class JointGoal(GoalRelation):
 class Open(JointGoal):
     """Open by ``value`` at least, up to the goal's tolerance; by default by most of its way."""
 
-    def evaluate(self, goal: Goal, final: FinalState) -> Placement:
-        """See `GoalRelation.evaluate`."""
-        joint, value = self.joint(goal, final)
-        asked = opened(value, np.array([joint.limits]), goal.value, self.tolerance(goal, joint))
-        return self.placement(asked, (NOT_OPEN, IS_OPEN), goal, joint, value)
+    reasons = (NOT_OPEN, IS_OPEN)
+
+    def asked(self, goal: Goal, joint: JointModel, value: Array) -> ValueAsked:
+        """See `JointGoal.asked`."""
+        return opened(value, np.array([joint.limits]), goal.value, self.tolerance(goal, joint))
 
 
 @register("goal relation", "shut")
 class Shut(JointGoal):
     """Shut, up to some millimetres or degrees."""
 
-    def evaluate(self, goal: Goal, final: FinalState) -> Placement:
-        """See `GoalRelation.evaluate`."""
-        joint, value = self.joint(goal, final)
-        asked = shut(value, np.array([joint.limits]), np.array([joint.turns]))
-        return self.placement(asked, (NOT_SHUT, IS_SHUT), goal, joint, value)
+    reasons = (NOT_SHUT, IS_SHUT)
+
+    def asked(self, goal: Goal, joint: JointModel, value: Array) -> ValueAsked:
+        """See `JointGoal.asked`."""
+        return shut(value, np.array([joint.limits]), np.array([joint.turns]))
 
 
 @register("goal relation", "set")
 class SetTo(JointGoal):
     """Open by ``value``, up to the goal's tolerance."""
+
+    reasons = (NOT_SET, IS_SET)
 
     def fault(self, goal: Goal, part: FixturePart | None) -> str:
         """See `GoalRelation.fault`."""
@@ -144,9 +142,7 @@ class SetTo(JointGoal):
             return f"the goal 'set' of '{goal.object}' needs a 'value', how far it should be open"
         return super().fault(goal, part)
 
-    def evaluate(self, goal: Goal, final: FinalState) -> Placement:
-        """See `GoalRelation.evaluate`."""
-        joint, value = self.joint(goal, final)
+    def asked(self, goal: Goal, joint: JointModel, value: Array) -> ValueAsked:
+        """See `JointGoal.asked`."""
         assert goal.value is not None, "see `fault`"
-        asked = set_to(value, goal.value, self.tolerance(goal, joint))
-        return self.placement(asked, (NOT_SET, IS_SET), goal, joint, value)
+        return set_to(value, goal.value, self.tolerance(goal, joint))

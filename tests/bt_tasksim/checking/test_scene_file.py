@@ -92,8 +92,8 @@ def test_furniture_beside_a_robot_is_let_alone(robot):
     assert not in_the_robot(robot, fixtures=["shelf"], objects={"box": "on table"})
 
 
-def together(goals, **objects):
-    scene = Scene(fixtures=["shelf"], objects=objects, goals=goals)
+def together(goals, fixtures=("shelf",), **objects):
+    scene = Scene(fixtures=list(fixtures), objects=objects, goals=goals)
     worlds = [scene.sample(seed) for seed in range(3)]
     report = Report()
     check_together(scene, worlds, report)
@@ -142,6 +142,26 @@ def test_goals_that_exclude_each_other_are_named(goals, words):
 )
 def test_goals_that_go_together_are_let_alone(goals):
     assert together(goals, **THREE) == []
+
+
+def of_drawer(*asked):
+    return [Goal("drawer", relation=relation, value=value) for relation, value in asked]
+
+
+@pytest.mark.parametrize(
+    ("asked", "possible"),
+    [
+        ((("open", None), ("shut", None)), False),
+        ((("open", 0.1), ("set", 0.05)), False),
+        ((("set", 0.05), ("set", 0.12)), False),
+        ((("open", 0.1), ("set", 0.15)), True),
+        ((("open", 0.1), ("open", None)), True),
+    ],
+)
+def test_a_part_cannot_stand_both_ways(asked, possible):
+    found = together(of_drawer(*asked), fixtures=["chest"])
+    assert (found == []) == possible
+    assert all("cannot stand both ways" in what for what in found)
 
 
 def test_draws_that_fail_are_counted():
