@@ -18,7 +18,7 @@ from bt_tasksim.core.own_files import beside_code, not_there
 from bt_tasksim.core.plain import short, shown
 from bt_tasksim.core.registry import parts
 from bt_tasksim.core.renamed import renamed_fields
-from bt_tasksim.core.resources import is_file
+from bt_tasksim.core.resources import asset, is_file
 from bt_tasksim.core.typed_file import Model, checked, plain
 from bt_tasksim.scene.geometry import Colour
 from bt_tasksim.scene.grips import GivenGrip
@@ -70,7 +70,7 @@ class ObjectSpec:
         friction: Friction coefficient, or low and high.
         exponents: Low and high shape exponents ``(e1, e2)`` of a superellipsoid; or ``((e1, e2), (e1, e2))``
             where the two have ranges of their own.
-        mesh: Path of a mesh file, for kind ``mesh``.
+        mesh: Path of a mesh file, or the name of a bundled one such as ``mug.obj``, for kind ``mesh``.
         split: Which of the ten equal strips of each range of size and exponents are drawn from: ``all``,
             ``even`` or ``odd`` ones. This keeps draws apart where both have the same ranges; where these
             differ, strips overlap.
@@ -122,7 +122,9 @@ class ObjectSpec:
                 raise FieldError(f"an object: 'file' should be text, found {short(self.file)}", "file")
             self._complete(self.file)
         if isinstance(self.mesh, str):
-            object.__setattr__(self, "mesh", beside_code(self.mesh))
+            own, bundled = beside_code(self.mesh), asset("objects", Path(self.mesh).name)
+            by_name = self.mesh == bundled.name and bundled.is_file() and not Path(own).is_file()
+            object.__setattr__(self, "mesh", str(bundled) if by_name else own)
             if not Path(self.mesh).is_file():
                 raise FieldError(not_there("mesh file", self.mesh), "mesh")
         if isinstance(self.kinds, str):

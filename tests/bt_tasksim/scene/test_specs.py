@@ -159,6 +159,18 @@ def test_a_colour_that_is_none_is_said_to_be_none(tmp_path):
         load_scene(tmp_path / "s.yaml")
 
 
+def test_a_bundled_mesh_is_found_by_its_name_and_ones_own_first(tmp_path, monkeypatch):
+    bundled = asset("objects", "bottle.obj")
+    monkeypatch.chdir(tmp_path)
+    assert ObjectSpec(on="table", mesh="bottle.obj").mesh == str(bundled)
+    (tmp_path / "bottle.obj").write_text(bundled.read_text())
+    assert (
+        Path(ObjectSpec(on="table", mesh="bottle.obj").mesh).resolve() == (tmp_path / "bottle.obj").resolve()
+    )
+    with pytest.raises(FieldError, match="mesh file"):
+        ObjectSpec(on="table", mesh="bottles.obj")
+
+
 def test_a_mesh_alone_says_that_it_is_one():
     spec = ObjectSpec(on="table", mesh=str(asset("objects", "mug.obj")))
     assert spec.kinds == ("mesh",)
