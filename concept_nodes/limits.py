@@ -49,3 +49,10 @@ def force_at_tool(seen: Seen) -> Array:
 def torque_at_tool(seen: Seen) -> Array:
     """Torques ``(N, 3)`` at the wrist in the robot base frame, Nm."""
     return rotate(seen.tool[:, 3:], seen.wrench[:, 3:])
+
+
+def longer_than_allowed(duration: float, timeout: float) -> str:
+    """What is wrong where something should last longer than it may, both in seconds; else nothing."""
+    if duration < timeout:
+        return ""
+    return f"its 'timeout' of {timeout:g} s would end it before its {duration:g} s are over: raise that"

@@ -10,7 +10,7 @@ from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Newtons, ObjectName, Seconds
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.holding import HOLDING
-from bt_tasksim.concept_nodes.limits import strain
+from bt_tasksim.concept_nodes.limits import longer_than_allowed, strain
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Form, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace
@@ -72,8 +72,13 @@ class Pressing(ConceptModel[PressingT]):
         return f"for {float(parameters['duration']):.1f} s" if "duration" in parameters else ""
 
     def contradiction(self) -> str:
-        """Limits in their order."""
-        return "" if self.least < self.most else "'least' should be less than 'most'"
+        """Limits in their order, and time for what is asked."""
+        wrong = "" if self.least < self.most else "'least' should be less than 'most'"
+        return wrong or ("" if self.patient else longer_than_allowed(self.duration, self.timeout))
+
+    def planned(self, memory: PressingT) -> Array | float:
+        """The time for which it presses comes on top of the usual timeout."""
+        return self.duration
 
     def felt(self, seen: Seen, memory: PressingT) -> Array:
         """Force ``(N,)`` with which it presses, N."""

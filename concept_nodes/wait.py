@@ -5,6 +5,7 @@ from __future__ import annotations
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import Seconds
 from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept_nodes.limits import longer_than_allowed
 from bt_tasksim.core.outcomes import Form, Statement
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
@@ -25,6 +26,10 @@ class Wait(ConceptModel[None]):
     duration: Seconds
 
     default_timeout = 3600.0
+
+    def contradiction(self) -> str:
+        """Time for what is asked."""
+        return longer_than_allowed(self.duration, self.timeout)
 
     def command(self, action: Array, seen: Seen, memory: None) -> Command:
         """Nothing: both parts keep their last targets."""
