@@ -103,7 +103,10 @@ RELAXES = 1.0
 """Share of what the tool is held aside of where it is told to be, in which it gives way in a second: where an
 arm is soft, that is more than what `YIELDS` says."""
 PUSHES = 2.0
-"""Share of what is missing at the way's end that the hand goes on in a second: arms give way to friction."""
+"""Share of what is missing at the way's end that the hand goes on in a second: arms and fingers give way to
+friction."""
+FURTHER = {False: 0.03, True: math.radians(20.0)}
+"""Metres or radians by which it does so at most."""
 TOLERANCE = {False: 0.004, True: math.radians(1.5)}
 """Metres or radians within which a value counts as reached."""
 ACCELERATION = 0.4
@@ -127,6 +130,8 @@ class JointMemory(NamedTuple):
         start: Where the tool was then ``(N, 3)``.
         pivots: Booleans ``(N,)``: the part turns between the fingers, as `joint_way.PIVOTS` says.
         offset: Metres ``(N, 3)`` by which the hand has given way aside, robot base frame.
+        further: Metres or radians ``(N,)`` of the joint beyond the path's end to which the hand goes, since
+            the part has stayed behind it.
         progress: Seconds ``(N,)`` of the path that have been commanded.
         felt: Ticks ``(N,)`` in a row with the stop's force.
         behind: Seconds ``(N,)`` in a row for which the part was far behind the hand.
@@ -140,6 +145,7 @@ class JointMemory(NamedTuple):
     start: Array
     pivots: Array
     offset: Array
+    further: Array
     progress: Array
     felt: Array
     behind: Array
@@ -215,6 +221,7 @@ class OnJoint(ConceptModel[JointMemory]):
             start=seen.tool[:, :3],
             pivots=poses.constant(np.array([pivot for _, _, pivot in found]), seen.contacts),
             offset=0.0 * seen.tool[:, :3],
+            further=nothing,
             progress=nothing,
             felt=xp.astype(nothing, xp.int64),
             behind=nothing,
@@ -307,13 +314,6 @@ class OnJoint(ConceptModel[JointMemory]):
         """How far ``(N,)`` the part is taken to be open."""
         return self._law(seen).value(seen.object(self.target))
 
-    def _missing(self, seen: Seen, memory: JointMemory) -> Array:
-        """The way ``(N, 3)`` of the tool that is left to the wanted value, metres."""
-        law = self._law(seen)
-        ends = (law.pose(value) for value in (memory.goal, self._value(seen)))
-        there, here = (poses.multiply(end, poses.inverse(memory.grip))[:, :3] for end in ends)
-        return there - here
-
     def _ahead(self, seen: Seen, memory: JointMemory) -> Array:
         """Sign ``(N,)`` of what is missing to the wanted value; of a stop, to a little beyond it."""
         missing = memory.goal - self._value(seen) + self.stops * BEYOND[self.turns]
@@ -348,19 +348,18 @@ class OnJoint(ConceptModel[JointMemory]):
         force_there, along = force_at_tool(seen), self._along(seen, memory)
         aside = force_there - poses.dot(force_there, along)[:, None] * along
         minds = poses.clip(1.0 - UNFELT / poses.clip(poses.norm(aside), 1e-9, math.inf), 0.0, 1.0)
-        behind = (
-            seen.tool[:, :3] - poses.shifted(at_times(memory.path, memory.progress)[0], memory.offset)[:, :3]
-        )
+        behind = seen.tool[:, :3] - self._led(seen, memory)[0][:, :3]
         behind = behind - poses.dot(behind, along)[:, None] * along
         give = (period * minds)[:, None] * (YIELDS * aside + RELAXES * behind)
-        short = self._missing(seen, memory) * PUSHES * period
+        short = (memory.goal - now) * PUSHES * period
         at_end = (memory.late > 0.0) & (share > 0.0) & (self.stops == 0)
-        give = xp.where(at_end[:, None], give + short, give)
+        further = memory.further + xp.where(at_end, short, xp.zeros_like(short))
         offset = memory.offset + give
         offset = offset * poses.clip(MOST / poses.clip(poses.norm(offset), 1e-9, math.inf), 0.0, 1.0)[:, None]
         over = (progress >= memory.path.duration) | (share <= 0.0)
         return memory._replace(
             offset=offset,
+            further=poses.clip(further, -FURTHER[self.turns], FURTHER[self.turns]),
             progress=xp.minimum(progress, memory.path.duration),
             felt=self._felt(seen, memory),
             behind=xp.where(far, memory.behind + period, xp.zeros_like(memory.behind)),
@@ -378,9 +377,16 @@ class OnJoint(ConceptModel[JointMemory]):
         return xp.where(at_stop & (against > self.press), memory.felt + ticks, nothing)
 
     def command(self, action: Array, seen: Seen, memory: JointMemory) -> Command:
-        """Follow the path, aside of it where the hand gives way; it keeps its grip."""
+        """Follow the path, aside of it where the hand gives way, and on beyond its end; it keeps its grip."""
+        tool, arm = self._led(seen, memory)
+        return Command(tool=tool, posture=arm)
+
+    def _led(self, seen: Seen, memory: JointMemory) -> tuple[Array, Array]:
+        """Tool poses ``(N, 7)`` now, and the arm's joints ``(N, n_arm)`` on the path."""
         tool, arm = at_times(memory.path, memory.progress)
-        return Command(tool=poses.shifted(tool, memory.offset), posture=arm)
+        law = self._law(seen)
+        on = poses.multiply(law.pose(memory.goal + memory.further), poses.inverse(law.pose(memory.goal)))
+        return poses.shifted(poses.multiply(on, tool), memory.offset), arm
 
     def _asked(self, seen: Seen, memory: JointMemory) -> Array:
         """The value ``(N,)`` that the hand asks for now."""

@@ -18,7 +18,7 @@ from bt_tasksim.concept_nodes import (
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.concept_nodes.limits import WRIST_STRAINED
-from bt_tasksim.concept_nodes.on_joint import JAMMED, NOT_THERE, TOO_FAR, JointMemory
+from bt_tasksim.concept_nodes.on_joint import FURTHER, JAMMED, NOT_THERE, TOO_FAR, JointMemory
 from bt_tasksim.concept_nodes.press_button import AROUND, FIST, LEANS, LEVEL, _fists
 from bt_tasksim.concept_nodes.press_button import JAMMED as BUTTON_JAMS
 from bt_tasksim.core import poses
@@ -120,6 +120,7 @@ def hand_on_the_drawer(pressed):
         np.zeros(1, bool),
         np.zeros((1, 3)),
         np.zeros(1),
+        np.zeros(1),
         np.zeros(1, int),
         np.zeros(1),
         np.zeros(1),
@@ -154,6 +155,19 @@ def test_a_stop_is_felt(pressed, ticks):
             felt = tick
         memory = shuts.advance(None, seen, memory)
     assert felt == ticks
+
+
+def test_a_part_that_has_stayed_behind_is_taken_on_beyond_the_end_of_the_way():
+    """Fingers that give way leave it behind: the hand goes on until it is there, and no farther."""
+    pulls = AdjustDrawer.value(target="drawer", distance=0.01)
+    seen, remembered = hand_on_the_drawer(0.0)
+    memory = remembered(np.array([0.01]))
+    ends = []
+    for _ in range(60):
+        memory = pulls.advance(None, seen, memory)
+        ends.append(float(np.linalg.norm(pulls.command(None, seen, memory).tool[0, :3] - seen.tool[0, :3])))
+    assert max(ends[:2]) < 0.011 and ends[-1] == pytest.approx(0.01 + FURTHER[False], abs=1e-3)
+    assert (np.diff(ends) > -1e-9).all()
 
 
 def test_a_way_that_the_arm_cannot_go_is_refused_before_it_is_begun():
