@@ -23,7 +23,7 @@ from bt_tasksim.concept_nodes.limits import force_at_tool, force_at_wrist, strai
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
-from bt_tasksim.core.joints import Joints
+from bt_tasksim.core.joints import JointModel, Joints
 from bt_tasksim.core.outcomes import Form, Possible, Reason, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.transfer import fetched
@@ -302,6 +302,16 @@ class OnJoint(ConceptModel[JointMemory]):
     def _end(self, now: Array, limits: Array) -> Array:
         """The wanted value ``(N,)``, as far as the part goes."""
         return poses.clip(self.wanted(now, limits), limits[:, 0], limits[:, 1])
+
+    def beyond_its_way(self, joint: JointModel) -> str:
+        """What is wrong with asking it of a part with such a joint, wherever that stands; else nothing."""
+        low, high = joint.limits
+        now = np.array([low, (low + high) / 2, high])
+        limits = np.tile([low, high], (3, 1))
+        if not self._beyond(now, limits).all():
+            return ""
+        wanted = float(self.wanted(now, limits)[0])
+        return TOO_FAR[joint.turns](object=self.target, wanted=wanted, low=low, high=high).sentence
 
     def _beyond(self, now: Array, limits: Array) -> Array:
         """Boolean ``(N,)``: the part is asked farther than it goes."""

@@ -80,14 +80,18 @@ def _code(file: str, tree: str | None, robot: str | None) -> Report:
 
 def _scene_and_tree(file: str, robot: str | None) -> Report:
     """The scene of a Python file, and its tree, if it builds one: its names have to be in the scene."""
+    from bt_tasksim.checking.tree_parts import check_parts
     from bt_tasksim.trees.load import has_tree, load_source
 
     if not has_tree(file):
         return _scene(file, robot)
     source = load_source(file, robot)
-    report = _scene(file, robot)
-    nodes = sum(1 for _ in source.build().iterate())
-    report.done(f"tree {source.name}, {nodes} nodes: shape, memory, names of objects and places")
+    report, tree = _scene(file, robot), source.build()
+    check_parts(tree, source.scene, report)
+    nodes = sum(1 for _ in tree.iterate())
+    report.done(
+        f"tree {source.name}, {nodes} nodes: shape, memory, names of objects and places, ways of parts"
+    )
     return report
 
 
