@@ -23,7 +23,7 @@ def at_rest(world: WorldModel, estimates: Array) -> Array:
 
     An object stands on the highest place within `OFF` that its middle is above, or on furniture beside all
     places, as long as it has room there; on another object, where the top of that is nearer. Those that lean,
-    and those below which there is nothing, are left as they are.
+    those below which there is nothing, and parts of furniture are left as they are.
 
     Args:
         world: The world.
@@ -36,6 +36,9 @@ def at_rest(world: WorldModel, estimates: Array) -> Array:
         model, pose = world.objects[k], found[k]
         upright = _upright(pose, model)
         if upright is None:
+            continue
+        if model.joint is not None:  # where it can be, its joint says, and it may bear others
+            tops[k] = float(pose[2]) + model.extent[2] / 2
             continue
         bottom = float(pose[2]) - model.extent[2] / 2
         # A goal in the air carries nothing.

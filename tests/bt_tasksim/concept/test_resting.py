@@ -82,6 +82,28 @@ def test_what_does_not_stand_is_left_as_it_is_seen(change):
     assert np.array_equal(at_rest(world, seen)[2], seen[2], equal_nan=True)
 
 
+@pytest.mark.parametrize("height", [-0.012, -0.004, 0.004, 0.012])
+def test_a_part_of_furniture_is_left_on_its_joint_whatever_it_is_just_above(height):
+    """A button that seems to stand a little above or within its console, and a cube that stands on it."""
+    scene = Scene(
+        "panda",
+        fixtures=["button"],
+        objects={"cube": ObjectSpec("cube", on="table", centre=(-0.1, 0.3), area=(0.02, 0.02))},
+    )
+    drawn = scene.sample(3)
+    world, seen = (
+        drawn.world_model(["left", "right"], 0.08),
+        np.array([actor.pose for actor in drawn.objects]),
+    )
+    button, cube = world.object_index("button"), world.object_index("cube")
+    seen[button, 2] += height
+    top = seen[button, 2] + world.object("button").extent[2] / 2
+    seen[cube, :3] = [*seen[button, :2], top + world.object("cube").extent[2] / 2 + 0.003]
+    found = at_rest(world, seen)
+    assert np.array_equal(found[button], seen[button])
+    assert found[cube, 2] == pytest.approx(top + world.object("cube").extent[2] / 2, abs=1e-6)
+
+
 def test_furniture_carries_beside_its_places_too_where_there_is_room():
     """The table's top is larger than its named region; the rim of a tray is no place to stand."""
     world, true = world_of(3)
