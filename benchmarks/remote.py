@@ -34,6 +34,8 @@ from bt_tasksim.trees.load import load_source
 
 EVERY = 10
 """Control periods from one picture to the next, where pictures are drawn."""
+QUICK_EVERY = 15
+"""The same for a quick look."""
 SHORT = 1.0
 """Simulated seconds after which the episodes of a quick look are stopped."""
 STEPS = 2000
@@ -48,7 +50,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="What another process costs.")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, and nothing is written")
     options = parser.parse_args()
-    found = measure(1, 1, EVERY, SHORT, 200) if options.quick else measure(9, 6, EVERY)
+    found = measure(1, 1, QUICK_EVERY, SHORT, 200) if options.quick else measure(9, 6, EVERY)
     print(json.dumps(found, indent=2))
     if not options.quick:
         write_text(RESULTS / "remote.json", json.dumps(found, indent=2) + "\n")

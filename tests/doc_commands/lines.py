@@ -60,7 +60,7 @@ QUICK = {
     "benchmarks.gap": "--episodes 1 --scenarios shelf_to_shelf --grasps programmed --engines sapien",
     "benchmarks.grasp": "--draws 2 --workers 1 --only programmed --noise original",
     "benchmarks.learning": "--quick --only inference --json learning.json",
-    "benchmarks.maniskill_world": "--episodes 1",
+    "benchmarks.maniskill_world": "--episodes 1 --longest 1",
     "benchmarks.oracle": "--draws 1 --workers 1 --robot panda",
     "benchmarks.remote": "--quick",
     "benchmarks.sealed": "",
