@@ -13,6 +13,9 @@ PYTEST_FLAGS ?= -n logical --maxprocesses 4 --dist loadfile
 
 TWIN := .twin
 
+# Tests start hundreds of processes, and each would compile all modules anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: twin twin-environment test-twin test-perturbed demo test attacks bench docs lint format style types imports setup clean
 
 demo: setup

@@ -5,6 +5,7 @@ A command that none of the tables below knows fails: say here how it is made qui
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import runpy
@@ -146,6 +147,7 @@ def command_form(line: str) -> list[str]:
     return words
 
 
+@functools.cache
 def form(line: str) -> tuple[str, ...]:
     """What is run of a line."""
     return tuple(quick_form(line) if line.startswith("python") else command_form(line))
