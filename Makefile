@@ -8,8 +8,8 @@ SHELL := /bin/bash
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
 EXTRAS := sim,train,report,ros,remote,mujoco,warp,cluster,docs,dev
-# A file's tests in one process: what they share is made once.
-PYTEST_FLAGS ?= -n logical --maxprocesses 4 --dist loadfile
+# A file's tests in one process: what they share is made once. Files in the order of tests/conftest.py.
+PYTEST_FLAGS ?= -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 TWIN := .twin
 
