@@ -54,7 +54,8 @@ LONG = tuple(f"tests/{name}" for name in (
 ))  # fmt: skip
 """Files of a minute and more: first, so that no process is still at one when the others have ended.
 
-Not bt_tasksim/core/test_cluster.py, which looks at what of Ray is left: other files that start Ray are here."""
+Not bt_tasksim/core/test_cluster.py: it looks at what is left of Ray, which other files here start.
+"""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
