@@ -8,10 +8,13 @@ SHELL := /bin/bash
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check -qq
 EXTRAS := sim,train,report,ros,remote,mujoco,warp,cluster,docs,dev
-# A file's tests in one process: what they share is made once.
-PYTEST_FLAGS ?= -n logical --maxprocesses 4 --dist loadfile
+# A file's tests in one process: what they share is made once. Files in the order of tests/conftest.py.
+PYTEST_FLAGS ?= -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 TWIN := .twin
+
+# Tests start hundreds of processes, and each would compile all modules anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: twin twin-environment test-twin test-perturbed demo test attacks bench docs lint format style types imports setup clean
 

@@ -21,7 +21,7 @@ import tempfile
 import threading
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -171,17 +171,17 @@ def _note(ended: list[int], outcome: EpisodeOutcome) -> None:
     ended.append(outcome.seed)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, and say whether every result was whole and equal."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--times", type=int, default=10, help="how often a node is killed")
     parser.add_argument("--episodes", type=int, default=100)
     parser.add_argument("--tree", default="pick_and_place")
     parser.add_argument("--seed", type=int, default=0, help="of the moments and of the first episode")
-    arguments = parser.parse_args()
-    job, seeds = Job(arguments.tree), range(arguments.seed, arguments.seed + arguments.episodes)
+    options = parser.parse_args(arguments)
+    job, seeds = Job(options.tree), range(options.seed, options.seed + options.episodes)
     alone = timeless(evaluate(job, seeds).outcomes)
-    moments = random.Random(arguments.seed)
+    moments = random.Random(options.seed)
     good = 0
     with local_cluster(1, 1) as cluster:
         began = time.monotonic()
@@ -190,7 +190,7 @@ def main() -> int:
         print(
             f"two nodes, none killed: {took:.1f} s, {'equal' if whole == alone else 'NOT EQUAL'}", flush=True
         )
-        for k in range(arguments.times):
+        for k in range(options.times):
             # from before the actors begin to shortly before the end
             moment = moments.uniform(0.0, 0.9 * took)
             ended: list[int] = []
@@ -207,11 +207,11 @@ def main() -> int:
             lost = sum(issubclass(warning.category, BtTasksimWarning) for warning in said)
             words = f"killed after {moment:.1f} s, ended after {seconds:.1f} s, {lost} actors made up for"
             print(f"{k + 1}: {words}: {'whole and equal' if same else 'NOT EQUAL'}", flush=True)
-            if k + 1 < arguments.times:
+            if k + 1 < options.times:
                 cluster.nodes.pop()
                 cluster.start()
-    print(f"{good} of {arguments.times} results whole and equal")
-    return 0 if good == arguments.times and whole == alone else 1
+    print(f"{good} of {options.times} results whole and equal")
+    return 0 if good == options.times and whole == alone else 1
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from typing import Any
 
 from bt_tasksim.core.files import write_text
 from bt_tasksim.execution.pipelines import EngineOptions
-from bt_tasksim.execution.runner import Runner
+from bt_tasksim.execution.runner import LONGEST, Runner
 from bt_tasksim.trees.load import load_source
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples" / "maniskill"
@@ -38,17 +38,20 @@ class Stopwatch:
             self.seconds += time.perf_counter() - started
 
 
-def measure(environment: str, episodes: int, noise: str = "fine") -> dict[str, float]:
+def measure(
+    environment: str, episodes: int, noise: str = "fine", longest: float = LONGEST
+) -> dict[str, float]:
     """Medians over episodes: microseconds a control step, and milliseconds of a reset.
 
     Args:
         environment: One of `TREES`.
         episodes: How many.
         noise: Name of the noise model.
+        longest: Simulated seconds after which an episode is stopped.
     """
     options = EngineOptions(engines=f"maniskill:{environment}", noise=noise)
     source = load_source(str(EXAMPLES / TREES[environment]), world=options.own_world())
-    runner = Runner(source.build(), source.scene, options)
+    runner = Runner(source.build(), source.scene, options, longest=longest)
     opened: Any = runner.pipeline.physics._open()  # type: ignore[attr-defined]
     step = opened.step = Stopwatch(opened.step)
     reset = opened.reset = Stopwatch(opened.reset)
@@ -75,9 +78,10 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--episodes", type=int, default=30, help="episodes of each environment")
+    parser.add_argument("--longest", type=float, default=LONGEST, help="simulated seconds of an episode")
     parser.add_argument("--json", type=Path, help="write the numbers to this file")
     arguments = parser.parse_args()
-    found = {name: measure(name, arguments.episodes) for name in TREES}
+    found = {name: measure(name, arguments.episodes, longest=arguments.longest) for name in TREES}
     for name, numbers in found.items():
         print(f"{name}: " + ", ".join(f"{what} {value:.0f}" for what, value in numbers.items()))
     if arguments.json is not None:

@@ -29,13 +29,17 @@ from bt_tasksim.core.errors import MachineError
 from bt_tasksim.core.files import write_text
 from bt_tasksim.core.world import JointTarget
 from bt_tasksim.execution.pipelines import EngineOptions
-from bt_tasksim.execution.runner import Runner, Step
+from bt_tasksim.execution.runner import LONGEST, Runner, Step
 from bt_tasksim.trees.load import load_source
 
 EVERY = 10
 """Control periods from one picture to the next, where pictures are drawn."""
-QUICK_EVERY = 100
+QUICK_EVERY = 15
 """The same for a quick look."""
+SHORT = 1.0
+"""Simulated seconds after which the episodes of a quick look are stopped."""
+STEPS = 2000
+"""Steps of the robot at rest that are timed."""
 CAMERA = "perception"
 START = 60.0
 """Seconds that a server may take to start."""
@@ -46,20 +50,24 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="What another process costs.")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, and nothing is written")
     options = parser.parse_args()
-    found = measure(1, 1, QUICK_EVERY) if options.quick else measure(9, 6, EVERY)
+    found = measure(1, 1, QUICK_EVERY, SHORT, 200) if options.quick else measure(9, 6, EVERY)
     print(json.dumps(found, indent=2))
     if not options.quick:
         write_text(RESULTS / "remote.json", json.dumps(found, indent=2) + "\n")
     return 0
 
 
-def measure(rounds: int, episodes: int, every: int) -> dict[str, Any]:
+def measure(
+    rounds: int, episodes: int, every: int, longest: float = LONGEST, steps: int = STEPS
+) -> dict[str, Any]:
     """Control steps per second of every arrangement, in turns, and ratios to that in one process.
 
     Args:
         rounds: How often each is measured.
         episodes: In each round.
         every: Control periods from one picture to the next, where pictures are drawn.
+        longest: Simulated seconds after which an episode is stopped.
+        steps: Steps of the robot at rest that are timed.
     """
     here = "mujoco" if importlib.util.find_spec("mujoco") else "sapien"
     found: dict[str, Any] = {"mixed_physics": here}
@@ -71,9 +79,9 @@ def measure(rounds: int, episodes: int, every: int) -> dict[str, Any]:
             "physics_served": EngineOptions(engines=physics),
             "two_served": EngineOptions(engines=other, kinematics=kinematics),
         }
-        found |= compared(plain, rounds, episodes)
-        found["step_us"] = step_times(plain["in_process"])
-        found["served_step_us"] = step_times(plain["physics_served"])
+        found |= compared(plain, rounds, episodes, longest)
+        found["step_us"] = step_times(plain["in_process"], steps)
+        found["served_step_us"] = step_times(plain["physics_served"], steps)
     with contextlib.ExitStack() as servers:
         try:
             rendering = servers.enter_context(served("rendering", "sapien"))
@@ -83,7 +91,7 @@ def measure(rounds: int, episodes: int, every: int) -> dict[str, Any]:
             "pictures_in_process": EngineOptions(engines=here, rendering=True),
             "pictures_served": EngineOptions(engines=here, rendering=True, renderer=rendering),
         }
-        return found | compared(drawn, max(rounds // 3, 1), 1, every)
+        return found | compared(drawn, max(rounds // 3, 1), 1, longest, every)
 
 
 @contextlib.contextmanager
@@ -108,11 +116,11 @@ def served(role: str, name: str) -> Iterator[str]:
 
 
 def compared(
-    ways: dict[str, EngineOptions], rounds: int, episodes: int, every: int | None = None
+    ways: dict[str, EngineOptions], rounds: int, episodes: int, longest: float, every: int | None = None
 ) -> dict[str, Any]:
     """Control steps per second of each way, medians, and medians of the ratios to the first one."""
     rates: dict[str, list[float]] = {name: [] for name in ways}
-    runners = {name: runner_of(options) for name, options in ways.items()}
+    runners = {name: runner_of(options, longest) for name, options in ways.items()}
     try:
         for runner in runners.values():
             rate(runner, range(1), every)
@@ -131,10 +139,10 @@ def compared(
     return out
 
 
-def runner_of(options: EngineOptions) -> Runner:
+def runner_of(options: EngineOptions, longest: float = LONGEST) -> Runner:
     """A runner of the scenario that is measured."""
     source = load_source("pick_and_place")
-    return Runner(source.build(), source.scene, options)
+    return Runner(source.build(), source.scene, options, longest=longest)
 
 
 def rate(runner: Runner, seeds: range, every: int | None) -> float:
@@ -152,7 +160,7 @@ def rate(runner: Runner, seeds: range, every: int | None) -> float:
     return count[0] / (time.perf_counter() - started)
 
 
-def step_times(options: EngineOptions, steps: int = 2000) -> float:
+def step_times(options: EngineOptions, steps: int) -> float:
     """Median microseconds of a step of the physics engine, with the robot at rest."""
     runner = runner_of(options)
     runner.begin(0)

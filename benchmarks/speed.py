@@ -30,7 +30,7 @@ from bt_tasksim.concept.leaf import ConceptNode
 from bt_tasksim.core.files import write_text
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.execution.pipelines import EngineOptions
-from bt_tasksim.execution.runner import Runner
+from bt_tasksim.execution.runner import LONGEST, Runner
 from bt_tasksim.trees.load import load_source
 
 PURE = ("initial_state", "begin", "violated", "maintained", "carry_out", "explain")
@@ -41,13 +41,15 @@ BARS = {"256_1": 4.3, "64_2": 7.0}
 """At least so many times ManiSkill's control steps per second, by case."""
 OUTSIDE_US = 1200.0
 HELP_S = 0.5
+SHORT = 2.0
+"""Simulated seconds after which the episodes of a quick look are stopped."""
 
 
 def main(quick: bool = False, json_path: Path | None = None) -> int:
     """Measure, print the tables, and write the numbers as JSON if asked."""
     found: dict[str, Any] = throughput(quick)
-    found |= outside_physics(episodes=2 if quick else 20)
-    found |= help_time(3 if quick else 7)
+    found |= outside_physics(episodes=1, longest=SHORT) if quick else outside_physics(episodes=20)
+    found |= help_time(1 if quick else 7)
     _print(found)
     if json_path is not None:
         write_text(json_path, json.dumps(found, indent=2) + "\n")
@@ -62,7 +64,8 @@ def throughput(quick: bool) -> dict[str, Any]:
         for worlds, processes in CASES:
             if processes > (os.cpu_count() or 1) or (quick and (worlds > 1 or processes > 1)):
                 continue
-            options = argparse.Namespace(threads=1, processes=processes, quick=quick)
+            longest = SHORT if quick else LONGEST
+            options = argparse.Namespace(threads=1, processes=processes, quick=quick, longest=longest)
             out[f"{worlds}_{processes}"] = episodes.measured(
                 worlds, options, peer, apart=False, rounds=1 if quick else 5
             )
@@ -71,9 +74,9 @@ def throughput(quick: bool) -> dict[str, Any]:
     return {"episodes": out, "maniskill_missing": peer.missing}
 
 
-def outside_physics(episodes: int, robot: str = "panda") -> dict[str, Any]:
+def outside_physics(episodes: int, robot: str = "panda", longest: float = LONGEST) -> dict[str, Any]:
     """Median microseconds a control step spends in each part; physics is PhysX's own steps."""
-    runner = _runner("pick_and_place", robot)
+    runner = _runner("pick_and_place", robot, longest)
     runner.run(0)
     clock = _Clock()
     physics: Any = runner.pipeline.physics
@@ -168,9 +171,9 @@ def help_time(rounds: int) -> dict[str, Any]:
     return {"help_s": statistics.median(times), "help_imports": heavy}
 
 
-def _runner(scenario: str, robot: str = "panda") -> Runner:
+def _runner(scenario: str, robot: str, longest: float) -> Runner:
     source = load_source(scenario, robot)
-    return Runner(source.build(), source.scene, EngineOptions())
+    return Runner(source.build(), source.scene, EngineOptions(), longest=longest)
 
 
 def _print(found: dict[str, Any]) -> None:

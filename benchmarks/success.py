@@ -103,7 +103,7 @@ def measure(row: Row, seeds: Sequence[int], workers: int) -> Evaluation:
     options = EngineOptions(perception=row.perception)
     if not row.from_logs:
         return evaluate(Job(row.scenario, robot=row.robot, options=options), seeds, workers)
-    logs = sorted(asset("demonstrations", row.scenario).glob("*.h5"))
+    logs = sorted(asset("demonstrations", row.scenario).glob("*.h5"))[: len(seeds)]
     share = len(seeds) // len(logs)
     parts = []
     with tempfile.TemporaryDirectory() as folder:

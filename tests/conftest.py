@@ -46,8 +46,21 @@ def pytest_configure(config: pytest.Config) -> None:
     perturbation.install(config.getoption("--nudge"), config.getoption("--shift-seeds"), os.environ)
 
 
+LONG = tuple(f"tests/{name}" for name in (
+    "trees/test_shipped.py", "concept_nodes/test_array_api.py", "doc_commands/", "trees/test_from_goals.py",
+    "bt_tasksim/training/test_cluster_evaluation.py", "bt_tasksim/training/test_evaluation.py",
+    "bt_tasksim/engines/maniskill/test_environments.py", "bt_tasksim/execution/test_batch_runner.py",
+    "test_wheel.py",
+))  # fmt: skip
+"""Files of a minute and more: first, so that no process is still at one when the others have ended.
+
+Not bt_tasksim/core/test_cluster.py: it looks at what is left of Ray, which other files here start.
+"""
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep one part of the tests; which one a test is in depends on its name alone."""
+    """Long files first. Keep one part of the tests; which one a test is in depends on its name alone."""
+    items.sort(key=lambda item: not item.nodeid.startswith(LONG))
     part, parts = (int(number) for number in config.getoption("--part").split("/"))
     if parts > 1:
         wanted = [zlib.crc32(item.nodeid.encode()) % parts == part for item in items]

@@ -25,6 +25,7 @@ from benchmarks.batch import (
 )
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.files import write_text
+from bt_tasksim.execution.runner import LONGEST
 
 SECTIONS = {
     "executor": executor,
@@ -52,6 +53,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         "--worlds", type=_positive, metavar="N", help="so many alone, instead of a section's own series"
+    )
+    parser.add_argument(
+        "--longest",
+        type=float,
+        default=LONGEST,
+        metavar="S",
+        help="simulated seconds after which episodes are stopped (laws, episodes, device, same-bits)",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
     for section in SECTIONS.values():

@@ -22,7 +22,6 @@ import numpy as np
 from bt_tasksim.engines.base import engine_class
 from bt_tasksim.execution.batch_runner import BatchRunner
 from bt_tasksim.execution.pipelines import LAWS, EngineOptions
-from bt_tasksim.execution.runner import LONGEST
 from bt_tasksim.trees.load import load_source
 
 WORLDS = {"cpu": 8, "cuda": 4096}
@@ -51,7 +50,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     batch: Any = runner.worlds.physics
     bare = _bare(batch, worlds, steps=20 if kind == "cpu" else 200)
     before = [bare() for _ in range(SLICES)]
-    runner.longest, done, successes = LONGEST, runner.control_steps, 0
+    runner.longest, done, successes = options.longest, runner.control_steps, 0
     with _timed() as spent:
         started = time.perf_counter()
         for _, result in runner.run(range(worlds, 3 * worlds)):

@@ -26,6 +26,7 @@ from benchmarks.peer_maniskill import Peer
 from bt_tasksim.core.workers import Workers
 from bt_tasksim.engines.vulkan import use_software_driver
 from bt_tasksim.execution.batch_runner import BatchRunner
+from bt_tasksim.execution.runner import LONGEST
 from bt_tasksim.trees.load import load_source
 
 WORLDS = (1, 64, 256, 1024)
@@ -41,6 +42,7 @@ COLUMNS = (
     ("outside_us", 10),
 )
 PEER_STEPS = 1000
+QUICK_PEER_STEPS = 200
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -91,11 +93,12 @@ class Episodes:
     Args:
         worlds: How many.
         threads: How many threads step them.
+        longest: Simulated seconds after which an episode is stopped.
     """
 
-    def __init__(self, worlds: int, threads: int) -> None:
+    def __init__(self, worlds: int, threads: int, longest: float = LONGEST) -> None:
         source = load_source("pick_and_place")
-        self.runner = BatchRunner(source.build, source.scene, worlds=worlds, threads=threads)
+        self.runner = BatchRunner(source.build, source.scene, worlds=worlds, threads=threads, longest=longest)
         self._for_ever: Iterator[Any] | None = None
 
     def whole(self, seeds: range) -> int:
@@ -139,16 +142,17 @@ def measured(
     """Medians over rounds, both sides in turns; ``apart``: and then where the time goes."""
     processes, threads = options.processes, options.threads
     episodes, steps, rows = max(2 * worlds, 8), 150 * max(worlds, 16), []
+    peer_steps = PEER_STEPS
     if options.quick:
-        episodes, steps = worlds, 150 * worlds
-    with Workers(partial(Episodes, worlds, threads), processes, "spawn") as fleet:
+        episodes, steps, peer_steps = worlds, min(150, round(20 * options.longest)) * worlds, QUICK_PEER_STEPS
+    with Workers(partial(Episodes, worlds, threads, options.longest), processes, "spawn") as fleet:
         list(fleet.spread(whole, [range(2)] * processes))  # whatever is made but once
         for k in range(rounds or (1 if options.quick else 5)):
             first = k * processes * episodes
             seeds = [range(first + n * episodes, first + (n + 1) * episodes) for n in range(processes)]
             rows.append({"steps_per_s": _rate(fleet.spread(whole, seeds))})
             if not peer.missing:
-                best = max(rate(PEER_STEPS) for rate in _ways(peer, max(threads, processes)))
+                best = max(rate(peer_steps) for rate in _ways(peer, max(threads, processes)))
                 rows[-1] |= {"peer_steps_per_s": best, "ratio": rows[-1]["steps_per_s"] / best}
         found = {name: statistics.median(row[name] for row in rows) for name in rows[0]}
         if not apart:

@@ -44,7 +44,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     out: dict[str, Any] = {"device": options.device}
     print("\nall but physics, us of a control step and world")
     print(f"{'worlds':>8}  {'laws':8}" + "".join(f"{part:>9}" for part in (*PARTS, "all")))
-    recorded = Recorded()
+    recorded = Recorded(2 if options.quick and options.worlds else EPISODES, options.longest)
     counts = WORLDS[:2] if options.quick else WORLDS
     for worlds in (options.worlds,) if options.worlds else counts:
         for laws in ("numpy", "torch"):
@@ -67,7 +67,12 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
 class Recorded:
     """Episodes of ``pick_and_place`` with all that physics said in them.
 
+    Args:
+        episodes: How many.
+        longest: Simulated seconds after which they are stopped.
+
     Attributes:
+        episodes: How many there are.
         source: The tree and its scene.
         drawn: Worlds by seed.
         states: By name of a field of `WorldState`, ``(seeds, most periods, ...)``.
@@ -75,9 +80,10 @@ class Recorded:
         ends: Periods of each ``(seeds,)``.
     """
 
-    def __init__(self) -> None:
-        self.source, everyone = load_source("pick_and_place"), np.arange(EPISODES)
-        runner = BatchRunner(self.source.build, self.source.scene, EngineOptions(laws="numpy"), EPISODES)
+    def __init__(self, episodes: int, longest: float) -> None:
+        self.source, everyone = load_source("pick_and_place"), np.arange(episodes)
+        self.episodes, engines = episodes, EngineOptions(laws="numpy")
+        runner = BatchRunner(self.source.build, self.source.scene, engines, episodes, longest=longest)
         physics = runner.worlds.physics
         said: list[tuple[Array, WorldState, Hidden]] = []
 
@@ -97,25 +103,27 @@ class Recorded:
                 pass
         runner.close()
         self.drawn = {seed: self.source.scene.sample(seed) for seed in everyone.tolist()}
-        self.ends = np.bincount(np.concatenate([rows for rows, _, _ in said]), minlength=EPISODES)
+        self.ends = np.bincount(np.concatenate([rows for rows, _, _ in said]), minlength=episodes)
         self.states = self._table([(rows, state) for rows, state, _ in said])
         self.hidden = self._table([(rows, hidden) for rows, _, hidden in said])
 
     def _table(self, bundles: Sequence[tuple[Array, Any]]) -> dict[str, Array]:
         out: dict[str, Array] = {}
-        at = np.zeros(EPISODES, int)
+        at = np.zeros(self.episodes, int)
         for rows, bundle in bundles:
             for field in dataclasses.fields(bundle):
                 values = getattr(bundle, field.name)
                 if field.name not in out:
-                    out[field.name] = np.zeros((EPISODES, self.ends.max(), *values.shape[1:]), values.dtype)
+                    out[field.name] = np.zeros(
+                        (self.episodes, self.ends.max(), *values.shape[1:]), values.dtype
+                    )
                 out[field.name][rows, at[rows]] = values
             at[rows] += 1
         return out
 
     def sample(self, seed: int, stream: str = "evaluation", stage: int | None = None) -> ActorConfiguration:
         """A recorded world; seeds beyond them are those again."""
-        return self.drawn[seed % EPISODES]
+        return self.drawn[seed % self.episodes]
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.source.scene, name)

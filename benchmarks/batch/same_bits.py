@@ -47,15 +47,16 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     episodes = min(options.episodes, 6) if options.quick else options.episodes
     seeds, out = range(episodes), {}
     for engine in ENGINES:
-        alone = _alone(engine, seeds)
+        alone = _alone(engine, seeds, options.longest)
         for worlds, threads in BATCHES if not options.quick else BATCHES[2:3]:
             for order in ("seeds in order", "shuffled"):
                 shuffled = np.random.default_rng(worlds).permutation(episodes).tolist()
-                found = _in_batch(engine, seeds if order == "seeds in order" else shuffled, worlds, threads)
+                ordered = seeds if order == "seeds in order" else shuffled
+                found = _in_batch(engine, ordered, worlds, threads, options.longest)
                 row = f"{engine}, {worlds} worlds, {threads} threads, {order}"
                 out[row] = _compared(row, alone, found, out)
         if not options.quick:
-            job = Job(TREE, options=EngineOptions(engines=engine), batch=4)
+            job = Job(TREE, options=EngineOptions(engines=engine), batch=4, longest=options.longest)
             here = _outcomes(evaluate(dataclasses.replace(job, batch=1), seeds).outcomes)
             for actors in ACTORS:
                 for kill in (False, True):
@@ -110,10 +111,10 @@ def _bytes(batch: ThreadedBatch[Any], state: WorldState, hidden: Hidden, row: in
     return out
 
 
-def _alone(engine: str, seeds: Sequence[int]) -> dict[int, str]:
+def _alone(engine: str, seeds: Sequence[int], longest: float) -> dict[int, str]:
     """By a runner of one world."""
     source = load_source(TREE)
-    runner = Runner(source.build(), source.scene, EngineOptions(engines=engine))
+    runner = Runner(source.build(), source.scene, EngineOptions(engines=engine), longest=longest)
     physics: Any = runner.pipeline.physics
     hashes, out = _Hashes(), {}
     with hashes.watch(physics._batch):
@@ -132,10 +133,11 @@ def _run(runner: Runner, seed: int) -> Any:
         return error
 
 
-def _in_batch(engine: str, seeds: Sequence[int], worlds: int, threads: int) -> dict[int, str]:
+def _in_batch(engine: str, seeds: Sequence[int], worlds: int, threads: int, longest: float) -> dict[int, str]:
     """In a batch."""
     source = load_source(TREE)
-    runner = BatchRunner(source.build, source.scene, EngineOptions(engines=engine), worlds, threads)
+    engines = EngineOptions(engines=engine)
+    runner = BatchRunner(source.build, source.scene, engines, worlds, threads, longest)
     hashes, drawn, out = _Hashes(), {}, {}
     physics: Any = runner.worlds.physics
     reset = runner.worlds.reset

@@ -18,12 +18,12 @@ def quick(monkeypatch):
     def served(role, name):
         yield "remote:127.0.0.1:1"
 
-    def compared(ways, rounds, episodes, every=None):
+    def compared(ways, rounds, episodes, longest, every=None):
         return {"pictures": next(iter(ways.values())).engines} if every is not None else {}
 
     monkeypatch.setattr(remote, "served", served)
     monkeypatch.setattr(remote, "compared", compared)
-    monkeypatch.setattr(remote, "step_times", lambda options: 1.0)
+    monkeypatch.setattr(remote, "step_times", lambda options, steps: 1.0)
 
 
 @pytest.mark.parametrize("there", [True, False])
@@ -49,7 +49,7 @@ def test_pictures_that_cannot_be_served_are_said_to_be_missing(quick, monkeypatc
 
 
 def test_a_run_that_fails_is_no_missing_picture(quick, monkeypatch):
-    def compared(ways, rounds, episodes, every=None):
+    def compared(ways, rounds, episodes, longest, every=None):
         if every is not None:
             raise MachineError("the physics blew up")
         return {}

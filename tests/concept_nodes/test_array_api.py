@@ -6,6 +6,7 @@ other worlds are, however many and in which order.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib.util
 import warnings
@@ -95,9 +96,7 @@ from bt_tasksim.scene.specs import ObjectSpec
 from bt_tasksim.trees.load import load_source
 
 SEEDS = (1, 2)
-"""Draws of which the objects differ in kind and size."""
-EACH = 1
-"""Situations of each concept in each draw."""
+"""Draws of which the objects differ in kind and size; leaves begin in the one and in the other in turns."""
 PLANNED = 6
 """Of these, so many are asked to begin again and again: a plan takes seconds where there is hardly a way."""
 CLOSE = 1e-7
@@ -244,10 +243,14 @@ class Asking:
     def __init__(self, model, situations, robot):
         self.model, self.robot = model, robot
         rng = np.random.default_rng(0)
-        self.single = [s for s in (self.begun(s, rng) for s in situations) if s is not None]
+        self.single, begun = [], []
+        for situation in situations:
+            with contextlib.suppress(NoWayError):
+                begun.append(self.ask("begin", situation))
+                self.single.append(situation._replace(memory=self.remembered(begun[-1], rng)))
         assert self.single, "it begins in none of the worlds"
         self.batch = together(self.single)
-        self._alone = {}
+        self._alone = {"begin": [begun[k] for k in self.rows("begin")]}
 
     def rows(self, name):
         """The worlds that a question is about."""
@@ -261,12 +264,8 @@ class Asking:
             self._alone[name] = [self.ask(name, self.single[k]) for k in self.rows(name)]
         return self._alone[name]
 
-    def begun(self, situation, rng):
-        try:
-            memory = self.model.begin(self.asked(situation).seen)
-        except NoWayError:
-            return None
-        return situation._replace(memory=memory if rng.random() < 0.3 else changed_memory(memory, rng))
+    def remembered(self, memory, rng):
+        return memory if rng.random() < 0.3 else changed_memory(memory, rng)
 
     def ask(self, name, situation):
         return QUESTIONS[name].ask(self.model, self.asked(situation))
@@ -283,19 +282,20 @@ def worlds(recorded_run):
 
     def get(scenario):
         if scenario not in kept:
-            decisions = []
-            for seed in SEEDS:
-                by_leaf = {}
+            seeds = SEEDS if scenario in SCENES else SEEDS[:1]
+            firsts = [{} for _ in seeds]
+            for seed, first in zip(seeds, firsts, strict=True):
                 for decision in recorded_run(scenario, seed):
-                    by_leaf.setdefault(decision.leaf.name, []).append(decision._replace(memory=None))
-                for found in by_leaf.values():
-                    decisions += found[:: max(1, len(found) // EACH)]
-            decisions = alike(decisions)
+                    first.setdefault(decision.leaf.name, decision._replace(memory=None))
+            leaves = enumerate(firsts[0])
+            decisions = alike([firsts[k % len(firsts)][leaf] for k, leaf in leaves])
             rng = np.random.default_rng(1)
             real = [situation_of(d) for d in decisions]
             robot, target = decisions[0].seen.robot, names(scenario)[0]
             kinds = [facts_of(kind, target, scenario, robot) for kind in KINDS]
-            others = [perturbed(s, rng)._replace(world=kinds[k % len(kinds)]) for k, s in enumerate(real)]
+            others = [
+                perturbed(real[k % len(real)], rng)._replace(world=kind) for k, kind in enumerate(kinds)
+            ]
             kept[scenario] = [*real, *others], robot
         return kept[scenario]
 

@@ -20,7 +20,7 @@ def bench(
     json_: Annotated[
         Path | None, typer.Option("--json", metavar="F", help="Write the numbers as JSON.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer repetitions.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer repetitions, of shorter episodes.")] = False,
 ) -> int:
     """Measure speed, beside other simulators in the same run."""
     return int(measurement()(quick=quick, json_path=json_))

@@ -138,12 +138,12 @@ def test_soft_actor_critic_of_stable_baselines_trains_it(env):
 
     torch.set_num_threads(1)
     model = SAC(
-        "MlpPolicy", env, learning_starts=100, batch_size=32, buffer_size=1000, device="cpu", seed=0,
+        "MlpPolicy", env, learning_starts=40, batch_size=32, buffer_size=1000, device="cpu", seed=0,
         policy_kwargs={"net_arch": [16]},
     )  # fmt: skip
     before = [p.detach().clone() for p in model.actor.parameters()]
-    model.learn(300)
-    assert model.num_timesteps == 300 and model.replay_buffer.size() == 300
+    model.learn(80)
+    assert model.num_timesteps == 80 and model.replay_buffer.size() == 80
     assert any(not bool((a == b).all()) for a, b in zip(before, model.actor.parameters(), strict=True))
 
 

@@ -136,7 +136,7 @@ def vector_of(toy_engines):
 @pytest.mark.parametrize("longest", [30.0, 0.6])
 @pytest.mark.parametrize("tree", TREES.values(), ids=list(TREES))
 def test_rollouts_are_those_of_an_environment_of_their_own(env_of, batch_of, tree, longest):
-    tasks = [task(k, decisions=24) for k in range(4)]
+    tasks = [task(k, decisions=14) for k in range(4)]
     expected = []
     try:
         expected = [as_bytes(alone(env_of(tree(), longest=longest), t)) for t in tasks]
