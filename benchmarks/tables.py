@@ -1,8 +1,9 @@
 """Measured numbers into the documentation: ``python -m benchmarks.tables``.
 
 Reads ``benchmarks/results/*.json`` and writes the tables between the marker comments of README.md,
-docs/evaluation.md, docs/training.md, docs/experiments.md, docs/remote_engines.md, docs/twin.md and
-docs/taxonomy.md, so that no number is typed by hand. Results are what the measurements write:
+docs/evaluation.md, docs/training.md, docs/experiments.md, docs/remote_engines.md, docs/twin.md,
+docs/taxonomy.md and docs/concept_successes.md, so that no number is typed by hand. Results are what the
+measurements write:
 
 - ``<scenario>-<robot>[-camera][-fromlogs].json`` by ``python -m benchmarks.success``, in the format of
   ``bt-tasksim evaluate --json``;
@@ -18,7 +19,7 @@ docs/taxonomy.md, so that no number is typed by hand. Results are what the measu
 - ``any_tree-<robot>[-...].json`` by ``python -m benchmarks.any_tree``, ``five-<tree>-<robot>.json`` by
   ``python -m benchmarks.any_tree.five``;
 - ``concept-<scenario>-<robot>-<engine>.json`` by ``python -m benchmarks.concepts``, which stand in
-  docs/taxonomy.md;
+  docs/taxonomy.md and docs/concept_successes.md;
 - ``decomposition.json`` by ``python -m benchmarks.tables --decomposition``, which measures first.
 
 ``--check`` changes nothing and fails when a table is not up to date.
@@ -33,7 +34,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from benchmarks import any_tree_tables, learned_tables, robot_tables, taxonomy_table
+from benchmarks import any_tree_tables, concept_tables, learned_tables, robot_tables, taxonomy_table
 from benchmarks.experiments import pages as experiment_tables
 from benchmarks.speed import CASES, described
 from benchmarks.success import RESULTS, SCENARIOS
@@ -49,6 +50,7 @@ PAGES = (
     "docs/remote_engines.md",
     "docs/twin.md",
     "docs/taxonomy.md",
+    "docs/concept_successes.md",
 )
 ROWS = tuple(row.name for row in MEASURED)
 """Rows that are always there, measured or not; others follow as files are found."""
@@ -56,10 +58,10 @@ KINDS = ("camera", "fromlogs")
 OTHER = ("speed", "decomposition", "learning", "remote", "faults", "loop", "planning", "taxonomy")
 APART = (
     *("oracle-", "grasp-", "experiment-", "training-", "gap-", "logs-", "decomposition-"),
-    *("any_tree-", "five-", "concept-"),
+    *("any_tree-", "five-", "concept-", "chores-"),
 )
-"""How results begin whose tables are made in `learned_tables`, `robot_tables`, `any_tree_tables` and
-`experiments.pages`."""
+"""How results begin whose tables are made in `learned_tables`, `robot_tables`, `any_tree_tables`,
+`concept_tables` and `experiments.pages`."""
 NOT_YET = "not measured yet"
 SPENT = 50_000
 """First seed of results that do not say it: measured again and again, see ``docs/evaluation.md``."""
@@ -241,6 +243,7 @@ TABLES = {
     **any_tree_tables.TABLES,
     **experiment_tables.TABLES,
     **taxonomy_table.TABLES,
+    **concept_tables.TABLES,
 }
 MARKED = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 
