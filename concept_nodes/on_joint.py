@@ -362,7 +362,7 @@ class OnJoint(ConceptModel[JointMemory]):
         behind = behind - poses.dot(behind, along)[:, None] * along
         give = (period * minds)[:, None] * (YIELDS * aside + RELAXES * behind)
         short = (memory.goal - now) * PUSHES * period
-        at_end = (memory.late > 0.0) & (share > 0.0) & (self.stops == 0)
+        at_end = (memory.late > 0.0) & (share > 0.0)
         further = memory.further + xp.where(at_end, short, xp.zeros_like(short))
         offset = memory.offset + give
         offset = offset * poses.clip(MOST / poses.clip(poses.norm(offset), 1e-9, math.inf), 0.0, 1.0)[:, None]

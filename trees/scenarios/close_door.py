@@ -5,13 +5,23 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept_nodes import CloseDoor, Grasp, Release
+from bt_tasksim.planning.arm import arm_of
+from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
 
+FAR = 0.36
+"""Metres before its base at which a hand may rest and be clear of the door where that usually stands."""
+
 
 def scene(robot: str = "panda") -> Scene:
-    """A cabinet with a door that is open; its sizes, place, handle and friction are drawn."""
-    stands = {"value": (0.5, 1.1), "x": (0.66, 0.72), "heading": (-0.2, 0.2)}
+    """A cabinet with a door that is open; its sizes, place, handle and friction are drawn.
+
+    It stands farther off where the robot's hand rests far out.
+    """
+    made = load_robot(robot)
+    farther = max(0.0, float(arm_of(made).tool(made.rest)[0]) - FAR)
+    stands = {"value": (0.5, 1.1), "x": (0.66 + farther, 0.72 + farther), "heading": (-0.2, 0.2)}
     return Scene(
         robot,
         fixtures=[FixtureSpec("door", parameters=stands)],
