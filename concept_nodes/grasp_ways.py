@@ -91,7 +91,8 @@ class ServedAlong(Served):
         if pivot and not self._room(goal, hand, pivot):
             return False
         finder, tools = self._finder(goal, hand, pivot), self._along(goal, pivot)
-        found = gone_along(finder, joints, tools, *((SPARE, SUPPLE) if self._closer < TOUCHING else ()))
+        spare, supple = (SPARE, SUPPLE) if self._closer < TOUCHING else (0.0, 0.0)
+        found = gone_along(finder, joints, tools, spare, supple)
         if found is None:
             return False
         if pivot and not keeps_clear(self._around.view, self._around.target, self._way, found, hand):

@@ -341,40 +341,47 @@ class OnJoint(ConceptModel[JointMemory]):
 
     def advance(self, action: Array, seen: Seen, memory: JointMemory) -> JointMemory:
         """Go on, slower where the wrist feels force, and give way aside; notice stops, and what jams."""
-        xp, period = array_namespace(seen.tool), seen.world.control_period
-        force, now = force_at_wrist(seen), self._value(seen)
-        asked = self._asked(seen, memory)
-        share = poses.clip((HARD - force / self.force_limit) / (HARD - SOFT), 0.0, 1.0)
-        if self.stops:
-            here, next_one = (position(memory.path, memory.progress + dt) for dt in (0.0, period))
-            ahead = poses.clip(poses.norm(next_one - here), 1e-9, math.inf)
-            end = poses.multiply(self._law(seen).pose(memory.goal), poses.inverse(memory.grip))
-            left = poses.clip(poses.norm(end[:, :3] - here) - SLOWLY, 0.0, math.inf)
-            most = xp.sqrt(GENTLY**2 + 2.0 * BRAKES * left)
-            share = xp.minimum(share, poses.clip(most * period / ahead, 0.0, 1.0))
-            share = xp.where(memory.felt > 0, xp.zeros_like(share), share)
+        xp, period, now = array_namespace(seen.tool), seen.world.control_period, self._value(seen)
+        share = self._share(seen, memory)
         progress = memory.progress + period * share
-        far = abs(asked - now) > BEHIND[self.turns]
-        force_there, along = force_at_tool(seen), self._along(seen, memory)
-        aside = force_there - poses.dot(force_there, along)[:, None] * along
-        minds = poses.clip(1.0 - UNFELT / poses.clip(poses.norm(aside), 1e-9, math.inf), 0.0, 1.0)
-        behind = seen.tool[:, :3] - self._led(seen, memory)[0][:, :3]
-        behind = behind - poses.dot(behind, along)[:, None] * along
-        give = (period * minds)[:, None] * (YIELDS * aside + RELAXES * behind)
-        short = (memory.goal - now) * PUSHES * period
+        far = abs(self._asked(seen, memory) - now) > BEHIND[self.turns]
         at_end = (memory.late > 0.0) & (share > 0.0)
+        short = (memory.goal - now) * PUSHES * period
         further = memory.further + xp.where(at_end, short, xp.zeros_like(short))
-        offset = memory.offset + give
-        offset = offset * poses.clip(MOST / poses.clip(poses.norm(offset), 1e-9, math.inf), 0.0, 1.0)[:, None]
         over = (progress >= memory.path.duration) | (share <= 0.0)
         return memory._replace(
-            offset=offset,
+            offset=self._given_way(seen, memory),
             further=poses.clip(further, -FURTHER[self.turns], FURTHER[self.turns]),
             progress=xp.minimum(progress, memory.path.duration),
             felt=self._felt(seen, memory),
             behind=xp.where(far, memory.behind + period, xp.zeros_like(memory.behind)),
             late=xp.where(over, memory.late + period, xp.zeros_like(memory.late)),
         )
+
+    def _share(self, seen: Seen, memory: JointMemory) -> Array:
+        """Share ``(N,)`` of the path's own speed: less where the wrist feels force, and near a stop."""
+        xp, period = array_namespace(seen.tool), seen.world.control_period
+        share = poses.clip((HARD - force_at_wrist(seen) / self.force_limit) / (HARD - SOFT), 0.0, 1.0)
+        if not self.stops:
+            return share
+        here, next_one = (position(memory.path, memory.progress + dt) for dt in (0.0, period))
+        ahead = poses.clip(poses.norm(next_one - here), 1e-9, math.inf)
+        end = poses.multiply(self._law(seen).pose(memory.goal), poses.inverse(memory.grip))
+        left = poses.clip(poses.norm(end[:, :3] - here) - SLOWLY, 0.0, math.inf)
+        most = xp.sqrt(GENTLY**2 + 2.0 * BRAKES * left)
+        share = xp.minimum(share, poses.clip(most * period / ahead, 0.0, 1.0))
+        return xp.where(memory.felt > 0, xp.zeros_like(share), share)
+
+    def _given_way(self, seen: Seen, memory: JointMemory) -> Array:
+        """Metres ``(N, 3)`` by which the hand has given way aside then, as what presses it asks."""
+        force, along = force_at_tool(seen), self._along(seen, memory)
+        aside = force - poses.dot(force, along)[:, None] * along
+        minds = poses.clip(1.0 - UNFELT / poses.clip(poses.norm(aside), 1e-9, math.inf), 0.0, 1.0)
+        behind = seen.tool[:, :3] - self._led(seen, memory)[0][:, :3]
+        behind = behind - poses.dot(behind, along)[:, None] * along
+        give = (seen.world.control_period * minds)[:, None] * (YIELDS * aside + RELAXES * behind)
+        offset = memory.offset + give
+        return offset * poses.clip(MOST / poses.clip(poses.norm(offset), 1e-9, math.inf), 0.0, 1.0)[:, None]
 
     def _felt(self, seen: Seen, memory: JointMemory) -> Array:
         """Ticks ``(N,)`` in a row for which the stop is felt, with this one; a firm one is enough."""
