@@ -97,6 +97,11 @@ def left(out):
     return Path(out, "policy.safetensors").read_bytes(), tensors, history
 
 
+def there():
+    """All that is in the working folder, but for what Python compiles."""
+    return [path for path in sorted(Path().rglob("*")) if "__pycache__" not in path.parts]
+
+
 @needs_ray
 def test_two_actors_learn_what_one_process_does_also_after_one_was_killed(named, monkeypatch):
     """Stopped in the middle, and gone on with by actors of which one dies in its first rollout."""
@@ -118,12 +123,12 @@ def test_two_actors_learn_what_one_process_does_also_after_one_was_killed(named,
 @needs_ray
 def test_an_actor_that_finds_another_tree_is_refused_and_nothing_is_written(named, monkeypatch, capsys):
     monkeypatch.setenv("HEIGHT_THERE", "0.44")
-    before = sorted(Path().rglob("*"))
+    before = there()
     assert main(["train", "toy_tree.py", "--cluster", "local", "--workers", "1", "--out", "p"]) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1
     assert "another tree" in err and "is found there by the name 'toy_tree.py'" in err
-    assert [path for path in sorted(Path().rglob("*")) if "__pycache__" not in str(path)] == before
+    assert there() == before
 
 
 @needs_ray
@@ -133,7 +138,7 @@ def test_what_cannot_be_trained_on_a_cluster_is_one_sentence(named, capsys):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         nobody = f"127.0.0.1:{probe.getsockname()[1]}"
-    before = sorted(Path().rglob("*"))
+    before = there()
     for words, code, said in (
         (["--cluster", "ray://10.0.0.1"], 2, "a cluster is 'local' or HOST:PORT"),
         (["--cluster", nobody], 1, f"no Ray cluster answers at {nobody}"),
@@ -143,7 +148,7 @@ def test_what_cannot_be_trained_on_a_cluster_is_one_sentence(named, capsys):
         assert main(["train", "toy_tree.py", *words]) == code
         out, err = capsys.readouterr()
         assert out == "" and err.count("\n") == 1 and said in err
-        assert sorted(Path().rglob("*")) == before
+        assert there() == before
 
 
 def test_where_ray_is_not_installed_it_says_what_to_do(named, monkeypatch):

@@ -74,16 +74,21 @@ def call(capsys):
     return run
 
 
+def there(folder):
+    """All that is in a folder, but for what Python compiles."""
+    return [path for path in sorted(folder.rglob("*")) if "__pycache__" not in path.parts]
+
+
 @pytest.fixture
 def refused(call, tmp_path):
     """Exit code 2, one sentence, and no new file."""
 
     def run(*words) -> str:
-        before = sorted(tmp_path.rglob("*"))
+        before = there(tmp_path)
         code, out, err = call(*words)
         assert code == 2, err
         assert out == "" and err.startswith("bt-tasksim: ") and err.count("\n") == 1
-        assert sorted(tmp_path.rglob("*")) == before
+        assert there(tmp_path) == before
         return err
 
     return run
