@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from benchmarks.any_tree_tables import NOT_YET
+from benchmarks.taxonomy_table import COLUMNS as SIMULATED
 from bt_tasksim.training.evaluation_outcomes import wilson
 from bt_tasksim.trees.load import scenarios
 
-NOT_YET = "not measured yet"
-COLUMNS = {
-    "panda-sapien": "Panda, SAPIEN",
-    "panda-mujoco": "Panda, MuJoCo",
-    "xarm7_ability-sapien": "Ability hand, SAPIEN",
-    "panda-twin": "Panda, twin over ROS",
-}
+NOT_DRAWN, TWIN = "no_draw", "panda-twin"
+COLUMNS = {**SIMULATED, TWIN: "Panda, twin over ROS"}
 """What results are called behind their scenario, and how a table says it."""
 UNITS = {
     "force": ("force at the wrist", 1.0, "N"),
@@ -21,7 +18,6 @@ UNITS = {
     "overlap": ("overlap", 1e3, "mm"),
 }
 """What is felt: its name, the factor by which it is shown, its unit."""
-NOT_DRAWN, TWIN = "no_draw", "panda-twin"
 CHORES = {
     "chores-panda": "Panda, SAPIEN",
     "chores-panda-mujoco": "Panda, MuJoCo",

@@ -53,6 +53,6 @@ def torque_at_tool(seen: Seen) -> Array:
 
 def longer_than_allowed(duration: float, timeout: float) -> str:
     """What is wrong where something should last longer than it may, both in seconds; else nothing."""
-    if duration < timeout:
+    if duration <= timeout:
         return ""
     return f"its 'timeout' of {timeout:g} s would end it before its {duration:g} s are over: raise that"

@@ -305,13 +305,15 @@ class OnJoint(ConceptModel[JointMemory]):
 
     def beyond_its_way(self, joint: JointModel) -> str:
         """What is wrong with asking it of a part with such a joint, wherever that stands; else nothing."""
+        if joint.turns != self.turns:  # which is refused as such, and has other units
+            return ""
         low, high = joint.limits
         now = np.array([low, (low + high) / 2, high])
         limits = np.tile([low, high], (3, 1))
         if not self._beyond(now, limits).all():
             return ""
         wanted = float(self.wanted(now, limits)[0])
-        return TOO_FAR[joint.turns](object=self.target, wanted=wanted, low=low, high=high).sentence
+        return TOO_FAR[self.turns](object=self.target, wanted=wanted, low=low, high=high).sentence
 
     def _beyond(self, now: Array, limits: Array) -> Array:
         """Boolean ``(N,)``: the part is asked farther than it goes."""

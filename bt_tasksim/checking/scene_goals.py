@@ -63,10 +63,11 @@ def contradictions(world: ActorConfiguration) -> Iterator[str]:
 
 def _excluded(one: Goal, two: Goal, world: ActorConfiguration) -> str:
     """Why two goals cannot both be reached; empty where nothing says so."""
-    first_one, second_one = (relation_named(goal.relation) for goal in (one, two))
-    held = [relation.in_hand for relation in (first_one, second_one)]
-    if one.object == two.object and isinstance(first_one, JointGoal) and isinstance(second_one, JointGoal):
-        return _both_ways((first_one, second_one), (one, two), world)
+    relations = [relation_named(goal.relation) for goal in (one, two)]
+    held = [relation.in_hand for relation in relations]
+    of_parts = [relation for relation in relations if isinstance(relation, JointGoal)]
+    if one.object == two.object and len(of_parts) == 2:
+        return _both_ways(of_parts, (one, two), world)
     if one.object != two.object:
         if all(held):
             return "one hand holds one object"
@@ -90,9 +91,7 @@ def _excluded(one: Goal, two: Goal, world: ActorConfiguration) -> str:
     return ""
 
 
-def _both_ways(
-    relations: tuple[JointGoal, JointGoal], goals: tuple[Goal, Goal], world: ActorConfiguration
-) -> str:
+def _both_ways(relations: Sequence[JointGoal], goals: Sequence[Goal], world: ActorConfiguration) -> str:
     """One part that is to stand in two ways, of which no value of its joint is both."""
     part = next(actor for actor in world.objects if actor.name == goals[0].object)
     joint = part.model().joint

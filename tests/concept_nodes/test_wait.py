@@ -36,6 +36,10 @@ def test_what_could_never_end_well_is_refused(made):
         made()
 
 
+def test_what_lasts_just_as_long_as_it_may_ends_well(toy):
+    assert toy(Wait(0.3, timeout=0.3)).tick(100) == Status.SUCCESS
+
+
 def test_what_is_held_for_longer_than_usual_has_the_time_for_it():
     leaf = Hold("cup", direction=(1, 0, 0), duration=40.0)
     assert leaf.model.patient and leaf.model.planned(None) == 40.0

@@ -4,7 +4,7 @@ import pytest
 
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.checking.tree_parts import check_parts
-from bt_tasksim.concept_nodes import AdjustDrawer, CloseDrawer, Grasp, OpenDrawer, Release, TurnKnob
+from bt_tasksim.concept_nodes import AdjustDrawer, CloseDrawer, Grasp, OpenDoor, OpenDrawer, Release, TurnKnob
 from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
 
@@ -28,6 +28,10 @@ def test_a_drawer_that_is_asked_too_far_is_an_error(leaf):
 )
 def test_what_it_can_do_is_let_alone(leaf):
     assert findings(leaf) == []
+
+
+def test_a_part_that_moves_otherwise_is_not_measured_in_its_units():
+    assert findings(OpenDoor("drawer", angle=1.2)) == []
 
 
 def test_a_knob_of_which_only_some_go_so_far_is_a_warning():
