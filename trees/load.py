@@ -19,10 +19,11 @@ from bt_tasksim.concept.leaf import ConceptNode, ModelLeaf
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.former import advice
+from bt_tasksim.core.named_data import named_data
 from bt_tasksim.core.own_files import code_of
 from bt_tasksim.core.plugins import line_in
 from bt_tasksim.policy.policy import concept_name
-from bt_tasksim.robot.description import load_robot
+from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.scene.scene import Scene, WorldSource
 from bt_tasksim.trees.check import check_tree
 
@@ -301,7 +302,9 @@ def _from_xml(path: Path, robot: str | None, scene: str | None, world: WorldSour
         return TreeSource(path.stem, lambda: load_tree(path), world)
     named = scene or scene_of_tree(path)
     if named is None:
-        fitting = [name for name in scenarios() if _fits(root, _scene(name, robot))]
+        if robot is not None:
+            named_data("robot", robot, RobotDescription)  # an unknown one is said to be that
+        fitting = [name for name in scenarios() if _fits(root, name, robot)]
         if not fitting:
             objects, places = names_in(root)
             raise NoSceneError(
@@ -320,9 +323,10 @@ def _from_xml(path: Path, robot: str | None, scene: str | None, world: WorldSour
     return TreeSource(path.stem, lambda: load_tree(path), _scene(named, robot))
 
 
-def _fits(root: Behaviour, scene: Scene) -> bool:
+def _fits(root: Behaviour, scenario: str, robot: str | None) -> bool:
+    """A scenario has what a tree names; not so one that asks the robot for more than is installed here."""
     try:
-        check_names(root, scene)
+        check_names(root, _scene(scenario, robot))
     except InputError:
         return False
     return True

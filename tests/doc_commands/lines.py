@@ -110,6 +110,8 @@ def only_parsed(line: str) -> bool:
 def overridden(words: list[str], quick: str) -> list[str]:
     """Words with some options replaced."""
     options = {option.split()[0] for option in re.findall(r"--[\w-]+", quick)}
+    if "--seed" in options:
+        options.add("--block")  # either names the draws
     kept: list[str] = []
     dropping = False
     for word in words:
