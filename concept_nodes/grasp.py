@@ -25,6 +25,7 @@ from bt_tasksim.concept_nodes.grasp_candidates import candidates, narrowest_grip
 from bt_tasksim.concept_nodes.grasp_choice import GENTLE, Choice, Chooser, rooms
 from bt_tasksim.concept_nodes.grasp_features import ALONG, CLOSE
 from bt_tasksim.concept_nodes.grasp_firmness import SLANTED
+from bt_tasksim.concept_nodes.grasp_landing import reaches_palm
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.concept_nodes.grasp_pose import (
     grasp_pose,
@@ -277,6 +278,9 @@ class Grasp(ConceptModel[GraspMemory]):
             settled=xp.astype(nothing, xp.int64),
             preshape=closure,
             tight=tight > 0.5,
+            lands=reaches_palm(
+                half_extent(seen.object(self.target), seen.model(self.target), approach), seen.robot.depth
+            ),
             touched=xp.zeros_like(xp.astype(seen.contacts, goal.dtype)),
             first=nothing,
             estimate=estimate,

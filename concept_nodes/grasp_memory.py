@@ -27,6 +27,7 @@ class GraspMemory(NamedTuple):
         settled: Ticks in a row with opposing contacts and a still hand.
         preshape: Closure at which the hand comes.
         tight: Boolean ``(N,)``: the hand feels its way, see `grasp_choice.Choice.tight`.
+        lands: Boolean ``(N,)``: the palm comes close to the object's top, see `grasp_landing`.
         touched: Which fingertips ``(N, n_tips)`` have touched anything since the approach began, 0 or 1.
         first: How far before the grasp pose the tool was at the first contact, metres; 0 without one.
         estimate: What the estimate says ``(N, 5)``: height of the grasp pose and of the object's centre
@@ -50,6 +51,7 @@ class GraspMemory(NamedTuple):
     settled: Array
     preshape: Array
     tight: Array
+    lands: Array
     touched: Array
     first: Array
     estimate: Array

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
-
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import grasp_features
-from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, CAREFUL, EAGER, HASTE, SCALE
+from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, HASTE, SCALE
+from bt_tasksim.concept_nodes.grasp_landing import STANDS, Landing, advance, landing, paced
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
 from bt_tasksim.concept_nodes.limits import gentler
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.planning.hand_collision import beyond
-from bt_tasksim.planning.reference_motion import position
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.robot.kinematics.hand import standing_side, tips_in_tool
 
@@ -29,8 +27,6 @@ BOUNCING = 0.0015
 """Metres by which a hand of which a finger has touched something is held up: it waits."""
 SURELY_ABOVE = 0.008
 """The same above an object's top, for the ends of a jaw that swings: they go far down beside what is tall."""
-SLOWEST = 0.05
-"""The least share of the reference motion's own speed at which it does so."""
 YIELDS = 15.0
 """Newtons against the approach from which on a hand gives way: a finger that stands on something as it comes,
 or a jaw that swings and presses what it closes on against its support."""
@@ -53,46 +49,47 @@ def motion(seen: Seen, memory: GraspMemory, target: str) -> Array:
         memory: What the grasp remembers.
         target: The object.
     """
-    xp = array_namespace(memory.middle)
-    still = yielding(seen, memory)
-    usual = xp.concat([still, xp.full_like(still[..., :1], HASTE)], axis=-1)
+    xp, palm = array_namespace(memory.middle), landing(seen, memory)
+    still = yielding(seen, memory, palm)
+    pace = xp.where(palm.near, palm.pace, xp.full_like(palm.pace, HASTE))
+    usual = xp.concat([still, pace[:, None]], axis=-1)
     if not bool(xp.any(memory.tight)):
         return usual
-    return xp.where(memory.tight[:, None], feeling(seen, memory, target), usual)
+    return xp.where(memory.tight[:, None], feeling(seen, memory, target, palm), usual)
 
 
-def yielding(seen: Seen, memory: GraspMemory) -> Array:
+def yielding(seen: Seen, memory: GraspMemory, palm: Landing) -> Array:
     """Offsets ``(N, 5)`` asked for by a hand that gives way where it touches something, see `YIELDS`."""
     xp = array_namespace(memory.offset)
     push = poses.clip(-seen.wrench[:, 2] / YIELDS - 1.0, 0.0, 1.0)
     begun = seen.elapsed - memory.delay >= memory.begins
     back = xp.where(begun & xp.any(seen.contacts, axis=-1), YIELDING * push, xp.zeros_like(push))
+    back = xp.where(palm.near, xp.maximum(back, palm.back), back)
     gone = memory.offset[:, ALONG] - back
     wanted = gone / SCALE[ALONG] - memory.middle[:, ALONG]
-    asked = xp.where(gone < 0.0, -xp.sqrt(poses.clip(-wanted, 0.0, 1.0)), xp.zeros_like(gone))
+    yields = (gone < 0.0) | (back > 0.0)
+    asked = xp.where(yields, -xp.sqrt(poses.clip(-wanted, 0.0, 1.0)), xp.zeros_like(gone))
     return asked[:, None] * grasp_features.axis(ALONG, asked)
 
 
-def feeling(seen: Seen, memory: GraspMemory, target: str) -> Array:
+def feeling(seen: Seen, memory: GraspMemory, target: str, palm: Landing) -> Array:
     """Actions ``(N, 6)`` of a hand that feels its way, see `programmed_motion`."""
     xp = array_namespace(memory.middle)
     outwards = _way_out(seen, memory)
-    now, period = seen.elapsed - memory.delay, seen.world.control_period
-    ahead = position(memory.path, now + period) - position(memory.path, now)
     near = (poses.norm(seen.tool[:, :3] - memory.goal[:, :3]) < DEEP) | _among(seen, memory, target)
     share = gentler(seen.tool)
     share = xp.where(seen.model(target).jointed, RIGID * share, share)
     most = FEELING * xp.where(near, share, xp.ones_like(share))
-    share = poses.clip(most * period / poses.clip(poses.norm(ahead), 1e-9, math.inf), SLOWEST, 1.0)
-    pace = (share - CAREFUL) / EAGER
-    slower, stands = xp.minimum(pace, xp.zeros_like(pace)), xp.full_like(pace, -CAREFUL / EAGER)
+    pace = paced(poses.norm(advance(seen, memory)), most * seen.world.control_period)
+    pace = xp.where(palm.near, xp.minimum(pace, palm.pace), pace)
+    slower, stands = xp.minimum(pace, xp.zeros_like(pace)), xp.full_like(pace, STANDS)
     pace = xp.where(xp.any(seen.contacts, axis=-1), slower, pace)
     # A finger that stands on an edge bounces: it must not be pressed down while it does not touch.
     held_up = poses.localise(memory.target, seen.tool[:, :3])[:, 2] < -BOUNCING
     comes_down = (memory.closing < 0.0) & xp.any(memory.touched > 0.0, axis=-1)
     pace = xp.where(held_up & comes_down, stands, pace)
     aside = SEARCHING * outwards[:, None] * grasp_features.axis(ACROSS, outwards)
-    return xp.concat([aside + yielding(seen, memory), pace[:, None]], axis=-1)
+    return xp.concat([aside + yielding(seen, memory, palm), pace[:, None]], axis=-1)
 
 
 def _way_out(seen: Seen, memory: GraspMemory) -> Array:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept_nodes import AdjustDoor, Grasp, Release
-from bt_tasksim.scene import FixtureSpec, Goal, Scene
+from bt_tasksim.scene import Goal, Scene
 from bt_tasksim.trees import sequence
+from bt_tasksim.trees.scenarios.close_door import open_door
 
 
 def scene(robot: str = "panda") -> Scene:
     """A cabinet with a door that is half open; its sizes, place, handle and friction are drawn."""
-    stands = {"value": (0.3, 1.2), "x": (0.66, 0.72), "heading": (-0.2, 0.2)}
     return Scene(
         robot,
-        fixtures=[FixtureSpec("door", parameters=stands)],
+        fixtures=[open_door(robot, value=(0.3, 1.2))],
         goal=Goal("door", relation="set", value=0.8, angle_tolerance=0.06),
         name="adjust_door",
     )

@@ -14,17 +14,29 @@ FAR = 0.36
 """Metres before its base at which a hand may rest and be clear of the door where that usually stands."""
 
 
-def scene(robot: str = "panda") -> Scene:
-    """A cabinet with a door that is open; its sizes, place, handle and friction are drawn.
+WIDE = 0.9
+"""Radians beyond which a door does not stand open before a hand that rests farther out."""
 
-    It stands farther off where the robot's hand rests far out.
+
+def open_door(robot: str, value: tuple[float, float]) -> FixtureSpec:
+    """A door that stands open, farther off and no wider than `WIDE` where the robot's hand rests far out.
+
+    Args:
+        robot: The robot that is to close or adjust it.
+        value: Between which angles it is drawn, radians.
     """
     made = load_robot(robot)
     farther = max(0.0, float(arm_of(made).tool(made.rest)[0]) - FAR)
-    stands = {"value": (0.5, 1.1), "x": (0.66 + farther, 0.72 + farther), "heading": (-0.2, 0.2)}
+    drawn = (value[0], min(value[1], WIDE)) if farther else value
+    stands = {"value": drawn, "x": (0.66 + farther, 0.72 + farther), "heading": (-0.2, 0.2)}
+    return FixtureSpec("door", parameters=stands)
+
+
+def scene(robot: str = "panda") -> Scene:
+    """A cabinet with a door that is open; its sizes, place, handle and friction are drawn."""
     return Scene(
         robot,
-        fixtures=[FixtureSpec("door", parameters=stands)],
+        fixtures=[open_door(robot, value=(0.5, 1.1))],
         goal=Goal("door", relation="shut"),
         name="close_door",
     )
