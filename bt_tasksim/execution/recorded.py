@@ -81,6 +81,8 @@ class Recorded:
         versions: Versions by name, and policies by leaf.
         tree: Its tree as XML; empty where XML cannot hold it.
         policies: For each concept, the number of its node and what it named to get its policy.
+        success: Whether it says that it succeeded; None where it does not say it.
+        reason: Why not, by name; empty where it does not say it.
     """
 
     demonstration: Demonstration
@@ -91,6 +93,8 @@ class Recorded:
     versions: Mapping[str, str]
     tree: str
     policies: Sequence[tuple[int, str]]
+    success: bool | None
+    reason: str
 
 
 def recorded_run(demonstration: Demonstration, given: Given, where: str) -> Recorded:
@@ -128,6 +132,8 @@ def recorded_run(demonstration: Demonstration, given: Given, where: str) -> Reco
         versions=versions,
         tree=texts["tree"],
         policies=_policies(demonstration, where),
+        success=from_plain(bool, about["success"], f"{where}: success") if "success" in about else None,
+        reason=from_plain(str, about.get("reason", ""), f"{where}: reason"),
     )
 
 

@@ -14,7 +14,7 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.demos_decomp.log import Demonstration
 from bt_tasksim.demos_decomp.log_file import read_log
-from bt_tasksim.execution.recorded import Given, comparable, recorded_run, take_policies
+from bt_tasksim.execution.recorded import Given, Recorded, comparable, recorded_run, take_policies
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.run_log import RunRecorder, versions
 from bt_tasksim.execution.runner import Runner
@@ -41,7 +41,7 @@ class ReplayResult:
     """How a run and its repetition compare.
 
     Attributes:
-        identical: Every compared number is the same, bit for bit.
+        identical: Every compared number is the same, bit for bit, and so is what was said of the run.
         why: One sentence.
         time: Seconds at which the first difference was seen; None where there is none.
         differences: Largest difference by compared array, where there is one; infinity where one has a number
@@ -116,7 +116,7 @@ def replay(
         for name in sorted({*before, *now})
         if before.get(name) != now.get(name)
     }
-    return _compared(recorded.demonstration, compared, repeated, result, changed, until)
+    return _compared(recorded, compared, repeated, result, changed, until)
 
 
 def _tree(text: str, given: Given, where: str) -> Behaviour:
@@ -128,16 +128,17 @@ def _tree(text: str, given: Given, where: str) -> Behaviour:
 
 
 def _compared(
-    recorded: Demonstration,
+    run: Recorded,
     compared: Mapping[str, NDArray[Any]],
     repeated: Demonstration,
     result: Result,
     changed: dict[str, tuple[str, str]],
     until: float | None,
 ) -> ReplayResult:
-    lengths = [len(run.time) for run in (recorded, repeated)]
+    recorded = run.demonstration
+    lengths = [len(one.time) for one in (recorded, repeated)]
     if until is not None:  # what comes after it, and how it is judged there, is the shorter run's own
-        lengths = [int(np.searchsorted(run.time, until)) for run in (recorded, repeated)]
+        lengths = [int(np.searchsorted(one.time, until)) for one in (recorded, repeated)]
     count = min(lengths)
     first, differences = count, {}
     for name in COMPARED:
@@ -151,6 +152,9 @@ def _compared(
             first = min(first, int(np.argmax(gap > 0)))
             differences[name] = float(gap.max())
     same_length = lengths[0] == lengths[1]
+    if not differences and same_length and until is None and (judged := _judged_otherwise(run, result)):
+        why = f"the same states over {count} ticks, and yet {judged}"
+        return ReplayResult(False, why, float(recorded.time[-1]), {}, changed, result)
     if not differences and same_length:
         said = result.why if until is None else f"the first {until:g} s"
         why = f"identical bit for bit over {count} ticks: {said}"
@@ -171,6 +175,15 @@ def _compared(
         changed,
         result,
     )
+
+
+def _judged_otherwise(run: Recorded, result: Result) -> str:
+    """In words, where a log says something else of its run than is said of the repetition; else nothing."""
+    said = ("fails" if run.success is False else "succeeds") + (f" ({run.reason})" if run.reason else "")
+    same = run.success in (None, result.success) and run.reason in ("", result.reason)
+    if same or not result.judged:  # a goal that is a function is not in a log
+        return ""
+    return f"the log says that it {said}, and it is judged now: {result.why}"
 
 
 def _gap(a: NDArray[Any], b: NDArray[Any], count: int) -> NDArray[np.float64]:

@@ -75,6 +75,17 @@ def test_the_first_seconds_alone(folder, tampered):
         replay(folder, until=0.0)
 
 
+@pytest.mark.parametrize("changes", [{"success": False}, {"success": False, "reason": "dropped"}])
+def test_a_run_that_is_said_to_have_ended_otherwise_is_not_the_same(folder, tampered, changes):
+    text = read_text(read_log(folder / "run.h5").demonstrations[0].extra["run/about"])
+    about = {**json.loads(text), **changes}
+    found = replay(tampered(**{"run/about": json.dumps(about)}))
+    assert not found.identical and found.differences == {} and found.result.success
+    said = f"fails ({changes['reason']})" if "reason" in changes else "fails"
+    assert f"the log says that it {said}, and it is judged now: " in found.why
+    assert replay(folder, until=1.5).identical, "how a run ends is no matter of its first seconds"
+
+
 def test_another_version_is_named(folder, tampered):
     extra = read_log(folder / "run.h5").demonstrations[0].extra
     about = json.loads(read_text(extra["run/about"]))
