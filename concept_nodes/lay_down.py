@@ -37,7 +37,7 @@ class LayDown(Tipping):
     target: ObjectName
     towards: Direction | None = None
     press: Newtons = 3.0
-    speed: MetresPerSecond = 0.15
+    speed: MetresPerSecond = 0.05
     force_limit: Newtons = FORCE_LIMIT
 
     establishes = (ConditionOf("Lying", target="target"),)
