@@ -76,19 +76,19 @@ def without_nearing(world: World, bodies: Sequence[physx.PhysxRigidBaseComponent
 
     Args:
         world: The world.
-        bodies: The two, at least one of them an object. What is none goes on as it does.
+        bodies: The two. What is no object of its own goes on as it does: furniture, and its parts on joints.
         met: Where they meet.
     """
     nearing, mobility, loose = 0.0, 0.0, []
     for body, sign in zip(bodies, (1.0, -1.0), strict=True):
         nearing += sign * float(_velocity_at(body, met.place) @ met.normal)
         kind, k = world.bodies.get(body, ("", -1))
-        if kind == "object":
+        if kind == "object" and hasattr(body, "set_linear_velocity"):  # a link of an articulation has none
             turning = np.cross(met.place - _centre(body), met.normal)
             spin = _inverse_inertia(world, k) @ turning
             mobility += 1.0 / body.mass + float(turning @ spin)
             loose.append((body, sign, spin))
-    if nearing <= 0.0:
+    if nearing <= 0.0 or not loose:
         return
     impulse = nearing / mobility
     for body, sign, spin in loose:

@@ -32,6 +32,13 @@ class Body:
         return self.linear_velocity + np.cross(self.angular_velocity, np.asarray(place) - np.asarray(at))
 
 
+class Link(Body):
+    """A part of furniture on a joint: nobody but its articulation sets how it moves."""
+
+    set_linear_velocity = property(lambda self: getattr(self, "nothing"))
+    set_angular_velocity = set_linear_velocity
+
+
 def meeting(monkeypatch, second, met):
     """A world in which a body that falls meets a second one so, and how often somebody has looked."""
     first, asked = Body((0.0, 0.0, 0.0), (0.1, 0.0, -0.5)), []
@@ -71,6 +78,22 @@ def test_of_two_that_move_momentum_stays(monkeypatch):
     assert MASS * (first.linear_velocity + second.linear_velocity) == pytest.approx(before)
     apart = first.velocity_at((0, 0, 0), PLACE) - second.velocity_at((0, 0, -0.06), PLACE)
     assert apart @ DOWN == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_part_of_furniture_goes_on_as_it_does(monkeypatch):
+    link = Link((0.0, 0.0, -0.06), (0.0, 0.0, 0.2))
+    first, sinking, _ = meeting(monkeypatch, link, DeepestPlace(2 * SUNK, PLACE, DOWN))
+    sinking.stop(0.0)
+    assert link.linear_velocity.tolist() == [0.0, 0.0, 0.2] and not link.angular_velocity.any()
+    assert first.velocity_at((0, 0, 0), PLACE) @ DOWN == pytest.approx(-0.2, abs=1e-12), "it goes along"
+
+
+def test_of_two_parts_of_furniture_none_is_stopped(monkeypatch):
+    one = Link((0.0, 0.0, 0.0), (0.0, 0.0, -0.5))
+    two = Link((0.0, 0.0, -0.06), (0.0, 0.0, 0.2))
+    world = SimpleNamespace(bodies={one: ("object", 0), two: ("object", 1)})
+    sapien_sinking.without_nearing(world, (one, two), DeepestPlace(2 * SUNK, PLACE, DOWN))
+    assert one.linear_velocity.tolist() == [0.0, 0.0, -0.5]
 
 
 @pytest.mark.parametrize(("depth", "normal"), [(SUNK / 2, DOWN), (2 * SUNK, -DOWN)])
