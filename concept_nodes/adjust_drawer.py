@@ -9,7 +9,8 @@ from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.parameters import Metres, MetresPerSecond, Newtons, ObjectName
 from bt_tasksim.concept.presentation import Presentation
-from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT
+from bt_tasksim.concept_nodes.on_joint import OnJoint
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
@@ -22,15 +23,13 @@ class AdjustDrawer(OnJoint):
         target: The drawer.
         distance: How far it is open in the end, from its value 0.
         speed: Peak speed of the tool.
-        press: Force against the motion by which a stop is felt.
         force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
     distance: Metres
     speed: MetresPerSecond = 0.15
-    press: Newtons = 12.0
-    force_limit: Newtons = FORCE_LIMIT
+    force_limit: Newtons = PART_FORCE_LIMIT
 
     establishes = (ConditionOf("JointAt", target="target", at="distance"),)
     requires = (ConditionOf("Slides", target="target"),)
@@ -44,7 +43,7 @@ class AdjustDrawer(OnJoint):
     @classmethod
     def describe_task(cls, parameters: Mapping[str, Any]) -> str:
         """How far."""
-        return f"by {float(parameters['distance']):.2f} m" if "distance" in parameters else ""
+        return f"to {float(parameters['distance']):.2f} m" if "distance" in parameters else ""
 
     def wanted(self, now: Array, limits: Array) -> Array:
         """See `OnJoint.wanted`."""

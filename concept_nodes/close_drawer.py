@@ -9,13 +9,14 @@ from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName
 from bt_tasksim.concept.presentation import Presentation
-from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT
+from bt_tasksim.concept_nodes.to_stop import ToStop
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
 
 @register("concept")
-class CloseDrawer(OnJoint):
+class CloseDrawer(ToStop):
     """Push a drawer, or anything that slides, onto its stop by the handle in the hand (PR to OP).
 
     Args:
@@ -28,7 +29,7 @@ class CloseDrawer(OnJoint):
     target: ObjectName
     speed: MetresPerSecond = 0.15
     press: Newtons = 12.0
-    force_limit: Newtons = FORCE_LIMIT
+    force_limit: Newtons = PART_FORCE_LIMIT
 
     establishes = (ConditionOf("IsShut", target="target"),)
     requires = (ConditionOf("Slides", target="target"),)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept_nodes.close_door import CloseDoor
-from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT
+from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT
 from bt_tasksim.core.registry import register
 
 
@@ -25,7 +25,7 @@ class CloseLid(CloseDoor):
     target: ObjectName
     speed: MetresPerSecond = 0.15
     press: Newtons = 12.0
-    force_limit: Newtons = FORCE_LIMIT
+    force_limit: Newtons = PART_FORCE_LIMIT
 
     presentation = Presentation(
         colour="#3f6f2f",

@@ -16,7 +16,7 @@ from bt_tasksim.concept_nodes.holding import NOT_HELD, off_handle
 from bt_tasksim.concept_nodes.joint_conditions import value_of
 from bt_tasksim.concept_nodes.joint_force import arm_of, force_against, lever_of
 from bt_tasksim.concept_nodes.joint_values import nearer_stop
-from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
+from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT
 from bt_tasksim.concept_nodes.pressing import Pressing
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Possible, register_reason
@@ -83,7 +83,7 @@ class HoldTurned(Pressing[HoldTurnedMemory]):
     duration: Seconds = 2.0
     least: Newtons = 4.0
     most: Newtons = 20.0
-    force_limit: Newtons = FORCE_LIMIT
+    force_limit: Newtons = PART_FORCE_LIMIT
 
     contact = ContactChange(ContactState.FT, ContactState.FT, "rotation")
     presentation = Presentation(

@@ -13,6 +13,8 @@ FAR = 0.5
 see `gentler`."""
 FORCE_LIMIT = 60.0
 """N at the wrist: well above what carrying and placing take, well below what breaks a cup or a finger."""
+PART_FORCE_LIMIT = 50.0
+"""The same for parts of furniture: what a stiff drawer takes, and well below what tears a handle off."""
 WRIST_STRAINED = register_reason(
     "wrist_strained", "force at the wrist is {value:.3g}, above {limit:.3g}", value=NEWTONS, limit=NEWTONS
 )

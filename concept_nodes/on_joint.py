@@ -17,7 +17,6 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING, VERY_CLOSE, with_room
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
 from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
-from bt_tasksim.concept_nodes.joint_force import force_against
 from bt_tasksim.concept_nodes.joint_way import JointWay, gone_anyhow, keeps_clear, pivots
 from bt_tasksim.concept_nodes.limits import force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
@@ -29,7 +28,7 @@ from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.transfer import fetched
 from bt_tasksim.core.units import METRES, NEWTONS, RADIANS, Unit
 from bt_tasksim.core.world import Command
-from bt_tasksim.planning.reference_motion import Path, at_times, plan, position, searched_for
+from bt_tasksim.planning.reference_motion import Path, at_times, plan, searched_for
 from bt_tasksim.planning.route import Pace, Route, followed
 from bt_tasksim.planning.routes import SAMPLES, with_routes
 from bt_tasksim.planning.ways import WayFinder
@@ -72,27 +71,14 @@ TOO_FAR = _by_kind(
     *("wanted", "low", "high"),
 )
 STANDS = {turns: _form(turns) for turns in UNITS}
-FORCE_LIMIT = 50.0
-"""N at the wrist: what a stiff drawer takes, and well below what tears a handle off."""
 SOFT, HARD = 0.5, 0.9
 """Shares of the force limit between which the hand goes slower and slower, until it stands."""
-NEAR = {False: 0.015, True: math.radians(4.0)}
-"""Metres or radians from its stop within which a part that is felt to be stopped is at it."""
 BEYOND = {False: 0.008, True: math.radians(2.5)}
 """Metres or radians beyond the stop to which the hand goes unless it feels it before."""
 BEHIND = {False: 0.04, True: math.radians(10.0)}
 """Metres or radians by which a part may be behind the hand."""
 PATIENCE, LATE = 1.0, 2.5
 """Seconds for which it may be farther behind, and after the way's end until which it may come there."""
-SLOWLY = 0.016
-"""Metres of the hand's way before a stop from which on it goes no faster than `GENTLY`."""
-GENTLY = 0.008
-"""Metres per second: what meets its stop in the hand of a stiff arm presses with up to 20 N more with every
-half millimetre that this goes on."""
-BRAKES = 0.1
-"""m/s^2 by which it comes to go so slowly."""
-FELT, FIRMLY = 2, 1.5
-"""Ticks in a row for which a stop must be felt, and how many times `press` are felt at once."""
 ROUND = 0.01
 """Metres from the axis within which a hand turns about itself rather than that it goes somewhere."""
 YIELDS, UNFELT, MOST = 3e-5, 3.0, 0.012
@@ -109,6 +95,8 @@ FURTHER = {False: 0.03, True: math.radians(20.0)}
 """Metres or radians by which it does so at most."""
 TOLERANCE = {False: 0.004, True: math.radians(1.5)}
 """Metres or radians within which a value counts as reached."""
+ALLOWED = {False: 0.02, True: math.radians(8.0)}
+"""Metres or radians from the wanted value that are tolerable."""
 ACCELERATION = 0.4
 """Peak acceleration of the tool, m/s^2."""
 TURN = 0.5
@@ -135,7 +123,7 @@ class JointMemory(NamedTuple):
         progress: Seconds ``(N,)`` of the path that have been commanded.
         felt: Ticks ``(N,)`` in a row with the stop's force.
         behind: Seconds ``(N,)`` in a row for which the part was far behind the hand.
-        late: Seconds ``(N,)`` since the path's end.
+        late: Seconds ``(N,)`` since the path's end, or for which force has held the hand up before it.
     """
 
     path: Path
@@ -157,7 +145,6 @@ class OnJoint(ConceptModel[JointMemory]):
 
     target: ObjectName
     speed: MetresPerSecond
-    press: Newtons
     force_limit: Newtons
 
     turns: ClassVar[bool] = False
@@ -347,7 +334,7 @@ class OnJoint(ConceptModel[JointMemory]):
         share = self._share(seen, memory)
         progress = memory.progress + period * share
         far = abs(self._asked(seen, memory) - now) > BEHIND[self.turns]
-        at_end = (memory.late > 0.0) & (share > 0.0)
+        at_end = (memory.late > 0.0) & (share > 0.0) & (memory.progress >= memory.path.duration)
         short = (memory.goal - now) * PUSHES * period
         further = memory.further + xp.where(at_end, short, xp.zeros_like(short))
         over = (progress >= memory.path.duration) | (share <= 0.0)
@@ -361,18 +348,9 @@ class OnJoint(ConceptModel[JointMemory]):
         )
 
     def _share(self, seen: Seen, memory: JointMemory) -> Array:
-        """Share ``(N,)`` of the path's own speed: less where the wrist feels force, and near a stop."""
-        xp, period = array_namespace(seen.tool), seen.world.control_period
-        share = poses.clip((HARD - force_at_wrist(seen) / self.force_limit) / (HARD - SOFT), 0.0, 1.0)
-        if not self.stops:
-            return share
-        here, next_one = (position(memory.path, memory.progress + dt) for dt in (0.0, period))
-        ahead = poses.clip(poses.norm(next_one - here), 1e-9, math.inf)
-        end = poses.multiply(self._law(seen).pose(memory.goal), poses.inverse(memory.grip))
-        left = poses.clip(poses.norm(end[:, :3] - here) - SLOWLY, 0.0, math.inf)
-        most = xp.sqrt(GENTLY**2 + 2.0 * BRAKES * left)
-        share = xp.minimum(share, poses.clip(most * period / ahead, 0.0, 1.0))
-        return xp.where(memory.felt > 0, xp.zeros_like(share), share)
+        """Share ``(N,)`` of the path's own speed: less where the wrist feels force."""
+        strained = force_at_wrist(seen) / self.force_limit
+        return poses.clip((HARD - strained) / (HARD - SOFT), 0.0, 1.0)
 
     def _given_way(self, seen: Seen, memory: JointMemory) -> Array:
         """Metres ``(N, 3)`` by which the hand has given way aside then, as what presses it asks."""
@@ -386,14 +364,8 @@ class OnJoint(ConceptModel[JointMemory]):
         return offset * poses.clip(MOST / poses.clip(poses.norm(offset), 1e-9, math.inf), 0.0, 1.0)[:, None]
 
     def _felt(self, seen: Seen, memory: JointMemory) -> Array:
-        """Ticks ``(N,)`` in a row for which the stop is felt, with this one; a firm one is enough."""
-        xp, nothing = array_namespace(seen.tool), 0 * memory.felt
-        if not self.stops:
-            return nothing
-        against = force_against(seen, self.target, self._ahead(seen, memory))
-        at_stop = abs(self._value(seen) - memory.goal) < NEAR[self.turns]
-        ticks = xp.where(against > FIRMLY * self.press, nothing + FELT, nothing + 1)
-        return xp.where(at_stop & (against > self.press), memory.felt + ticks, nothing)
+        """Ticks ``(N,)`` in a row for which a stop is felt, with this one: only some tasks go by that."""
+        return 0 * memory.felt
 
     def command(self, action: Array, seen: Seen, memory: JointMemory) -> Command:
         """Follow the path, aside of it where the hand gives way, and on beyond its end; it keeps its grip."""
@@ -408,7 +380,7 @@ class OnJoint(ConceptModel[JointMemory]):
         return poses.shifted(poses.multiply(on, tool), memory.offset), arm
 
     def _asked(self, seen: Seen, memory: JointMemory) -> Array:
-        """The value ``(N,)`` that the hand asks for now."""
+        """The value ``(N,)`` that the hand asks for now on its path."""
         tool, _ = at_times(memory.path, memory.progress)
         law, xp = self._law(seen), array_namespace(seen.tool)
         held = law.value(poses.multiply(tool, memory.grip))
@@ -431,10 +403,9 @@ class OnJoint(ConceptModel[JointMemory]):
         )
 
     def done(self, seen: Seen, memory: JointMemory) -> Array:
-        """The value is reached and the hand at rest, or the stop is felt."""
+        """The hand has come to the end of its way, and the part to its value."""
         off = abs(self._value(seen) - memory.goal)
-        arrived = (memory.progress >= memory.path.duration) & (off <= TOLERANCE[self.turns])
-        return arrived | (self._felt(seen, memory) >= FELT)
+        return (memory.progress >= memory.path.duration) & (off <= TOLERANCE[self.turns])
 
     def maintained(self, goal: str, seen: Seen, memory: JointMemory) -> Array:
         """The handle may still be in the hand."""
@@ -455,7 +426,3 @@ class OnJoint(ConceptModel[JointMemory]):
         return STANDS[self.turns](
             object=self.target, value=self._value(seen), wanted=memory.goal, force=force_at_wrist(seen)
         )
-
-
-ALLOWED = {False: 0.02, True: math.radians(8.0)}
-"""Metres or radians from the wanted value that are tolerable."""

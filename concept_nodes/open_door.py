@@ -10,7 +10,8 @@ from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, Radians
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept_nodes.joint_values import open_by
-from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT
+from bt_tasksim.concept_nodes.on_joint import OnJoint
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
@@ -23,15 +24,13 @@ class OpenDoor(OnJoint):
         target: The door.
         angle: How far it is open in the end, from its value 0; by default all the way.
         speed: Peak speed of the tool.
-        press: Force against the motion by which a stop is felt.
         force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
     angle: Radians | None = None
     speed: MetresPerSecond = 0.15
-    press: Newtons = 12.0
-    force_limit: Newtons = FORCE_LIMIT
+    force_limit: Newtons = PART_FORCE_LIMIT
 
     turns = True
     establishes = (
@@ -49,7 +48,7 @@ class OpenDoor(OnJoint):
     @classmethod
     def describe_task(cls, parameters: Mapping[str, Any]) -> str:
         """How far."""
-        return f"by {float(parameters['angle']):.2f} rad" if "angle" in parameters else ""
+        return f"to {float(parameters['angle']):.2f} rad" if "angle" in parameters else ""
 
     @property
     def wholly(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, Radians
 from bt_tasksim.concept.presentation import Presentation
-from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT
+from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT
 from bt_tasksim.concept_nodes.open_door import OpenDoor
 from bt_tasksim.core.registry import register
 
@@ -18,15 +18,13 @@ class OpenLid(OpenDoor):
         angle: How far it is open in the end, from its value 0; by default all the way. What is open by
             less than upright falls shut when it is let go.
         speed: Peak speed of the tool.
-        press: Force against the motion by which a stop is felt.
         force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
     angle: Radians | None = None
     speed: MetresPerSecond = 0.15
-    press: Newtons = 12.0
-    force_limit: Newtons = FORCE_LIMIT
+    force_limit: Newtons = PART_FORCE_LIMIT
 
     presentation = Presentation(
         colour="#5f8f4f",

@@ -17,7 +17,7 @@ from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.closer import CLOSER, TOUCHING, with_room
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
-from bt_tasksim.concept_nodes.limits import force_at_tool, force_at_wrist, strain
+from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT, force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
@@ -118,7 +118,7 @@ class PressButton(ConceptModel[PressMemory]):
     press: Newtons = 14.0
     standoff: Metres = 0.06
     speed: MetresPerSecond = 0.4
-    force_limit: Newtons = 50.0
+    force_limit: Newtons = PART_FORCE_LIMIT
 
     contact = ContactChange(ContactState.PR, ContactState.OP)
     presentation = Presentation(

@@ -10,7 +10,8 @@ from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName, Radians
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept_nodes.joint_values import nearer_stop
-from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT
+from bt_tasksim.concept_nodes.on_joint import OnJoint
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
@@ -23,15 +24,13 @@ class TurnOffStop(OnJoint):
         target: The lever.
         angle: How far it is from that stop in the end.
         speed: Peak speed of the tool.
-        press: Force against the motion by which a stop is felt.
         force_limit: Force at the wrist at which the task is broken off.
     """
 
     target: ObjectName
     angle: Radians
     speed: MetresPerSecond = 0.15
-    press: Newtons = 12.0
-    force_limit: Newtons = FORCE_LIMIT
+    force_limit: Newtons = PART_FORCE_LIMIT
 
     turns = True
     establishes = (ConditionOf("OffStop", target="target"),)

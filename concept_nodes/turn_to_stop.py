@@ -9,13 +9,14 @@ from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
 from bt_tasksim.concept.parameters import Flag, MetresPerSecond, Newtons, ObjectName
 from bt_tasksim.concept.presentation import Presentation
-from bt_tasksim.concept_nodes.on_joint import FORCE_LIMIT, OnJoint
+from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT
+from bt_tasksim.concept_nodes.to_stop import ToStop
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 
 
 @register("concept")
-class TurnToStop(OnJoint):
+class TurnToStop(ToStop):
     """Turn a lever, or whatever turns between stops, until the wrist feels its stop (TR to OT, rotation).
 
     Args:
@@ -30,7 +31,7 @@ class TurnToStop(OnJoint):
     back: Flag = False
     speed: MetresPerSecond = 0.15
     press: Newtons = 12.0
-    force_limit: Newtons = FORCE_LIMIT
+    force_limit: Newtons = PART_FORCE_LIMIT
 
     turns = True
     establishes = (

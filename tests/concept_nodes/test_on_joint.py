@@ -21,6 +21,7 @@ from bt_tasksim.concept_nodes.limits import WRIST_STRAINED
 from bt_tasksim.concept_nodes.on_joint import FURTHER, JAMMED, NOT_THERE, TOO_FAR, JointMemory
 from bt_tasksim.concept_nodes.press_button import AROUND, FIST, LEANS, LEVEL, _fists
 from bt_tasksim.concept_nodes.press_button import JAMMED as BUTTON_JAMS
+from bt_tasksim.concept_nodes.to_stop import GENTLY
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import GOAL_LOST, NO_WAY
 from bt_tasksim.core.resources import asset
@@ -28,7 +29,7 @@ from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.planning.bodies import bodies_of
 from bt_tasksim.planning.hand_collision import hand_pieces
-from bt_tasksim.planning.reference_motion import plan
+from bt_tasksim.planning.reference_motion import plan, position
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene
 from bt_tasksim.trees import same_tree, sequence, tidy, tree_from_xml, tree_to_xml
@@ -168,6 +169,40 @@ def test_a_part_that_has_stayed_behind_is_taken_on_beyond_the_end_of_the_way():
         ends.append(float(np.linalg.norm(pulls.command(None, seen, memory).tool[0, :3] - seen.tool[0, :3])))
     assert max(ends[:2]) < 0.011 and ends[-1] == pytest.approx(0.01 + FURTHER[False], abs=1e-3)
     assert (np.diff(ends) > -1e-9).all()
+
+
+def test_a_hand_that_was_held_up_on_its_way_goes_on_from_there():
+    """One control period of force is no end of the way: no step is longer than its speed."""
+    pulls = OpenDrawer.value(target="drawer", distance=0.2)
+    seen, remembered = hand_on_the_drawer(0.0)
+    strained, _ = hand_on_the_drawer(-0.92 * pulls.force_limit)
+    memory = remembered(np.array([0.2]))
+    tools = []
+    for tick in range(25):
+        at = strained if tick == 10 else seen
+        memory = pulls.advance(None, at, memory)
+        tools.append(pulls._led(at, memory)[0][0, :3])
+    steps = np.linalg.norm(np.diff(tools, axis=0), axis=1)
+    assert steps.max() <= pulls.speed * seen.world.control_period and not memory.further.any()
+    assert steps[9] == 0.0 < steps[10], "it stood still meanwhile"
+
+
+def test_beyond_a_stop_that_is_not_felt_the_hand_goes_no_faster():
+    shuts, (seen, remembered) = CloseDrawer.value(target="drawer"), hand_on_the_drawer(0.0)
+    law, memory = seen.model("drawer").joints, remembered(np.zeros(1))
+    grip = poses.inverse(memory.grip)
+    way = [poses.multiply(law.pose(np.array([value])), grip) for value in (0.1, -0.06)]
+    memory = memory._replace(path=plan(way, 0.15))
+    inwards = (way[1] - way[0])[0, :3] / 0.16
+    stop, period, speeds = (way[0][0, :3] + 0.1 * inwards), seen.world.control_period, []
+    while float(memory.progress[0]) < float(memory.path.duration[0]) - 0.3:
+        before = position(memory.path, memory.progress)
+        memory = memory._replace(progress=memory.progress + period * shuts._share(seen, memory))
+        here = position(memory.path, memory.progress)
+        speeds.append(((here[0] - stop) @ inwards, float(np.linalg.norm(here - before)) / period))
+    beyond = [speed for depth, speed in speeds if 0.002 < depth < 0.045]
+    assert max(speed for _, speed in speeds) > 5 * GENTLY, "on its way it is faster"
+    assert len(beyond) > 20 and max(beyond) <= GENTLY + 1e-4
 
 
 def test_a_way_that_the_arm_cannot_go_is_refused_before_it_is_begun():

@@ -35,7 +35,7 @@ class Body:
 class Link(Body):
     """A part of furniture on a joint: nobody but its articulation sets how it moves."""
 
-    set_linear_velocity = property(lambda self: getattr(self, "nothing"))
+    set_linear_velocity = property(lambda self: self.nothing)
     set_angular_velocity = set_linear_velocity
 
 
