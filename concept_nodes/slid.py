@@ -286,15 +286,3 @@ class Slid(ConceptModel[SlidMemory]):
 
 ENDED = 3
 """Ticks in a row for which what ends the task has to be so."""
-
-
-def level(direction: tuple[float, float, float], distance: float, like: Array) -> Array:
-    """The displacement ``(3,)`` that goes so far along the level part of a direction, like an array."""
-    flat = np.array([*direction[:2], 0.0])
-    return constant(distance * flat / np.linalg.norm(flat), like)
-
-
-def not_level(direction: tuple[float, float, float] | None) -> str:
-    """Why a direction is none along a level support, as the end of a sentence; empty where it is one."""
-    steep = direction is not None and abs(direction[2]) > 0.1
-    return "'direction' should be level: it is the way along what the object is pressed on" if steep else ""

@@ -22,9 +22,10 @@ from bt_tasksim.concept.parameters import (
 )
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes.level_way import not_level
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.shoved_way import touching_now
-from bt_tasksim.concept_nodes.slid import GOOD, Slid, SlidMemory, not_level
+from bt_tasksim.concept_nodes.slid import GOOD, Slid, SlidMemory
 from bt_tasksim.concept_nodes.stops import CLEAR, gaps, nearest_stop, no_way_named, way_in, ways_in
 from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView

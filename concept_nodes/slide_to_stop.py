@@ -15,9 +15,10 @@ from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes.level_way import not_level
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.shoved_way import free_until
-from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, not_level
+from bt_tasksim.concept_nodes.slid import Slid, SlidMemory
 from bt_tasksim.concept_nodes.standing import supports_of
 from bt_tasksim.concept_nodes.stops import UP, gaps, no_way_named, way_in, ways_in
 from bt_tasksim.concept_nodes.tipping import support_of

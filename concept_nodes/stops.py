@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from bt_tasksim.concept.seen import Seen
+from bt_tasksim.concept_nodes.level_way import flattened
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
@@ -97,8 +98,7 @@ def way_in(
         None where there is neither.
     """
     if direction is not None:
-        flat = np.array([*direction[:2], 0.0])
-        return flat / np.linalg.norm(flat)
+        return flattened(direction)
     found = None if other is None else nearest_stop(view, target, other)
     return None if found is None else found.towards
 
