@@ -20,7 +20,7 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.closer import TOUCHING
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.insertion import hole_of
-from bt_tasksim.concept_nodes.insertion_way import ROWS
+from bt_tasksim.concept_nodes.insertion_way import ROWS, joints_line, yielding
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
@@ -48,8 +48,8 @@ SEEN = 0.005
 """Metres before the mouth, beyond the tolerance, from which on a thing is seen to be out."""
 LEFT = 0.02
 """Metres by which the hand may go farther than what it pulls."""
-YIELDS, MOST = 0.0004, 0.004
-"""Metres a second for each newton from aside with which it yields, and how far at most."""
+STEP = 0.001
+"""Metres that it goes aside in a control period at most."""
 SOFTLY = 0.4
 """Seconds in which it comes to its speed."""
 
@@ -141,9 +141,7 @@ class Extract(ConceptModel[ExtractMemory]):
         full = constant(np.array([way for way, _, _ in found]), like)
         outward = constant(np.array([out for _, out, _ in found]), like)
         nothing = xp.zeros_like(full)
-        table = xp.zeros((len(found), ROWS, 7), dtype=like.dtype, device=like.device) + like[:, None, :]
-        joints = constant(np.array([joints for _, _, joints in found]), like)
-        line = Path(table, nothing + 1.0, joints, xp.ones_like(nothing) > 0.0)
+        line = joints_line(constant(np.array([joints for _, _, joints in found]), like), like)
         now = seen.object(self.target)
         return ExtractMemory(line, like, now, outward, full, nothing, xp.zeros_like(outward))
 
@@ -194,10 +192,9 @@ class Extract(ConceptModel[ExtractMemory]):
         speed = self.speed * poses.clip(seen.elapsed / SOFTLY, 0.0, 1.0)
         near = poses.clip((memory.full - memory.way) / (SOFTLY * self.speed), 0.1, 1.0)
         rate = speed * near * poses.clip(1.0 + along / self.pull, -1.0, 1.0)
-        across = force - along[:, None] * memory.outward
-        step = poses.clip(YIELDS * period * across, -0.001, 0.001)
         inside = (self._come(seen, memory) < memory.full - self.clear)[:, None]
-        offset = poses.clip(memory.offset + step, -MOST, MOST)
+        nowhere = xp.zeros_like(memory.offset)
+        offset = yielding(memory.offset, force, memory.outward, nowhere, period, STEP)
         return memory._replace(
             way=poses.clip(xp.minimum(memory.way + period * rate, memory.full), 0.0, math.inf),
             offset=xp.where(inside, offset, memory.offset),

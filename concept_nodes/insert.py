@@ -27,7 +27,15 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.insertion import places_to_try
 from bt_tasksim.concept_nodes.insertion_edges import Edges, away, edges_of, held_up_at, wrench_of
-from bt_tasksim.concept_nodes.insertion_way import ROWS, STANDOFF, WayIn, ends_in, sides_of, way_in
+from bt_tasksim.concept_nodes.insertion_way import (
+    STANDOFF,
+    WayIn,
+    ends_in,
+    joints_line,
+    sides_of,
+    way_in,
+    yielding,
+)
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
@@ -74,8 +82,6 @@ beyond that, at what share of the usual speed, and with what share of the usual 
 edge at 40 mm/s strains itself."""
 ASIDE = 0.02
 """Metres a second at which it goes from one place to the next."""
-YIELDS, MOST = 0.0004, 0.004
-"""Metres a second for each newton from aside with which it yields in the hole, and how far at most."""
 
 
 class InsertMemory(NamedTuple):
@@ -207,15 +213,9 @@ class Insert(ConceptModel[InsertMemory]):
         lies = constant(np.array([way.lies for way in found]), like)
         held = poses.multiply(seen.object(self.target), lies)
         joints = constant(np.array([way.joints for way in found]), like)
-        line = Path(
-            xp.zeros((worlds, ROWS, 7), dtype=like.dtype, device=like.device) + start[:, None, :],
-            nothing + 1.0,
-            joints,
-            xp.ones_like(nothing) > 0.0,
-        )
         return InsertMemory(
             path=path,
-            line=line,
+            line=joints_line(joints, start),
             start=start,
             inward=inward,
             sides=sides_of(path.table[:, -1, 3:], inward),
@@ -358,10 +358,9 @@ class Insert(ConceptModel[InsertMemory]):
         share = xp.minimum(most / xp.maximum(length, xp.zeros_like(length) + 1e-9), xp.ones_like(length))
         free = xp.isfinite(memory.back) & (memory.way <= memory.back + 1e-9)
         searching = memory.offset + xp.where(free, share, 0.0 * share)[:, None] * step
-        across = force - poses.dot(force, memory.inward)[:, None] * memory.inward
-        yielding = memory.offset + poses.clip(YIELDS * period * across, -most, most)
+        yields = yielding(memory.offset, force, memory.inward, wanted, period, most)
         inside = memory.begun & (come > memory.mouth + BACK) & ~xp.isfinite(memory.back)
-        found = xp.where(inside[:, None], wanted + poses.clip(yielding - wanted, -MOST, MOST), searching)
+        found = xp.where(inside[:, None], yields, searching)
         return found, free & (length <= most)
 
     def _push(self, force: Array, weight: Array, memory: InsertMemory) -> Array:
