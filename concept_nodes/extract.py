@@ -29,7 +29,7 @@ from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS
-from bt_tasksim.core.world import Command
+from bt_tasksim.core.world import FURNITURE, Command
 from bt_tasksim.planning.reference_motion import Path, at_times
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Leave
@@ -149,7 +149,7 @@ class Extract(ConceptModel[ExtractMemory]):
         """How far it has to go, the way ``(3,)``, and the arm's joints ``(n, n_arm)`` along it."""
         hole = hole_of(view, self.out_of)
         out, full = poses.z_axis(np.asarray(hole.pose)[3:]), self._depth(view) + self.clear
-        leave = Leave(held={hole.fixture or "furniture"})
+        leave = Leave(held={hole.fixture or FURNITURE})
         finder = view.finder([self.target], held=view.held(self.target), leave=leave, closer=TOUCHING)
         line = np.repeat(view.tool[None], ROWS, axis=0)
         line[:, :3] += np.linspace(0.0, full, ROWS)[:, None] * out

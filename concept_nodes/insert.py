@@ -44,7 +44,7 @@ from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT, METRES, NEWTONS
-from bt_tasksim.core.world import Command
+from bt_tasksim.core.world import FURNITURE, Command
 from bt_tasksim.planning.reference_motion import Path, at_times, plan, searched_for
 from bt_tasksim.planning.routes import SAMPLES, with_routes
 
@@ -251,7 +251,7 @@ class Insert(ConceptModel[InsertMemory]):
             ends = ends_in(view, self.target, self.into, leading, self.share)
         except NoWayError:
             return None  # it is said when it begins
-        return Aim(ends, f"be pushed into {self.into}", frozenset([hole.fixture or "furniture"]))
+        return Aim(ends, f"be pushed into {self.into}", frozenset([hole.fixture or FURNITURE]))
 
     def command(self, action: Array, seen: Seen, memory: InsertMemory) -> Command:
         """Along the path, and then straight in, aside of there as the search says."""

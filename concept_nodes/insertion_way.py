@@ -13,7 +13,7 @@ from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array, array_namespace, constant
-from bt_tasksim.core.world import PlaceModel
+from bt_tasksim.core.world import FURNITURE, PlaceModel
 from bt_tasksim.planning.reference_motion import Path
 from bt_tasksim.planning.route import Pace, Route
 from bt_tasksim.planning.surroundings import pieces_of
@@ -83,7 +83,7 @@ def way_in(
     grip = poses.relative(held, view.tool)
     carried = Held(target, poses.relative(view.tool, held), pieces_of(view.model(target)))
     back = (share * hole.height + STANDOFF) * poses.z_axis(np.asarray(hole.pose)[3:])
-    leave = Leave(held={hole.fixture or "furniture"})
+    leave = Leave(held={hole.fixture or FURNITURE})
     inside = view.finder([target], held=carried, leave=leave, closer=TOUCHING)
 
     def find(room: tuple[float, Array]) -> WayIn:

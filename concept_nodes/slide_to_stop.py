@@ -28,6 +28,7 @@ from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import SECONDS
+from bt_tasksim.core.world import FURNITURE
 from bt_tasksim.planning.reference_motion import position
 from bt_tasksim.scene.walls import CLOSE
 
@@ -115,7 +116,7 @@ class SlideToStop(Slid):
         """The stop, wherever it is; where it is not named, any furniture and any object may be it."""
         if self.against is not None:
             return frozenset({self.against}) | supports_of(view, self.against)
-        return frozenset({*view.objects, *(box.fixture or "furniture" for box in view.world.obstacles)})
+        return frozenset({*view.objects, *(box.fixture or FURNITURE for box in view.world.obstacles)})
 
     def _pace(self, seen: Seen, memory: SlidMemory) -> Array:
         """Slowly from a little before where it is known to meet something, or all the way where nothing is.

@@ -15,7 +15,7 @@ from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.poses import Array, constant
 from bt_tasksim.core.transfer import fetched
-from bt_tasksim.core.world import Obstacle, WorldModel
+from bt_tasksim.core.world import FURNITURE, Obstacle, WorldModel
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import box_corners
 from bt_tasksim.scene.outlines import Slab, hull
@@ -64,18 +64,12 @@ def gaps(world: WorldFacts, objects: Array, target: str, other: str | None) -> A
 
 def _nearest(world: WorldModel, objects: Mapping[str, Array], target: str, other: str | None) -> Wall | None:
     """See `nearest_stop`. The outlines of what is not asked about are not made."""
-    named = None if other is None else whose(world, other)
-    walls = [_standing(box) for box in world.obstacles if named in (None, box.fixture or "furniture")]
+    named = None if other is None else world.thing_of(other)
+    walls = [_standing(box) for box in world.obstacles if named in (None, box.fixture or FURNITURE)]
     for name in objects:
         if name != target and named in (None, name):
             walls += _slabs(world, objects, name)
     return nearest_wall(_slabs(world, objects, target), walls)
-
-
-def whose(world: WorldModel, name: str) -> str:
-    """The name under which an object, or the fixture of a place, is kept clear of."""
-    place = world.places.get(name)
-    return name if place is None else place.fixture or "furniture"
 
 
 def no_way_named(direction: tuple[float, float, float] | None, other: str | None, by: str) -> str:

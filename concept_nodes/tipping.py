@@ -31,7 +31,7 @@ from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.units import NEWTONS, RADIANS, SHARE
-from bt_tasksim.core.world import Command, ObjectModel
+from bt_tasksim.core.world import FURNITURE, Command, ObjectModel
 from bt_tasksim.planning.reference_motion import Path, at_times, plan, searched_for
 from bt_tasksim.planning.route import Pace, Route, followed
 from bt_tasksim.planning.routes import SAMPLES, with_routes
@@ -372,7 +372,7 @@ def support_of(view: WorldView, target: str) -> tuple[list[str], float]:
             names.append(place.fixture)
             if gap < nearest:
                 nearest, level = gap, float(place.pose[2])
-    return [*dict.fromkeys([*names, "furniture"])], level
+    return [*dict.fromkeys([*names, FURNITURE])], level
 
 
 def lifted(view: WorldView, target: str) -> Array:
