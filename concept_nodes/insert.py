@@ -350,8 +350,7 @@ class Insert(ConceptModel[InsertMemory]):
         """
         xp = array_namespace(force)
         index = xp.astype(poses.clip(tried, 0.0, len(places) - 1.0), xp.int64)
-        table = constant(places, force)
-        goal = xp.stack([xp.take(table[:, k], index) for k in (0, 1)], axis=-1)
+        goal = xp.stack([xp.take(constant(places[:, k], force), index) for k in (0, 1)], axis=-1)
         wanted = goal[:, :1] * memory.sides[:, 0, :] + goal[:, 1:] * memory.sides[:, 1, :] + memory.centre
         step, most = wanted - memory.offset, ASIDE * period
         length = poses.norm(step)

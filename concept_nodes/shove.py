@@ -251,9 +251,9 @@ class Shove(ConceptModel[ShoveMemory]):
         """Where the middle of the thing is to go ``(N, 3)``, metres."""
         now, xp = seen.object(self.target)[:, :3], array_namespace(seen.tool)
         if self.to is not None:
-            frame, _ = destination(seen, self.to)
-            height = poses.localise(carrying(seen, self.target).place.pose, now)[:, 2]
-            up = xp.where(carrying(seen, self.target).found, height, seen.model(self.target).standing_height)
+            (frame, _), below = destination(seen, self.to), carrying(seen, self.target)
+            height = poses.localise(below.place.pose, now)[:, 2]
+            up = xp.where(below.found, height, seen.model(self.target).standing_height)
             return poses.transform(frame, xp.stack([0.0 * up, 0.0 * up, up], axis=-1))
         if self.position is not None:
             flat = xp.zeros_like(now[:, :2]) + constant(self.position[:2], now)

@@ -112,8 +112,13 @@ class Slid(ConceptModel[SlidMemory]):
     default_timeout = 20.0
     default_tolerance = 0.02
 
-    def waypoints(self, seen: Seen) -> Sequence[Array]:
-        """Level displacements ``(N, 3)`` of the object from where it is, one after the other."""
+    def waypoints(self, seen: Seen, each: Sequence[WorldView]) -> Sequence[Array]:
+        """Level displacements ``(N, 3)`` of the object from where it is, one after the other.
+
+        Args:
+            seen: What is seen.
+            each: Each world of that by itself.
+        """
         raise NotImplementedError
 
     def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
@@ -131,7 +136,8 @@ class Slid(ConceptModel[SlidMemory]):
         xp, found = array_namespace(seen.tool), carrying(seen, self.target)
         drop = height_above(seen, self.target, found.place.pose)
         drop = xp.where(found.found & (drop > 0.0), drop, xp.zeros_like(drop))
-        points = [poses.shifted(seen.tool, by) for by in self.waypoints(seen)]
+        each = views(seen)
+        points = [poses.shifted(seen.tool, by) for by in self.waypoints(seen, each)]
         before = points[-2] if len(points) > 1 else seen.tool
         way = points[-1][:, :3] - before[:, :3]
         length = poses.norm(way)
@@ -140,7 +146,7 @@ class Slid(ConceptModel[SlidMemory]):
         drops, *ends = host_numbers([drop, *points])
         clear = [
             self._check(view, int(ranks[k]), float(drops[k]), [end[k] for end in ends])
-            for k, view in enumerate(views(seen))
+            for k, view in enumerate(each)
         ]
         path = plan([seen.tool, *points], self.speed, blend=0.03, samples=65)
         nothing = xp.zeros_like(drop)

@@ -81,7 +81,7 @@ class Slide(Slid):
         goals = not_one_goal(self.to, self.position, self.direction, self.distance)
         return goals or not_level(self.direction)
 
-    def waypoints(self, seen: Seen) -> Sequence[Array]:
+    def waypoints(self, seen: Seen, each: Sequence[WorldView]) -> Sequence[Array]:
         """See `Slid.waypoints`."""
         xp, now = array_namespace(seen.tool), seen.object(self.target)[:, :3]
         if self.to is not None:

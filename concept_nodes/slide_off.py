@@ -30,7 +30,7 @@ from bt_tasksim.concept_nodes.stops import CLEAR, gaps, nearest_stop, no_way_nam
 from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, constant
 from bt_tasksim.core.registry import register
 
 
@@ -74,11 +74,11 @@ class SlideOff(Slid):
         """A way that is level, or what it leaves."""
         return not_level(self.direction) or no_way_named(self.direction, self.off, "off")
 
-    def waypoints(self, seen: Seen) -> Sequence[Array]:
+    def waypoints(self, seen: Seen, each: Sequence[WorldView]) -> Sequence[Array]:
         """See `Slid.waypoints`."""
-        if self.direction is not None:
-            return (self.distance * ways_in(seen, self.target, self.direction, None, math.inf),)
-        return (-self.distance * ways_in(seen, self.target, None, self.off, math.inf),)
+        distance = -self.distance if self.direction is None else self.distance
+        ways = ways_in(each, self.target, self.direction, self.off, math.inf)
+        return (distance * constant(ways, seen.tool),)
 
     def aim(self, view: WorldView) -> Aim | None:
         """To where it ends, where it stands against something now."""

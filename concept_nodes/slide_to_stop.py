@@ -25,7 +25,7 @@ from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import register_reason
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import SECONDS
 from bt_tasksim.core.world import FURNITURE
@@ -87,9 +87,10 @@ class SlideToStop(Slid):
         """A way that is level, or where it ends."""
         return not_level(self.direction) or no_way_named(self.direction, self.against, "against")
 
-    def waypoints(self, seen: Seen) -> Sequence[Array]:
+    def waypoints(self, seen: Seen, each: Sequence[WorldView]) -> Sequence[Array]:
         """See `Slid.waypoints`."""
-        return (self.distance * ways_in(seen, self.target, self.direction, self.against, self.distance),)
+        ways = ways_in(each, self.target, self.direction, self.against, self.distance)
+        return (self.distance * constant(ways, seen.tool),)
 
     def aim(self, view: WorldView) -> Aim | None:
         """To where it is known to meet something, if it does."""

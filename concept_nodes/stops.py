@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
 
-from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes.level_way import flattened
-from bt_tasksim.concept_nodes.view import WorldView, views
+from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.facts import WorldFacts
@@ -98,29 +97,31 @@ def way_in(
 
 
 def ways_in(
-    seen: Seen, target: str, direction: tuple[float, float, float] | None, other: str | None, reach: float
+    each: Sequence[WorldView],
+    target: str,
+    direction: tuple[float, float, float] | None,
+    other: str | None,
+    reach: float,
 ) -> Array:
-    """The same in each world ``(N, 3)``.
+    """The same in each of some worlds ``(N, 3)``.
 
     Raises:
-        NoWayError: Of one world nothing says which way, or the wall is farther away than it may go, metres.
+        NoWayError: In one of them nothing says which way, or the wall is farther away than it may go, metres.
     """
+    if direction is not None:
+        return np.array([flattened(direction)] * len(each))
     found = []
-    for view in views(seen):
-        way = way_in(view, target, direction, other)
-        if way is None:
+    for view in each:
+        stop = None if other is None else nearest_stop(view, target, other)
+        if stop is None:
             raise NoWayError(f"{other} has nothing beside {target} that holds it up: give a 'direction'")
-        if direction is None and (gap := _gap(view, target, other)) > reach:
+        if stop.gap > reach:
             raise NoWayError(
-                f"{other} is {1000 * gap:.0f} mm from {target}, farther than it may go, {1000 * reach:.0f} mm"
+                f"{other} is {1000 * stop.gap:.0f} mm from {target}, farther than it may go, "
+                f"{1000 * reach:.0f} mm"
             )
-        found.append(way)
-    return constant(np.array(found), seen.tool)
-
-
-def _gap(view: WorldView, target: str, other: str | None) -> float:
-    found = nearest_stop(view, target, other)
-    return 0.0 if found is None else found.gap
+        found.append(stop.towards)
+    return np.array(found)
 
 
 def _slabs(world: WorldModel, objects: Mapping[str, Array], name: str) -> list[Slab]:

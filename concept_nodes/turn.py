@@ -235,10 +235,12 @@ class Turn(ConceptModel[TurnMemory]):
         if not np.isfinite(now).all():
             return None
         above = [poses.shifted(now, np.array([0.0, 0.0, height])) for height in AIMED]
-        ways = [way.poses for pose in above for way in self._turnings(view, pose)[:FEW]]
-        most = max(2, max(len(way) for way in ways) // 2)
-        onwards = np.array([way[np.round(np.linspace(0, len(way) - 1, most)).astype(int)] for way in ways])
-        first = np.array([pose for pose in above for _ in self._turnings(view, pose)[:FEW]])
+        found = [(pose, way.poses) for pose in above for way in self._turnings(view, pose)[:FEW]]
+        most = max(2, max(len(way) for _, way in found) // 2)
+        onwards = np.array(
+            [way[np.round(np.linspace(0, len(way) - 1, most)).astype(int)] for _, way in found]
+        )
+        first = np.array([pose for pose, _ in found])
         ends = _near(now, onwards[:, -1])
         return Aim(first, "be turned in the air", on_the_way=True, onwards=onwards, aside=ends[:ELSEWHERE])
 
