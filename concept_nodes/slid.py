@@ -66,6 +66,13 @@ GOOD = 0.03
 """Metres from where it should end that are tolerable."""
 HIGH = 0.15
 """Metres above its support from which something may come down on it to slide."""
+ABOVE = 0.003
+"""Metres above its support at which it is looked at before it slides: by a choice of a grasp, and where it is
+to meet something."""
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Shares of its way at which the arm has to be able to be for a grasp to be chosen."""
+ENDED = 3
+"""Ticks in a row for which what ends the task has to be so."""
 
 
 class SlidMemory(NamedTuple):
@@ -288,7 +295,3 @@ class Slid(ConceptModel[SlidMemory]):
     def _force(self, seen: Seen) -> Array:
         """Force at the wrist ``(N, 3)``, robot base frame, N."""
         return force_at_tool(seen)
-
-
-ENDED = 3
-"""Ticks in a row for which what ends the task has to be so."""

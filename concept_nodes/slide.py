@@ -25,7 +25,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.destination import destination
 from bt_tasksim.concept_nodes.level_way import goal_words, level, not_level, not_one_goal
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
-from bt_tasksim.concept_nodes.slid import GOOD, Slid
+from bt_tasksim.concept_nodes.slid import ABOVE, GOOD, Slid
 from bt_tasksim.concept_nodes.standing import reference_frame
 from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
@@ -119,7 +119,3 @@ class Slide(Slid):
         there = np.concatenate([end[:2], now[2:3] + ABOVE, now[3:]])
         supports = frozenset(support_of(view, self.target)[0])
         return Aim(there[None], "be slid there", supports, on_the_way=True)
-
-
-ABOVE = 0.003
-"""Metres above its support at which a grasp is chosen for it."""

@@ -18,7 +18,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.level_way import not_level
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.shoved_way import free_until
-from bt_tasksim.concept_nodes.slid import Slid, SlidMemory
+from bt_tasksim.concept_nodes.slid import ABOVE, SHARES, Slid, SlidMemory
 from bt_tasksim.concept_nodes.standing import supports_of
 from bt_tasksim.concept_nodes.stops import UP, gaps, no_way_named, way_in, ways_in
 from bt_tasksim.concept_nodes.tipping import support_of
@@ -38,6 +38,15 @@ NO_STOP = register_reason(
     value=SECONDS,
     limit=SECONDS,
 )
+BEYOND = 0.004
+"""Metres beyond where it meets something at which the hand has to be clear of that, so that no finger is in
+front of the object: of things and of how they lie in the hand some is not known.
+"""
+BEFORE, CREEPS, PRESSES = 0.025, 0.015, 0.005
+"""Metres before where it is known to meet something from which on it goes so slowly, m/s; and how slowly it
+goes on once it has met something."""
+LATE = 0.5
+"""Seconds after its way's end until which it may still be held up."""
 
 
 @register("concept")
@@ -163,18 +172,3 @@ def _slow(memory: SlidMemory) -> Array:
     xp, whole = array_namespace(memory.clear), _whole(memory)
     left = xp.minimum(whole - memory.clear + BEFORE, whole)
     return xp.where(memory.clear > whole - BEFORE, whole, left)
-
-
-SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Shares of its way up to there at which the arm has to be able to be."""
-BEYOND = 0.004
-"""Metres beyond where it meets something at which the hand has to be clear of that, so that no finger is in
-front of the object: of things and of how they lie in the hand some is not known.
-"""
-ABOVE = 0.003
-"""Metres above its support at which it is looked at where it meets something."""
-BEFORE, CREEPS, PRESSES = 0.025, 0.015, 0.005
-"""Metres before where it is known to meet something from which on it goes so slowly, m/s; and how slowly it
-goes on once it has met something."""
-LATE = 0.5
-"""Seconds after its way's end until which it may still be held up."""
