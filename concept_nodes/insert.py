@@ -55,7 +55,7 @@ PUSHED = Form(
 )
 JAMMED = register_reason(
     "jammed",
-    "{object} does not go into {place}: {value:.0f} places were tried, of {limit:.0f}",
+    "{object} does not go into {place}: {value:.0f} places were tried, and there are no more",
     value=COUNT,
     limit=COUNT,
 )
@@ -382,10 +382,8 @@ class Insert(ConceptModel[InsertMemory]):
     def limits(self, seen: Seen, memory: InsertMemory) -> tuple[Limit, ...]:
         """The force at the wrist; and all places about the mouth were tried."""
         names = {"object": self.target, "place": self.into}
-        return (
-            strain(seen, self.force_limit),
-            Limit(JAMMED, memory.tried, FEELS + float(len(places_to_try(seen.robot))), names),
-        )
+        last = FEELS + float(len(places_to_try(seen.robot))) - 1.0
+        return strain(seen, self.force_limit), Limit(JAMMED, memory.tried, last, names)
 
     def done(self, seen: Seen, memory: InsertMemory) -> Array:
         """It is where it should end, or near it and at the stop."""
