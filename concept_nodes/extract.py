@@ -20,7 +20,7 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.closer import TOUCHING
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.insertion import hole_of
-from bt_tasksim.concept_nodes.insertion_way import ROWS
+from bt_tasksim.concept_nodes.insertion_way import ROWS, joints_line, yielding
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
@@ -29,7 +29,7 @@ from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, NEWTONS
-from bt_tasksim.core.world import Command
+from bt_tasksim.core.world import FURNITURE, Command
 from bt_tasksim.planning.reference_motion import Path, at_times
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Leave
@@ -48,8 +48,8 @@ SEEN = 0.005
 """Metres before the mouth, beyond the tolerance, from which on a thing is seen to be out."""
 LEFT = 0.02
 """Metres by which the hand may go farther than what it pulls."""
-YIELDS, MOST = 0.0004, 0.004
-"""Metres a second for each newton from aside with which it yields, and how far at most."""
+STEP = 0.001
+"""Metres that it goes aside in a control period at most."""
 SOFTLY = 0.4
 """Seconds in which it comes to its speed."""
 
@@ -141,9 +141,7 @@ class Extract(ConceptModel[ExtractMemory]):
         full = constant(np.array([way for way, _, _ in found]), like)
         outward = constant(np.array([out for _, out, _ in found]), like)
         nothing = xp.zeros_like(full)
-        table = xp.zeros((len(found), ROWS, 7), dtype=like.dtype, device=like.device) + like[:, None, :]
-        joints = constant(np.array([joints for _, _, joints in found]), like)
-        line = Path(table, nothing + 1.0, joints, xp.ones_like(nothing) > 0.0)
+        line = joints_line(constant(np.array([joints for _, _, joints in found]), like), like)
         now = seen.object(self.target)
         return ExtractMemory(line, like, now, outward, full, nothing, xp.zeros_like(outward))
 
@@ -151,7 +149,7 @@ class Extract(ConceptModel[ExtractMemory]):
         """How far it has to go, the way ``(3,)``, and the arm's joints ``(n, n_arm)`` along it."""
         hole = hole_of(view, self.out_of)
         out, full = poses.z_axis(np.asarray(hole.pose)[3:]), self._depth(view) + self.clear
-        leave = Leave(held={hole.fixture or "furniture"})
+        leave = Leave(held={hole.fixture or FURNITURE})
         finder = view.finder([self.target], held=view.held(self.target), leave=leave, closer=TOUCHING)
         line = np.repeat(view.tool[None], ROWS, axis=0)
         line[:, :3] += np.linspace(0.0, full, ROWS)[:, None] * out
@@ -194,10 +192,9 @@ class Extract(ConceptModel[ExtractMemory]):
         speed = self.speed * poses.clip(seen.elapsed / SOFTLY, 0.0, 1.0)
         near = poses.clip((memory.full - memory.way) / (SOFTLY * self.speed), 0.1, 1.0)
         rate = speed * near * poses.clip(1.0 + along / self.pull, -1.0, 1.0)
-        across = force - along[:, None] * memory.outward
-        step = poses.clip(YIELDS * period * across, -0.001, 0.001)
         inside = (self._come(seen, memory) < memory.full - self.clear)[:, None]
-        offset = poses.clip(memory.offset + step, -MOST, MOST)
+        nowhere = xp.zeros_like(memory.offset)
+        offset = yielding(memory.offset, force, memory.outward, nowhere, period, STEP)
         return memory._replace(
             way=poses.clip(xp.minimum(memory.way + period * rate, memory.full), 0.0, math.inf),
             offset=xp.where(inside, offset, memory.offset),

@@ -15,6 +15,7 @@ from bt_tasksim.concept_nodes.holding import may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool
 from bt_tasksim.concept_nodes.pressing import Pressing
 from bt_tasksim.concept_nodes.stops import gaps, no_way_named, ways_in
+from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import Possible
 from bt_tasksim.core.poses import Array, array_namespace, constant
@@ -95,7 +96,8 @@ class Hold(Pressing[HoldMemory]):
         """
         nothing = array_namespace(seen.tool).zeros_like(seen.tool[:, :3])
         if self.direction is None:
-            along = ways_in(seen, self.target, None, self.against, self.tolerance)
+            ways = ways_in(views(seen), self.target, None, self.against, self.tolerance)
+            along = constant(ways, seen.tool)
         else:
             along = constant(np.array(self.direction), seen.tool) + nothing
         felt = _force_against(seen, along)

@@ -124,6 +124,10 @@ class HoldTurned(Pressing[HoldTurnedMemory]):
 
         Where it is on the axis it has no way, and where it slips on the part it does not turn.
         """
+        key = ("gone", self.target, id(memory))  # of a memory that lives as long as what is kept with it
+        return seen.once(key, lambda: (self._gone(seen, memory), memory))[0]
+
+    def _gone(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
         law, xp = seen.model(self.target).joints, array_namespace(memory.way)
         free = law._replace(limits=law.limits + poses.constant(np.array([-math.pi, math.pi]), law.limits))
         turned = free.value(poses.multiply(seen.tool, memory.grip)) - memory.value

@@ -58,9 +58,8 @@ class InContact(Condition):
 def _gap(view: WorldView, target: str, other: str) -> float:
     if target not in view.objects:
         return FAR
-    place = view.world.places.get(other)
     things = things_of(view.world, view.objects, closer=1.0)
-    theirs = other if place is None else place.fixture or "furniture"
+    theirs = view.world.thing_of(other)
     pairs = [
         _distance(mine, their)
         for mine in things

@@ -27,7 +27,15 @@ from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.insertion import places_to_try
 from bt_tasksim.concept_nodes.insertion_edges import Edges, away, edges_of, held_up_at, wrench_of
-from bt_tasksim.concept_nodes.insertion_way import ROWS, STANDOFF, WayIn, ends_in, sides_of, way_in
+from bt_tasksim.concept_nodes.insertion_way import (
+    STANDOFF,
+    WayIn,
+    ends_in,
+    joints_line,
+    sides_of,
+    way_in,
+    yielding,
+)
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
@@ -36,7 +44,7 @@ from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import COUNT, METRES, NEWTONS
-from bt_tasksim.core.world import Command
+from bt_tasksim.core.world import FURNITURE, Command
 from bt_tasksim.planning.reference_motion import Path, at_times, plan, searched_for
 from bt_tasksim.planning.routes import SAMPLES, with_routes
 
@@ -47,7 +55,7 @@ PUSHED = Form(
 )
 JAMMED = register_reason(
     "jammed",
-    "{object} does not go into {place}: {value:.0f} places were tried, of {limit:.0f}",
+    "{object} does not go into {place}: {value:.0f} places were tried, and there are no more",
     value=COUNT,
     limit=COUNT,
 )
@@ -74,8 +82,6 @@ beyond that, at what share of the usual speed, and with what share of the usual 
 edge at 40 mm/s strains itself."""
 ASIDE = 0.02
 """Metres a second at which it goes from one place to the next."""
-YIELDS, MOST = 0.0004, 0.004
-"""Metres a second for each newton from aside with which it yields in the hole, and how far at most."""
 
 
 class InsertMemory(NamedTuple):
@@ -207,15 +213,9 @@ class Insert(ConceptModel[InsertMemory]):
         lies = constant(np.array([way.lies for way in found]), like)
         held = poses.multiply(seen.object(self.target), lies)
         joints = constant(np.array([way.joints for way in found]), like)
-        line = Path(
-            xp.zeros((worlds, ROWS, 7), dtype=like.dtype, device=like.device) + start[:, None, :],
-            nothing + 1.0,
-            joints,
-            xp.ones_like(nothing) > 0.0,
-        )
         return InsertMemory(
             path=path,
-            line=line,
+            line=joints_line(joints, start),
             start=start,
             inward=inward,
             sides=sides_of(path.table[:, -1, 3:], inward),
@@ -251,7 +251,7 @@ class Insert(ConceptModel[InsertMemory]):
             ends = ends_in(view, self.target, self.into, leading, self.share)
         except NoWayError:
             return None  # it is said when it begins
-        return Aim(ends, f"be pushed into {self.into}", frozenset([hole.fixture or "furniture"]))
+        return Aim(ends, f"be pushed into {self.into}", frozenset([hole.fixture or FURNITURE]))
 
     def command(self, action: Array, seen: Seen, memory: InsertMemory) -> Command:
         """Along the path, and then straight in, aside of there as the search says."""
@@ -350,18 +350,16 @@ class Insert(ConceptModel[InsertMemory]):
         """
         xp = array_namespace(force)
         index = xp.astype(poses.clip(tried, 0.0, len(places) - 1.0), xp.int64)
-        table = constant(places, force)
-        goal = xp.stack([xp.take(table[:, k], index) for k in (0, 1)], axis=-1)
+        goal = xp.stack([xp.take(constant(places[:, k], force), index) for k in (0, 1)], axis=-1)
         wanted = goal[:, :1] * memory.sides[:, 0, :] + goal[:, 1:] * memory.sides[:, 1, :] + memory.centre
         step, most = wanted - memory.offset, ASIDE * period
         length = poses.norm(step)
         share = xp.minimum(most / xp.maximum(length, xp.zeros_like(length) + 1e-9), xp.ones_like(length))
         free = xp.isfinite(memory.back) & (memory.way <= memory.back + 1e-9)
         searching = memory.offset + xp.where(free, share, 0.0 * share)[:, None] * step
-        across = force - poses.dot(force, memory.inward)[:, None] * memory.inward
-        yielding = memory.offset + poses.clip(YIELDS * period * across, -most, most)
+        yields = yielding(memory.offset, force, memory.inward, wanted, period, most)
         inside = memory.begun & (come > memory.mouth + BACK) & ~xp.isfinite(memory.back)
-        found = xp.where(inside[:, None], wanted + poses.clip(yielding - wanted, -MOST, MOST), searching)
+        found = xp.where(inside[:, None], yields, searching)
         return found, free & (length <= most)
 
     def _push(self, force: Array, weight: Array, memory: InsertMemory) -> Array:
@@ -384,10 +382,8 @@ class Insert(ConceptModel[InsertMemory]):
     def limits(self, seen: Seen, memory: InsertMemory) -> tuple[Limit, ...]:
         """The force at the wrist; and all places about the mouth were tried."""
         names = {"object": self.target, "place": self.into}
-        return (
-            strain(seen, self.force_limit),
-            Limit(JAMMED, memory.tried, FEELS + float(len(places_to_try(seen.robot))), names),
-        )
+        last = FEELS + float(len(places_to_try(seen.robot))) - 1.0
+        return strain(seen, self.force_limit), Limit(JAMMED, memory.tried, last, names)
 
     def done(self, seen: Seen, memory: InsertMemory) -> Array:
         """It is where it should end, or near it and at the stop."""

@@ -1,4 +1,4 @@
-"""The way of something that is held to before a hole, and straight in."""
+"""The way of something that is held to before a hole, and straight in or out, yielding to the walls."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.poses import Array, array_namespace, constant
-from bt_tasksim.core.world import PlaceModel
+from bt_tasksim.core.world import FURNITURE, PlaceModel
+from bt_tasksim.planning.reference_motion import Path
 from bt_tasksim.planning.route import Pace, Route
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Held, Leave
@@ -28,7 +29,9 @@ OTHERS, POSTURES = 8, 4
 HELD_BY = 0.015
 """Metres of what is in a hole by which fingers hold it, at least."""
 ROWS = 33
-"""Poses straight in for which joints are computed."""
+"""Poses straight in, or out, for which joints are computed."""
+YIELDS, MOST = 0.0004, 0.004
+"""Metres a second for each newton from aside with which it yields to a wall, and how far at most."""
 
 
 class WayIn(NamedTuple):
@@ -80,7 +83,7 @@ def way_in(
     grip = poses.relative(held, view.tool)
     carried = Held(target, poses.relative(view.tool, held), pieces_of(view.model(target)))
     back = (share * hole.height + STANDOFF) * poses.z_axis(np.asarray(hole.pose)[3:])
-    leave = Leave(held={hole.fixture or "furniture"})
+    leave = Leave(held={hole.fixture or FURNITURE})
     inside = view.finder([target], held=carried, leave=leave, closer=TOUCHING)
 
     def find(room: tuple[float, Array]) -> WayIn:
@@ -131,6 +134,34 @@ def _why_not(finder: WayFinder, inside: WayFinder, tools: Array) -> str:
     if not inside.ends(tools[1:]).free[0]:
         return inside.no_end(tools[1:])
     return "the arm cannot follow the way in"
+
+
+def joints_line(joints: Array, tool: Array) -> Path:
+    """The arm's joints along straight ways as paths of one second, which are asked for shares of the ways.
+
+    Args:
+        joints: Joints ``(N, n, n_arm)`` evenly along the ways.
+        tool: Poses ``(N, 7)`` that stand for the paths' own, for which nobody asks.
+    """
+    xp, one = array_namespace(tool), array_namespace(tool).ones_like(tool[:, 0])
+    table = xp.zeros((*joints.shape[:2], 7), dtype=tool.dtype, device=tool.device) + tool[:, None, :]
+    return Path(table, one, joints, one > 0.0)
+
+
+def yielding(offset: Array, force: Array, way: Array, middle: Array, period: float, most: float) -> Array:
+    """Offsets ``(N, 3)`` aside of straight ways for the next tick, as what is led there yields to walls.
+
+    Args:
+        offset: Those of this one, metres.
+        force: Forces ``(N, 3)``, N.
+        way: Unit vectors ``(N, 3)`` along the ways.
+        middle: Offsets ``(N, 3)`` from which it goes no farther than `MOST`, metres.
+        period: Seconds until then.
+        most: Metres that it goes until then at most, along each axis.
+    """
+    across = force - poses.dot(force, way)[:, None] * way
+    moved = offset + poses.clip(YIELDS * period * across, -most, most)
+    return middle + poses.clip(moved - middle, -MOST, MOST)
 
 
 def sides_of(rotation: Array, inward: Array) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core.narrow_phase import coal
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import FURNITURE
 from bt_tasksim.planning.surroundings import pieces_of, things_of
 from bt_tasksim.planning.things import Thing, inner, shapes_of
 from bt_tasksim.robot.kinematics.models import se3
@@ -47,7 +48,7 @@ def own_furniture(view: WorldView, target: str) -> frozenset[str]:
     joint = view.model(target).joint
     assert joint is not None, "it is a part of furniture"
     parts = {m.name for m in view.world.objects if m.joint is not None and m.joint.fixture == joint.fixture}
-    return frozenset({joint.fixture or "furniture", *parts})
+    return frozenset({joint.fixture or FURNITURE, *parts})
 
 
 def _meets(shapes: Sequence[Any], at: Any, others: Sequence[Any], there: Any) -> bool:

@@ -15,6 +15,7 @@ from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.joints import Joints
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.world import FURNITURE
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Held, Leave
 from bt_tasksim.planning.ways import WayFinder
@@ -244,6 +245,6 @@ def carried_by(view: WorldView, target: str) -> frozenset[str]:
 
 def beside(view: WorldView, target: str) -> frozenset[str]:
     """Names of furniture and of its parts, but for one of them."""
-    fixtures: Collection[str] = {box.fixture or "furniture" for box in view.world.obstacles}
+    fixtures: Collection[str] = {box.fixture or FURNITURE for box in view.world.obstacles}
     others = {m.name for m in view.world.objects if m.joint is not None and m.name != target}
     return frozenset({*fixtures, *others})

@@ -10,7 +10,7 @@ import numpy as np
 
 from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
-from bt_tasksim.concept.demonstrated import position_words, rounded, straight_words
+from bt_tasksim.concept.demonstrated import rounded
 from bt_tasksim.concept.functions import booleans
 from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.model import ConceptModel
@@ -27,6 +27,7 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept.task import Task
 from bt_tasksim.concept_nodes.destination import destination
 from bt_tasksim.concept_nodes.holding import BETWEEN, REACH, holding, not_held, tool_distance
+from bt_tasksim.concept_nodes.level_way import goal_words, level, not_level, not_one_goal
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_tool, force_at_wrist, strain
 from bt_tasksim.concept_nodes.shoved_way import GAP, ShovedWay, shoved_way
 from bt_tasksim.concept_nodes.surface import carrying
@@ -203,12 +204,8 @@ class Shove(ConceptModel[ShoveMemory]):
     @classmethod
     def describe_task(cls, parameters: Mapping[str, Any]) -> str:
         """Where to, and with what."""
-        said = [f"to {parameters['to']}"] if "to" in parameters else []
-        if "position" in parameters:
-            said.append(f"to {position_words(parameters['position'])}")
-        if "direction" in parameters and "distance" in parameters:
-            said.append(straight_words(parameters))
-        return ", ".join([*said, *([f"with {parameters['tool']}"] if "tool" in parameters else [])])
+        tool = [f"with {parameters['tool']}"] if "tool" in parameters else []
+        return ", ".join([*goal_words(parameters), *tool])
 
     @classmethod
     def from_task(cls, task: Task, later: Sequence[Task]) -> dict[str, Any]:
@@ -221,14 +218,9 @@ class Shove(ConceptModel[ShoveMemory]):
 
     def contradiction(self) -> str:
         """One goal, and a way that is level."""
-        by_way = self.direction is not None or self.distance is not None
-        if sum((self.to is not None, self.position is not None, by_way)) != 1:
-            return "give either 'to', 'position', or 'direction' and 'distance'"
-        if by_way and (self.direction is None or self.distance is None):
-            return "'direction' and 'distance' go together"
-        if self.direction is not None and abs(self.direction[2]) > 0.1:
-            return "'direction' should be level: it is the way along what the object stands on"
-        return "'tool' is the target itself" if self.tool == self.target else ""
+        goals = not_one_goal(self.to, self.position, self.direction, self.distance)
+        wrong = goals or not_level(self.direction, "stands on")
+        return wrong or ("'tool' is the target itself" if self.tool == self.target else "")
 
     def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
         """The tool must be in the hand, or nothing; it is no ball, and its goal on its level."""
@@ -259,16 +251,15 @@ class Shove(ConceptModel[ShoveMemory]):
         """Where the middle of the thing is to go ``(N, 3)``, metres."""
         now, xp = seen.object(self.target)[:, :3], array_namespace(seen.tool)
         if self.to is not None:
-            frame, _ = destination(seen, self.to)
-            height = poses.localise(carrying(seen, self.target).place.pose, now)[:, 2]
-            up = xp.where(carrying(seen, self.target).found, height, seen.model(self.target).standing_height)
+            (frame, _), below = destination(seen, self.to), carrying(seen, self.target)
+            height = poses.localise(below.place.pose, now)[:, 2]
+            up = xp.where(below.found, height, seen.model(self.target).standing_height)
             return poses.transform(frame, xp.stack([0.0 * up, 0.0 * up, up], axis=-1))
         if self.position is not None:
             flat = xp.zeros_like(now[:, :2]) + constant(self.position[:2], now)
             return xp.concat([flat, now[:, 2:]], axis=-1)
         assert self.direction is not None and self.distance is not None
-        level = np.array([*self.direction[:2], 0.0])
-        return now + constant(self.distance * level / np.linalg.norm(level), now)
+        return now + level(self.direction, self.distance, now)
 
     def begin(self, seen: Seen) -> ShoveMemory:
         """How the pusher stands behind the thing, and its way there.

@@ -66,6 +66,13 @@ GOOD = 0.03
 """Metres from where it should end that are tolerable."""
 HIGH = 0.15
 """Metres above its support from which something may come down on it to slide."""
+ABOVE = 0.003
+"""Metres above its support at which it is looked at before it slides: by a choice of a grasp, and where it is
+to meet something."""
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Shares of its way at which the arm has to be able to be for a grasp to be chosen."""
+ENDED = 3
+"""Ticks in a row for which what ends the task has to be so."""
 
 
 class SlidMemory(NamedTuple):
@@ -112,8 +119,13 @@ class Slid(ConceptModel[SlidMemory]):
     default_timeout = 20.0
     default_tolerance = 0.02
 
-    def waypoints(self, seen: Seen) -> Sequence[Array]:
-        """Level displacements ``(N, 3)`` of the object from where it is, one after the other."""
+    def waypoints(self, seen: Seen, each: Sequence[WorldView]) -> Sequence[Array]:
+        """Level displacements ``(N, 3)`` of the object from where it is, one after the other.
+
+        Args:
+            seen: What is seen.
+            each: Each world of that by itself.
+        """
         raise NotImplementedError
 
     def initial_state(self, seen: Seen) -> tuple[Possible, ...]:
@@ -131,7 +143,8 @@ class Slid(ConceptModel[SlidMemory]):
         xp, found = array_namespace(seen.tool), carrying(seen, self.target)
         drop = height_above(seen, self.target, found.place.pose)
         drop = xp.where(found.found & (drop > 0.0), drop, xp.zeros_like(drop))
-        points = [poses.shifted(seen.tool, by) for by in self.waypoints(seen)]
+        each = views(seen)
+        points = [poses.shifted(seen.tool, by) for by in self.waypoints(seen, each)]
         before = points[-2] if len(points) > 1 else seen.tool
         way = points[-1][:, :3] - before[:, :3]
         length = poses.norm(way)
@@ -140,7 +153,7 @@ class Slid(ConceptModel[SlidMemory]):
         drops, *ends = host_numbers([drop, *points])
         clear = [
             self._check(view, int(ranks[k]), float(drops[k]), [end[k] for end in ends])
-            for k, view in enumerate(views(seen))
+            for k, view in enumerate(each)
         ]
         path = plan([seen.tool, *points], self.speed, blend=0.03, samples=65)
         nothing = xp.zeros_like(drop)
@@ -282,19 +295,3 @@ class Slid(ConceptModel[SlidMemory]):
     def _force(self, seen: Seen) -> Array:
         """Force at the wrist ``(N, 3)``, robot base frame, N."""
         return force_at_tool(seen)
-
-
-ENDED = 3
-"""Ticks in a row for which what ends the task has to be so."""
-
-
-def level(direction: tuple[float, float, float], distance: float, like: Array) -> Array:
-    """The displacement ``(3,)`` that goes so far along the level part of a direction, like an array."""
-    flat = np.array([*direction[:2], 0.0])
-    return constant(distance * flat / np.linalg.norm(flat), like)
-
-
-def not_level(direction: tuple[float, float, float] | None) -> str:
-    """Why a direction is none along a level support, as the end of a sentence; empty where it is one."""
-    steep = direction is not None and abs(direction[2]) > 0.1
-    return "'direction' should be level: it is the way along what the object is pressed on" if steep else ""

@@ -10,7 +10,6 @@ import numpy as np
 from bt_tasksim.concept.aim import Aim
 from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.declared import ConditionOf
-from bt_tasksim.concept.demonstrated import position_words, straight_words
 from bt_tasksim.concept.parameters import (
     Direction,
     Metres,
@@ -24,8 +23,9 @@ from bt_tasksim.concept.parameters import (
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.destination import destination
+from bt_tasksim.concept_nodes.level_way import goal_words, level, not_level, not_one_goal
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
-from bt_tasksim.concept_nodes.slid import GOOD, Slid, level, not_level
+from bt_tasksim.concept_nodes.slid import ABOVE, GOOD, Slid
 from bt_tasksim.concept_nodes.standing import reference_frame
 from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
@@ -74,23 +74,14 @@ class Slide(Slid):
     @classmethod
     def describe_task(cls, parameters: Mapping[str, Any]) -> str:
         """Where to."""
-        said = [f"to {parameters['to']}"] if "to" in parameters else []
-        if "position" in parameters:
-            said.append(f"to {position_words(parameters['position'])}")
-        if "direction" in parameters and "distance" in parameters:
-            said.append(straight_words(parameters))
-        return ", ".join(said)
+        return ", ".join(goal_words(parameters))
 
     def contradiction(self) -> str:
         """One goal, and a way that is level."""
-        by_way = self.direction is not None or self.distance is not None
-        if sum((self.to is not None, self.position is not None, by_way)) != 1:
-            return "give either 'to', 'position', or 'direction' and 'distance'"
-        if by_way and (self.direction is None or self.distance is None):
-            return "'direction' and 'distance' go together"
-        return not_level(self.direction)
+        goals = not_one_goal(self.to, self.position, self.direction, self.distance)
+        return goals or not_level(self.direction)
 
-    def waypoints(self, seen: Seen) -> Sequence[Array]:
+    def waypoints(self, seen: Seen, each: Sequence[WorldView]) -> Sequence[Array]:
         """See `Slid.waypoints`."""
         xp, now = array_namespace(seen.tool), seen.object(self.target)[:, :3]
         if self.to is not None:
@@ -128,7 +119,3 @@ class Slide(Slid):
         there = np.concatenate([end[:2], now[2:3] + ABOVE, now[3:]])
         supports = frozenset(support_of(view, self.target)[0])
         return Aim(there[None], "be slid there", supports, on_the_way=True)
-
-
-ABOVE = 0.003
-"""Metres above its support at which a grasp is chosen for it."""

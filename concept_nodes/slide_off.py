@@ -22,15 +22,19 @@ from bt_tasksim.concept.parameters import (
 )
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes.level_way import not_level
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.shoved_way import touching_now
-from bt_tasksim.concept_nodes.slid import GOOD, Slid, SlidMemory, not_level
+from bt_tasksim.concept_nodes.slid import GOOD, SHARES, Slid, SlidMemory
 from bt_tasksim.concept_nodes.stops import CLEAR, gaps, nearest_stop, no_way_named, way_in, ways_in
 from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, constant
 from bt_tasksim.core.registry import register
+
+NEAR = 0.02
+"""Metres from a stop up to which it counts as standing against that when it is grasped."""
 
 
 @register("concept")
@@ -73,11 +77,11 @@ class SlideOff(Slid):
         """A way that is level, or what it leaves."""
         return not_level(self.direction) or no_way_named(self.direction, self.off, "off")
 
-    def waypoints(self, seen: Seen) -> Sequence[Array]:
+    def waypoints(self, seen: Seen, each: Sequence[WorldView]) -> Sequence[Array]:
         """See `Slid.waypoints`."""
-        if self.direction is not None:
-            return (self.distance * ways_in(seen, self.target, self.direction, None, math.inf),)
-        return (-self.distance * ways_in(seen, self.target, None, self.off, math.inf),)
+        distance = -self.distance if self.direction is None else self.distance
+        ways = ways_in(each, self.target, self.direction, self.off, math.inf)
+        return (distance * constant(ways, seen.tool),)
 
     def aim(self, view: WorldView) -> Aim | None:
         """To where it ends, where it stands against something now."""
@@ -105,9 +109,3 @@ class SlideOff(Slid):
         """It has come its way, and the tool is there."""
         gone = poses.dot(seen.tool[:, :3] - memory.path.table[:, 0, :3], memory.along)
         return (memory.progress >= memory.path.duration) & (gone >= self.distance - self.tolerance)
-
-
-SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Shares of its way at which the arm has to be able to be."""
-NEAR = 0.02
-"""Metres from a stop up to which it counts as standing against that when it is grasped."""

@@ -15,18 +15,20 @@ from bt_tasksim.concept.limit import Limit
 from bt_tasksim.concept.parameters import Direction, Metres, MetresPerSecond, Newtons, ObjectName, PlaceName
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
+from bt_tasksim.concept_nodes.level_way import not_level
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT
 from bt_tasksim.concept_nodes.shoved_way import free_until
-from bt_tasksim.concept_nodes.slid import Slid, SlidMemory, not_level
+from bt_tasksim.concept_nodes.slid import ABOVE, SHARES, Slid, SlidMemory
 from bt_tasksim.concept_nodes.standing import supports_of
 from bt_tasksim.concept_nodes.stops import UP, gaps, no_way_named, way_in, ways_in
 from bt_tasksim.concept_nodes.tipping import support_of
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import register_reason
-from bt_tasksim.core.poses import Array, array_namespace
+from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import SECONDS
+from bt_tasksim.core.world import FURNITURE
 from bt_tasksim.planning.reference_motion import position
 from bt_tasksim.scene.walls import CLOSE
 
@@ -36,6 +38,15 @@ NO_STOP = register_reason(
     value=SECONDS,
     limit=SECONDS,
 )
+BEYOND = 0.004
+"""Metres beyond where it meets something at which the hand has to be clear of that, so that no finger is in
+front of the object: of things and of how they lie in the hand some is not known.
+"""
+BEFORE, CREEPS, PRESSES = 0.025, 0.015, 0.005
+"""Metres before where it is known to meet something from which on it goes so slowly, m/s; and how slowly it
+goes on once it has met something."""
+LATE = 0.5
+"""Seconds after its way's end until which it may still be held up."""
 
 
 @register("concept")
@@ -85,9 +96,10 @@ class SlideToStop(Slid):
         """A way that is level, or where it ends."""
         return not_level(self.direction) or no_way_named(self.direction, self.against, "against")
 
-    def waypoints(self, seen: Seen) -> Sequence[Array]:
+    def waypoints(self, seen: Seen, each: Sequence[WorldView]) -> Sequence[Array]:
         """See `Slid.waypoints`."""
-        return (self.distance * ways_in(seen, self.target, self.direction, self.against, self.distance),)
+        ways = ways_in(each, self.target, self.direction, self.against, self.distance)
+        return (self.distance * constant(ways, seen.tool),)
 
     def aim(self, view: WorldView) -> Aim | None:
         """To where it is known to meet something, if it does."""
@@ -114,7 +126,7 @@ class SlideToStop(Slid):
         """The stop, wherever it is; where it is not named, any furniture and any object may be it."""
         if self.against is not None:
             return frozenset({self.against}) | supports_of(view, self.against)
-        return frozenset({*view.objects, *(box.fixture or "furniture" for box in view.world.obstacles)})
+        return frozenset({*view.objects, *(box.fixture or FURNITURE for box in view.world.obstacles)})
 
     def _pace(self, seen: Seen, memory: SlidMemory) -> Array:
         """Slowly from a little before where it is known to meet something, or all the way where nothing is.
@@ -160,18 +172,3 @@ def _slow(memory: SlidMemory) -> Array:
     xp, whole = array_namespace(memory.clear), _whole(memory)
     left = xp.minimum(whole - memory.clear + BEFORE, whole)
     return xp.where(memory.clear > whole - BEFORE, whole, left)
-
-
-SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Shares of its way up to there at which the arm has to be able to be."""
-BEYOND = 0.004
-"""Metres beyond where it meets something at which the hand has to be clear of that, so that no finger is in
-front of the object: of things and of how they lie in the hand some is not known.
-"""
-ABOVE = 0.003
-"""Metres above its support at which it is looked at where it meets something."""
-BEFORE, CREEPS, PRESSES = 0.025, 0.015, 0.005
-"""Metres before where it is known to meet something from which on it goes so slowly, m/s; and how slowly it
-goes on once it has met something."""
-LATE = 0.5
-"""Seconds after its way's end until which it may still be held up."""

@@ -94,8 +94,7 @@ def _turned(options: Array, angle: float) -> Array:
 
 def supports_of(view: WorldView, reference: str) -> frozenset[str]:
     """Names of what an object touches that stands on a place or on another object."""
-    place = view.world.places.get(reference)
-    return frozenset([reference if place is None else place.fixture or "furniture"])
+    return frozenset([view.world.thing_of(reference)])
 
 
 def standing_height(model: ObjectModel) -> float:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
 
-from bt_tasksim.concept.seen import Seen
-from bt_tasksim.concept_nodes.view import WorldView, views
+from bt_tasksim.concept_nodes.level_way import flattened
+from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.facts import WorldFacts
 from bt_tasksim.core.poses import Array, constant
 from bt_tasksim.core.transfer import fetched
-from bt_tasksim.core.world import Obstacle, WorldModel
+from bt_tasksim.core.world import FURNITURE, Obstacle, WorldModel
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import box_corners
 from bt_tasksim.scene.outlines import Slab, hull
@@ -63,18 +63,12 @@ def gaps(world: WorldFacts, objects: Array, target: str, other: str | None) -> A
 
 def _nearest(world: WorldModel, objects: Mapping[str, Array], target: str, other: str | None) -> Wall | None:
     """See `nearest_stop`. The outlines of what is not asked about are not made."""
-    named = None if other is None else whose(world, other)
-    walls = [_standing(box) for box in world.obstacles if named in (None, box.fixture or "furniture")]
+    named = None if other is None else world.thing_of(other)
+    walls = [_standing(box) for box in world.obstacles if named in (None, box.fixture or FURNITURE)]
     for name in objects:
         if name != target and named in (None, name):
             walls += _slabs(world, objects, name)
     return nearest_wall(_slabs(world, objects, target), walls)
-
-
-def whose(world: WorldModel, name: str) -> str:
-    """The name under which an object, or the fixture of a place, is kept clear of."""
-    place = world.places.get(name)
-    return name if place is None else place.fixture or "furniture"
 
 
 def no_way_named(direction: tuple[float, float, float] | None, other: str | None, by: str) -> str:
@@ -97,36 +91,37 @@ def way_in(
         None where there is neither.
     """
     if direction is not None:
-        flat = np.array([*direction[:2], 0.0])
-        return flat / np.linalg.norm(flat)
+        return flattened(direction)
     found = None if other is None else nearest_stop(view, target, other)
     return None if found is None else found.towards
 
 
 def ways_in(
-    seen: Seen, target: str, direction: tuple[float, float, float] | None, other: str | None, reach: float
+    each: Sequence[WorldView],
+    target: str,
+    direction: tuple[float, float, float] | None,
+    other: str | None,
+    reach: float,
 ) -> Array:
-    """The same in each world ``(N, 3)``.
+    """The same in each of some worlds ``(N, 3)``.
 
     Raises:
-        NoWayError: Of one world nothing says which way, or the wall is farther away than it may go, metres.
+        NoWayError: In one of them nothing says which way, or the wall is farther away than it may go, metres.
     """
+    if direction is not None:
+        return np.array([flattened(direction)] * len(each))
     found = []
-    for view in views(seen):
-        way = way_in(view, target, direction, other)
-        if way is None:
+    for view in each:
+        stop = None if other is None else nearest_stop(view, target, other)
+        if stop is None:
             raise NoWayError(f"{other} has nothing beside {target} that holds it up: give a 'direction'")
-        if direction is None and (gap := _gap(view, target, other)) > reach:
+        if stop.gap > reach:
             raise NoWayError(
-                f"{other} is {1000 * gap:.0f} mm from {target}, farther than it may go, {1000 * reach:.0f} mm"
+                f"{other} is {1000 * stop.gap:.0f} mm from {target}, farther than it may go, "
+                f"{1000 * reach:.0f} mm"
             )
-        found.append(way)
-    return constant(np.array(found), seen.tool)
-
-
-def _gap(view: WorldView, target: str, other: str | None) -> float:
-    found = nearest_stop(view, target, other)
-    return 0.0 if found is None else found.gap
+        found.append(stop.towards)
+    return np.array(found)
 
 
 def _slabs(world: WorldModel, objects: Mapping[str, Array], name: str) -> list[Slab]:

@@ -24,19 +24,20 @@ from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import force_at_tool, strain
 from bt_tasksim.concept_nodes.standing import headings
 from bt_tasksim.concept_nodes.touching import touched
-from bt_tasksim.concept_nodes.turning import followed_anyhow, swung
+from bt_tasksim.concept_nodes.turning import brought, followed_anyhow, swung, turned_by
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import Form, Possible, Statement, register_reason
 from bt_tasksim.core.poses import Array, array_namespace, constant
 from bt_tasksim.core.units import NEWTONS, RADIANS, SHARE
-from bt_tasksim.core.world import Command, ObjectModel
+from bt_tasksim.core.world import FURNITURE, Command, ObjectModel
 from bt_tasksim.planning.reference_motion import Path, at_times, plan, searched_for
 from bt_tasksim.planning.route import Pace, Route, followed
 from bt_tasksim.planning.routes import SAMPLES, with_routes
 from bt_tasksim.planning.surroundings import pieces_of
 from bt_tasksim.planning.things import Leave
+from bt_tasksim.planning.ways import WayFinder
 
 NO_END = register_reason(
     "no_long_axis",
@@ -65,8 +66,8 @@ NEAR_LEVEL = 0.03
 """Metres between a thing's lowest point and a surface up to which it stands or lies there."""
 ASIDE = math.cos(math.radians(50.0))
 """Cosine of the angle to the side that was asked for within which a side counts as that."""
-TRIED, ENOUGH = 8, 6
-"""Sides over which it is tried to tip a thing; and postures at its end among which a search chooses."""
+TRIED = 8
+"""Sides over which it is tried to tip a thing."""
 RAISED = 0.003
 """Metres above that to which it is brought where the arm cannot lead it over an edge."""
 TURN = 0.7
@@ -173,12 +174,13 @@ class Tipping(ConceptModel[TipMemory]):
     def _found(self, view: WorldView) -> tuple[Route, Array]:
         grip = poses.relative(view.objects[self.target], view.tool)
         ways = spilling_none(view, self.target, self._swings(view))
+        leave = Leave(held=frozenset(support_of(view, self.target)[0]))
+
+        def finder_of(closer: float) -> WayFinder:
+            return view.finder([self.target], held=view.held(self.target), leave=leave, closer=closer)
 
         def find(closer: float) -> tuple[Route, Array]:
-            supports = frozenset(support_of(view, self.target)[0])
-            finder = view.finder(
-                [self.target], held=view.held(self.target), leave=Leave(held=supports), closer=closer
-            )
+            finder = finder_of(closer)
             for way in ways[:TRIED]:
                 joints = followed_anyhow(finder, poses.multiply(way.poses, grip[None]))
                 if joints is not None:
@@ -186,27 +188,16 @@ class Tipping(ConceptModel[TipMemory]):
             raise NoWayError("the arm can follow none of its sides over their edges")
 
         def through_the_air(closer: float) -> tuple[Route, Array]:
-            supports = frozenset(support_of(view, self.target)[0])
-            finder = view.finder(
-                [self.target], held=view.held(self.target), leave=Leave(held=supports), closer=closer
-            )
-            goals: list[Array] = []
-            downs: list[Array] = []
-            for down, pose in self._ends(view, ways):
-                joints = next(finder.postures(poses.multiply(pose, grip)), None)
-                if joints is not None:
-                    goals.append(joints)
-                    downs.append(down)
-                if len(goals) == ENOUGH:
-                    break
-            if not goals:
+            ends = self._ends(view, ways)
+            tools = (poses.multiply(pose, grip) for _, pose in ends)
+            found = brought(finder_of(closer), tools, Pace(self.speed))
+            if found is None:
                 raise NoWayError(
                     f"{self.target} cannot {self.words} as it is held: of {len(ways)} sides there is none on "
                     f"which the arm can set it with the room that there is; hold it otherwise, or make room"
                 )
-            route = finder.search_posture(np.array(goals), Pace(self.speed))
-            far = [float(np.abs(joints - route.joints[-1]).max()) for joints in goals]
-            return route, downs[int(np.argmin(far))]
+            route, chosen = found
+            return route, ends[chosen][0]
 
         try:
             return with_room(ROOMS, find)
@@ -253,11 +244,8 @@ class Tipping(ConceptModel[TipMemory]):
         xp = array_namespace(seen.tool)
         tool, arm = at_times(memory.path, seen.elapsed)
         up = constant([0.0, 0.0, 1.0], tool)
-        turn, middle = poses.from_rotation_vector(memory.righted), memory.middle
-        position = middle + poses.rotate(turn, tool[:, :3] - middle)
-        turned = xp.concat([position, poses.quat_multiply(turn, tool[:, 3:])], axis=-1)
         ended = (seen.elapsed >= memory.path.duration)[:, None]
-        tool = xp.where(ended, turned, tool)
+        tool = xp.where(ended, turned_by(tool, memory.righted, memory.middle), tool)
         return Command(tool=poses.shifted(tool, memory.raised[:, None] * up), posture=arm)
 
     def advance(self, action: Array, seen: Seen, memory: TipMemory) -> TipMemory:
@@ -384,7 +372,7 @@ def support_of(view: WorldView, target: str) -> tuple[list[str], float]:
             names.append(place.fixture)
             if gap < nearest:
                 nearest, level = gap, float(place.pose[2])
-    return [*dict.fromkeys([*names, "furniture"])], level
+    return [*dict.fromkeys([*names, FURNITURE])], level
 
 
 def lifted(view: WorldView, target: str) -> Array:

@@ -24,7 +24,7 @@ from bt_tasksim.concept_nodes.holding import HOLDING, may_hold, not_held
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, strain
 from bt_tasksim.concept_nodes.orientation import UP, missing_lean, missing_turn
 from bt_tasksim.concept_nodes.turn_ways import Turning, turnings
-from bt_tasksim.concept_nodes.turning import followed_anyhow, swung
+from bt_tasksim.concept_nodes.turning import brought, followed_anyhow, swung, turned_by
 from bt_tasksim.concept_nodes.view import WorldView, views
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
@@ -53,8 +53,8 @@ ROOMS = (CARRIED, BROUGHT, TOUCHING)
 """How much closer than usual one may come to things, tried one after the other."""
 RATE = 1.0
 """Radians a second at which it is turned."""
-TRIED, ENOUGH = 6, 6
-"""Ways to turn that are tried where it is; and postures at its end among which a search chooses."""
+TRIED = 6
+"""Ways to turn that are tried where it is."""
 ELSEWHERE = 60
 """Poses that are looked at where it cannot be turned where it is."""
 UPS, ASIDE = (0.0, 0.08, 0.16, 0.24), 0.12
@@ -176,8 +176,11 @@ class Turn(ConceptModel[TurnMemory]):
         grip = poses.relative(view.objects[self.target], view.tool)
         ways = spilling_none(view, self.target, self._turnings(view, view.objects[self.target]))
 
+        def finder_of(closer: float) -> WayFinder:
+            return view.finder([self.target], held=view.held(self.target), closer=closer)
+
         def here(closer: float) -> tuple[Route, Array]:
-            finder = view.finder([self.target], held=view.held(self.target), closer=closer)
+            finder = finder_of(closer)
             for way in ways[:TRIED]:
                 joints = followed_anyhow(finder, poses.multiply(way.poses, grip[None]))
                 if joints is not None:
@@ -185,8 +188,7 @@ class Turn(ConceptModel[TurnMemory]):
             raise NoWayError(f"the arm cannot turn {self.target} where it is")
 
         def elsewhere(closer: float) -> tuple[Route, Array]:
-            finder = view.finder([self.target], held=view.held(self.target), closer=closer)
-            return self._searched(view, finder, ways, grip)
+            return self._searched(view, finder_of(closer), ways, grip)
 
         try:
             return with_room(ROOMS, here)
@@ -205,23 +207,16 @@ class Turn(ConceptModel[TurnMemory]):
         """A way to near by, any way round."""
         ends = _near(view.tool, np.array([way.poses[-1] for way in ways]))
         far = reach_of(view.robot).beyond(poses.multiply(ends, grip[None]), LEANS)
-        goals: list[Array] = []
-        kept: list[Array] = []
-        for end in ends[~far][:ELSEWHERE]:
-            joints = next(finder.postures(poses.multiply(end, grip)), None)
-            if joints is not None:
-                goals.append(joints)
-                kept.append(end)
-            if len(goals) == ENOUGH:
-                break
-        if not goals:
+        near = ends[~far][:ELSEWHERE]
+        tools = (poses.multiply(end, grip) for end in near)
+        found = brought(finder, tools, Pace(self.speed, turn=RATE))
+        if found is None:
             raise NoWayError(
                 f"the arm cannot turn {self.target} so as it holds it: of {len(ends)} poses near by there is "
                 f"none in which it can hold it with the room that there is; hold it otherwise, or make room"
             )
-        route = finder.search_posture(np.array(goals), Pace(self.speed, turn=RATE))
-        off = [float(np.abs(joints - route.joints[-1]).max()) for joints in goals]
-        return route, kept[int(np.argmin(off))]
+        route, chosen = found
+        return route, near[chosen]
 
     def _turnings(self, view: WorldView, now: Array) -> list[Turning]:
         if self.up is not None:
@@ -240,10 +235,12 @@ class Turn(ConceptModel[TurnMemory]):
         if not np.isfinite(now).all():
             return None
         above = [poses.shifted(now, np.array([0.0, 0.0, height])) for height in AIMED]
-        ways = [way.poses for pose in above for way in self._turnings(view, pose)[:FEW]]
-        most = max(2, max(len(way) for way in ways) // 2)
-        onwards = np.array([way[np.round(np.linspace(0, len(way) - 1, most)).astype(int)] for way in ways])
-        first = np.array([pose for pose in above for _ in self._turnings(view, pose)[:FEW]])
+        found = [(pose, way.poses) for pose in above for way in self._turnings(view, pose)[:FEW]]
+        most = max(2, max(len(way) for _, way in found) // 2)
+        onwards = np.array(
+            [way[np.round(np.linspace(0, len(way) - 1, most)).astype(int)] for _, way in found]
+        )
+        first = np.array([pose for pose, _ in found])
         ends = _near(now, onwards[:, -1])
         return Aim(first, "be turned in the air", on_the_way=True, onwards=onwards, aside=ends[:ELSEWHERE])
 
@@ -251,9 +248,7 @@ class Turn(ConceptModel[TurnMemory]):
         """Follow the path, and turn on at its end by what is missing; the hand keeps its grip."""
         xp = array_namespace(seen.tool)
         tool, arm = at_times(memory.path, seen.elapsed)
-        turn, middle = poses.from_rotation_vector(memory.righted), memory.goal[:, :3]
-        position = middle + poses.rotate(turn, tool[:, :3] - middle)
-        turned = xp.concat([position, poses.quat_multiply(turn, tool[:, 3:])], axis=-1)
+        turned = turned_by(tool, memory.righted, memory.goal[:, :3])
         ended = (seen.elapsed >= memory.path.duration)[:, None]
         return Command(tool=xp.where(ended, turned, tool), posture=arm)
 

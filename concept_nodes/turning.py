@@ -1,15 +1,17 @@
-"""Turning what is held: poses on the way about an axis, and the arm's way through them, in one world."""
+"""Turning what is held: poses on the way about an axis, and how the arm comes along them, in one world."""
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.poses import Array
+from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.planning.arm import LEANS
+from bt_tasksim.planning.route import Pace, Route
 from bt_tasksim.planning.ways import WayFinder
 
 STEP = 0.1
@@ -18,13 +20,21 @@ FINE, JUMP = 0.08, 0.3
 """Radians between two postures of a motion of the elbow, and by which no joint may turn more there."""
 POSTURES = 4
 """Postures from which it is tried whether the arm can go on."""
+ENOUGH = 6
+"""Postures at ends among which a search chooses, see `brought`."""
 
 
 def turned(pose: Array, axis: Array, point: Array, angle: float) -> Array:
     """A pose ``(7,)`` turned about the line through ``point (3,)`` along ``axis (3,)``, a unit vector."""
-    turn = poses.from_rotation_vector(angle * axis)
-    position = point + poses.rotate(turn, pose[:3] - point)
-    return np.concatenate([position, poses.quat_multiply(turn, pose[3:])])
+    return turned_by(pose, angle * axis, point)
+
+
+def turned_by(pose: Array, turn: Array, point: Array) -> Array:
+    """Poses ``(..., 7)`` turned about points ``(..., 3)`` by rotation vectors ``(..., 3)``, radians."""
+    by = poses.from_rotation_vector(turn)
+    position = point + poses.rotate(by, pose[..., :3] - point)
+    rotation = poses.quat_multiply(by, pose[..., 3:])
+    return array_namespace(pose).concat([position, rotation], axis=-1)
 
 
 def steps(angle: float, most: float = STEP) -> Array:
@@ -87,6 +97,28 @@ def followed_anyhow(finder: WayFinder, tools: Array, leans: float = LEANS) -> Ar
         return None
     moved = elbow_moved(finder, other[0], now)
     return None if moved is None else np.concatenate([moved, other[1:]])
+
+
+def brought(finder: WayFinder, tools: Iterable[Array], pace: Pace) -> tuple[Route, int] | None:
+    """A motion to one of some tool poses ``(7,)``, of the first `ENOUGH` of them that the arm can be at.
+
+    Returns:
+        The motion, and which of the poses it ends at; None where the arm can be at none.
+    """
+    goals: list[Array] = []
+    kept: list[int] = []
+    for k, tool in enumerate(tools):
+        joints = next(finder.postures(tool), None)
+        if joints is not None:
+            goals.append(joints)
+            kept.append(k)
+        if len(goals) == ENOUGH:
+            break
+    if not goals:
+        return None
+    route = finder.search_posture(np.array(goals), pace)
+    off = [float(np.abs(joints - route.joints[-1]).max()) for joints in goals]
+    return route, kept[int(np.argmin(off))]
 
 
 def elbow_moved(finder: WayFinder, end: Array, tool: Array) -> Array | None:

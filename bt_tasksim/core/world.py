@@ -83,6 +83,8 @@ class ObjectModel:
     joint: JointModel | None = None
 
 
+FURNITURE = "furniture"
+"""Name under which boxes and places are kept clear of that belong to no fixture."""
 HOLE = "hole"
 """Kind of places that things are pushed into along one line, which may point anywhere."""
 
@@ -196,6 +198,11 @@ class WorldModel:
             return self.places[name]
         except KeyError:
             raise InputError(f"no place '{name}' in the scene{nearest(name, self.places)}") from None
+
+    def thing_of(self, name: str) -> str:
+        """The name under which an object, or the fixture of a place, is kept clear of."""
+        place = self.places.get(name)
+        return name if place is None else place.fixture or FURNITURE
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
-from bt_tasksim.core.world import ObjectModel, WorldModel
+from bt_tasksim.core.world import FURNITURE, ObjectModel, WorldModel
 from bt_tasksim.planning.things import Thing, box_corners
 
 CLEAR_OF_FURNITURE = 0.008
@@ -37,7 +37,7 @@ def things_of(world: WorldModel, objects: Mapping[str, Array], closer: float = 0
     """
     usual = 1.0 - closer
     furniture = [
-        Thing(box.fixture or "furniture", box.pose, box.size, margin=usual * CLEAR_OF_FURNITURE)
+        Thing(box.fixture or FURNITURE, box.pose, box.size, margin=usual * CLEAR_OF_FURNITURE)
         for box in world.obstacles
     ]
     margin = usual * CLEAR_OF_OBJECTS

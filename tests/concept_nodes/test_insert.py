@@ -5,8 +5,18 @@ import pytest
 from draws import successes
 
 from bt_tasksim import Runner
+from bt_tasksim.concept.leaf import ONE
 from bt_tasksim.concept_nodes import Grasp, Insert, Pick
-from bt_tasksim.concept_nodes.insertion import PLACES, SURE, UNSURE, box_turns, fitting_poses, in_fingers
+from bt_tasksim.concept_nodes.insert import FEELS, InsertMemory
+from bt_tasksim.concept_nodes.insertion import (
+    PLACES,
+    SURE,
+    UNSURE,
+    box_turns,
+    fitting_poses,
+    in_fingers,
+    places_to_try,
+)
 from bt_tasksim.concept_nodes.view import WorldView
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError, NoWayError
@@ -88,6 +98,22 @@ def test_the_places_that_are_tried_go_outwards_and_lie_close():
     angle, share = rng.uniform(0, 2 * np.pi, 200), np.sqrt(rng.uniform(size=200)) * 0.9
     points = (share * np.array([UNSURE * np.cos(angle), SURE * np.sin(angle)])).T
     assert np.linalg.norm(points[:, None] - PLACES[None], axis=-1).min(axis=1).max() < 0.0011
+
+
+def test_each_place_about_the_mouth_is_tried_once(toy):
+    seen = toy(Grasp("cup")).context.seen(ONE, np.zeros(1))
+    model, places = Insert.value("peg", into="hole"), places_to_try(seen.robot)
+    memory = InsertMemory(*[np.zeros(1)] * len(InsertMemory._fields))
+    memory = memory._replace(sides=np.eye(3)[None, :2], centre=np.zeros((1, 3)), offset=np.zeros((1, 3)))
+    force, inward, nothing = np.zeros((1, 3)), np.array([[0.0, 0.0, -1.0]]), np.zeros(1)
+    begun, visited = np.zeros(1, bool), []
+    memory = memory._replace(inward=inward, begun=begun, tried=nothing + FEELS)
+    while not (limit := model.limits(seen, memory)[1]).applies[0]:
+        offset, _ = model._aside(force, nothing, memory.tried - FEELS, memory, 10.0, places)
+        visited.append(offset[0, :2])
+        memory = memory._replace(tried=memory.tried + 1.0)
+    assert np.allclose(visited, places, atol=1e-12)
+    assert f"{FEELS + len(places):.0f} places were tried, and there are no more" in limit.at(0).sentence
 
 
 @pytest.mark.physical

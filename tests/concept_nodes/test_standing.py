@@ -23,6 +23,7 @@ from bt_tasksim.concept_nodes.standing import (
 from bt_tasksim.concept_nodes.surface import heading_of
 from bt_tasksim.concept_nodes.view import views
 from bt_tasksim.core import poses
+from bt_tasksim.core.world import FURNITURE
 
 
 @pytest.fixture
@@ -93,7 +94,7 @@ def test_on_another_object_it_stands_on_its_top(view):
 
 def test_it_touches_the_fixture_of_the_place_or_the_other_object(view):
     place = view.world.place("goal")
-    assert supports_of(view, "goal") == {place.fixture or "furniture"}
+    assert supports_of(view, "goal") == {place.fixture or FURNITURE}
     assert supports_of(view, "box") == {"box"}
 
 
