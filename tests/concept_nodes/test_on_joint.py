@@ -202,7 +202,7 @@ def test_beyond_a_stop_that_is_not_felt_the_hand_goes_no_faster():
         speeds.append(((here[0] - stop) @ inwards, float(np.linalg.norm(here - before)) / period))
     beyond = [speed for depth, speed in speeds if 0.002 < depth < 0.045]
     assert max(speed for _, speed in speeds) > 5 * GENTLY, "on its way it is faster"
-    assert len(beyond) > 20 and max(beyond) <= GENTLY + 1e-4
+    assert len(beyond) > 20 and max(beyond) <= 1.1 * GENTLY
 
 
 def test_a_way_that_the_arm_cannot_go_is_refused_before_it_is_begun():
