@@ -33,6 +33,9 @@ ROOM = 2.0
 """Each of two normals may be off: what is computed of both may be off by so many times as much."""
 ACTIVE = 4.0
 """The same for a contact that holds the freest direction back."""
+MOST, LARGEST = 60, 2_000
+"""Normals of a set that may differ by more than the tolerance, since all triples of them are looked at; and
+all of them, since all pairs are."""
 MEMORY = 4_000_000
 """Numbers in the largest array at once."""
 
@@ -52,6 +55,28 @@ def padded(sets: Sequence[ArrayLike]) -> tuple[Floats, Booleans]:
     for k, each in enumerate(arrays):
         vectors[k, : len(each)], there[k, : len(each)] = each, True
     return vectors, there
+
+
+def vectors(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    """Numbers of a shape.
+
+    Args:
+        what: What they are, for the sentence.
+        values: The numbers.
+        shape: Their shape; -1 for any length.
+
+    Raises:
+        InputError: They have another shape, or are no finite numbers.
+    """
+    asked = f"give finite numbers of shape ({', '.join('n' if size < 0 else str(size) for size in shape)})"
+    try:
+        found = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{what}: no numbers of one shape; {asked}") from None
+    fits = found.ndim == len(shape) and all(n in (-1, m) for n, m in zip(shape, found.shape, strict=True))
+    if not fits or not np.isfinite(found).all():
+        raise InputError(f"{what}: shape {found.shape}, or not finite; {asked}")
+    return found
 
 
 def unit_normals(normals: Floats, there: Booleans) -> Floats:
@@ -87,13 +112,21 @@ def cone_dimensions(normals: Floats, there: Booleans, tolerance: float = EXACT) 
         The three of each set ``(S, 3)``; their sum is 3.
 
     Raises:
-        InputError: A shape is wrong, or a normal is zero or not finite.
+        InputError: A shape is wrong, a normal is zero or not finite, or there are too many, see `MOST`.
     """
     if not 0.0 <= tolerance < 0.2:
         raise InputError(f"the tolerance of contact normals is {tolerance} rad; give one from 0 to 0.2")
     tolerance = max(float(tolerance), EXACT)
-    unit, there = _different(unit_normals(normals, there), there, tolerance)
+    unit = unit_normals(normals, there)
+    if unit.shape[1] > LARGEST:
+        raise InputError(f"a set has {unit.shape[1]} contact normals, and at most {LARGEST} are looked at")
+    unit, there = _different(unit, there, tolerance)
     counts = there.sum(axis=1)
+    if len(counts) and counts.max() > MOST:
+        raise InputError(
+            f"set {counts.argmax()} has {counts.max()} contact normals that differ by more than "
+            f"{tolerance:.2g} rad, and at most {MOST} are told apart: give fewer, or a larger tolerance"
+        )
     out = np.zeros((len(unit), 3), dtype=np.int64)
     for count in np.unique(counts):
         rows = np.flatnonzero(counts == count)

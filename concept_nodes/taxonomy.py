@@ -19,6 +19,7 @@ plan from observation", IEEE Trans. Robotics and Automation 10(3), 1994. The dim
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +35,7 @@ from bt_tasksim.concept_nodes.contact_cones import (
     Integers,
     cone_dimensions,
     unit_normals,
+    vectors,
 )
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.engines.body_contacts import BodyContacts
@@ -77,7 +79,10 @@ def translation_normals(normals: ArrayLike) -> NDArray[np.float64]:
     Raises:
         InputError: The shape is wrong, or a normal is zero or not finite.
     """
-    array = np.asarray(normals, dtype=np.float64)
+    try:
+        array = np.asarray(normals, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("contact normals are no numbers; give an array of shape (n, 3)") from None
     if array.size == 0:
         return np.zeros((0, 3))
     if array.ndim != 2 or array.shape[1] != 3:
@@ -105,10 +110,13 @@ def rotation_normals(
         InputError: A shape is wrong, or a normal is zero or not finite.
     """
     unit = translation_normals(normals)
-    at = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    about = vectors("the centre", centre, (3,))
+    at = vectors("contact points", points, (-1, 3)) if np.size(points) else np.zeros((0, 3))
+    if not 0.0 <= lever < math.inf:
+        raise InputError(f"the lever of a rotation is {lever} m; give a finite one that is not negative")
     if len(at) != len(unit):
         raise InputError(f"{len(unit)} contact normals but {len(at)} contact points; give one point each")
-    moments = np.cross(at - np.asarray(centre, dtype=np.float64), unit)
+    moments = np.cross(at - about, unit)
     arms = np.linalg.norm(moments, axis=1)
     keep = arms > lever
     return np.asarray(moments[keep] / arms[keep][:, None], dtype=np.float64)
@@ -146,7 +154,7 @@ def contact_state(triple: tuple[int, int, int]) -> ContactState:
         InputError: The numbers are negative or their sum is not 3, so that no cone has them.
     """
     m, d, c = triple
-    if min(m, d, c) < 0 or m + d + c != 3:
+    if any(each != int(each) for each in triple) or min(m, d, c) < 0 or m + d + c != 3:
         raise InputError(f"no contact state has (m, d, c) = ({m}, {d}, {c}): the three must add up to 3")
     return _CLASS_OF[c, d > 0]
 
@@ -215,6 +223,9 @@ def rotation_states(
             f"{normals.shape} contact normals, {points.shape} points and {centres.shape} centres do not fit: "
             "give a point for each normal, and a centre for each set"
         )
+    finite = np.isfinite(centres).all() and np.isfinite(np.where(there[..., None], points, 0.0)).all()
+    if not finite or not 0.0 <= lever < math.inf:
+        raise InputError("contact points, centres and the lever of a rotation have to be finite numbers")
     moments = np.cross(points - centres[:, None], unit_normals(normals, there))
     arms = np.linalg.norm(moments, axis=2)
     there = there & (arms > lever)

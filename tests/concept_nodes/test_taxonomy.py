@@ -235,3 +235,36 @@ def test_bad_input_is_refused_in_one_sentence():
         dimensions([X], tolerance=1.0)
     with pytest.raises(InputError, match="one point each"):
         rotation_normals([X, Y], [[0, 0, 0]], [0, 0, 0])
+
+
+UP, ASIDE = [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("call", "reason"),
+    [
+        (lambda: rotation_state(UP, [[np.nan, 0.0, 0.0]], [0.0, 0.0, 0.0]), "contact points: .* not finite"),
+        (lambda: rotation_state(UP, ASIDE, [np.nan, 0.0, 0.0]), "the centre: .* not finite"),
+        (lambda: rotation_state(UP, ASIDE, [0.0]), "the centre: shape"),
+        (lambda: rotation_state(UP, [[1.0, 0.0]], [0.0, 0.0, 0.0]), "contact points: shape"),
+        (lambda: rotation_state(UP, ASIDE, [0.0, 0.0, 0.0], lever=np.nan), "lever"),
+        (lambda: translation_state([["up", "down", "left"]]), "no numbers"),
+        (lambda: contact_state((1.5, 0.5, 1)), "must add up to 3"),
+        (lambda: translation_state(np.random.default_rng(0).normal(size=(300, 3))), "300 contact normals"),
+        (lambda: translation_state(np.random.default_rng(0).normal(size=(3000, 3))), "3000 contact normals"),
+        (
+            lambda: rotation_states(
+                np.array([UP]), np.ones((1, 1), bool), np.array([ASIDE]), np.full((1, 3), np.nan)
+            ),
+            "finite",
+        ),
+    ],
+)
+def test_what_is_no_set_of_contacts_is_said(call, reason):
+    with pytest.raises(InputError, match=reason):
+        call()
+
+
+def test_many_normals_of_one_direction_are_one_contact():
+    near = [0.0, 0.0, 1.0] + 1e-4 * np.random.default_rng(0).normal(size=(600, 3))
+    assert translation_state(near, tolerance=0.01) == ContactState.PC
