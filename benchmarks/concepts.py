@@ -118,14 +118,20 @@ def measure(row: Row, seeds: Sequence[int]) -> dict[str, Any]:
         versions=identity(),
     )
     felt = {
-        "force": list(feeler.force.values()),
-        "jerk": [feeler.jerk(seed, period) for seed in feeler.tool],
-        "overlap": [o.penetration for o in outcomes.values() if not np.isnan(o.penetration)],
+        "force": feeler.force,
+        "jerk": {seed: feeler.jerk(seed, period) for seed in feeler.tool},
+        "overlap": {seed: o.penetration for seed, o in outcomes.items() if not np.isnan(o.penetration)},
     }
+    rough = {seed for what, values in felt.items() for seed in values if values[seed] > LIMITS[what]}
     kept = {k: v for k, v in found.to_json().items() if k not in ("outcomes", "seconds", "sha256", "subject")}
     reasons = Counter(f"{o.leaf}: {o.reason}" for o in outcomes.values() if not o.success)
-    gentle = {what: _gentle(values, LIMITS[what]) for what, values in felt.items() if values}
-    return {**kept, "first_seed": seeds[0], "reasons": dict(reasons.most_common()), **gentle}
+    gentle = {what: _gentle(list(values.values()), LIMITS[what]) for what, values in felt.items() if values}
+    kept |= {
+        "first_seed": seeds[0],
+        "reasons": dict(reasons.most_common()),
+        "gentle": len(seeds) - len(rough),
+    }
+    return {**kept, **gentle}
 
 
 def _gentle(values: Sequence[float], limit: float) -> dict[str, Any]:

@@ -60,6 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             check_seed(seed)
         if asked.episodes < 1:
             raise InputError(f"'--episodes' should be at least 1, found {asked.episodes}")
+        if asked.kinds and asked.block:
+            raise InputError("a block is measured with all kinds of chores: leave out --kinds")
         if asked.only:
             sealed.check_looked_at(asked.only, f"chores/{name}")
             _said(list(_played(asked.only, asked)), name)
@@ -67,6 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         seeds = sealed.choose(asked.block, asked.seed, f"chores/{name}", asked.episodes)
         draws = list(_played(seeds, asked))
         content = {"benchmark": "chores", "robot": asked.robot, "engines": asked.engines}
+        content |= {name: vars(asked)[name] for name in ("tree", "noise", "oracle", "kinds")}
         content |= {"versions": identity(), **summary(draws), "draws": draws}
         sealed.keep(asked.block, f"chores/{name}", content)
         _said(draws, name)

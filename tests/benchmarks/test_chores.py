@@ -62,3 +62,8 @@ def test_the_ledge_is_in_its_slot():
     slot = dataclasses.replace(FRONT, centre=(0.70, 0.05))
     (ledge,) = KINDS["slide_to_stop"](slot, np.random.default_rng(0)).fixtures
     assert ledge.at == pytest.approx((0.62, 0.05))
+
+
+def test_a_block_is_measured_with_all_kinds(capsys):
+    assert command.main(["--block", "B0011", "--kinds", "carry"]) == 2
+    assert "leave out --kinds" in capsys.readouterr().err

@@ -57,4 +57,14 @@ def test_gentleness_is_that_of_the_engine_in_which_it_was_worse():
         "concept-push-panda-mujoco": result(97, force=41.0),
     }
     (row,) = concept_tables.gentleness(found).splitlines()[2:]
-    assert row == "| `push` | 41.0 of 60 | 12.0 of 40 | 1.1 of 2 | 97 of 100 at least |"
+    assert row.startswith("| `push` | 41.0 of 60 | 12.0 of 40 | 1.1 of 2 | ")
+    found["concept-push-panda-mujoco"]["gentle"] = 93
+    found["concept-push-panda-sapien"]["gentle"] = 95
+    assert concept_tables.gentleness(found).endswith("| 93 of 100 |")
+
+
+def test_of_each_limit_alone_it_follows_how_many_runs_kept_all_at_least():
+    row = result(97, force=20.0)
+    for what, within in (("force", 99), ("jerk", 93), ("overlap", 100)):
+        row[what] |= {"within": within, "of": 100}
+    assert concept_tables.gentleness({"concept-push-panda-sapien": row}).endswith("| 92 of 100 at least |")

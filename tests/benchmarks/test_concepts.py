@@ -19,7 +19,7 @@ def test_a_row_is_counted_and_felt(tmp_path, monkeypatch, capsys):
     found = json.loads(file.read_text())
     assert found["episodes"] == 1 and found["first_seed"] == 500001
     assert 0.0 < found["force"]["largest"] < 100.0 and found["jerk"]["largest"] > 0.0
-    assert found["force"]["within"] == found["force"]["of"] == 1
+    assert found["force"]["within"] == found["force"]["of"] == found["gentle"] == 1
 
 
 def test_sealed_seeds_are_refused(capsys):
