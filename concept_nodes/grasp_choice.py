@@ -427,21 +427,23 @@ class Chooser:
     def _beginnings(self, goal: Array, coming: WayFinder, at: WayFinder, standoff: float) -> _Begins | str:
         """Postures from which the hand comes straight on; or why there are none, in words."""
         back = poses.shifted(goal, -standoff * poses.z_axis(goal[3:]))
-        closed, ends = self._closed(goal), 0
+        closed, refused = self._closed(goal), list[str]()
         starts: list[Array] = []
         for leans in coming.leanings:
             for q in () if starts else itertools.islice(coming.postures(back, leans), ENOUGH):
                 line = at.straight([back, goal], start=q)
                 if line is None or not self._has_reach(back, coming, q, leans):
                     continue
-                if all(aim.goes_on(line[-1], closed, coming.hand) for aim in self._aims):
+                along = (aim.goes_on(line[-1], closed, coming.hand) for aim in self._aims)
+                which = next((k for k, goes in enumerate(along) if not goes), None)
+                if which is None:
                     starts.append(q)
                 else:
-                    ends += 1
+                    refused.append(self._aims[which].words)
         if starts:
             return _Begins(standoff, np.array(starts))
-        if ends:
-            return f"from which the arm cannot also {self._aims[0].words}"
+        if refused:
+            return f"from which the arm cannot also {refused[0]}"
         for finder, tool, when in ((coming, back, " on its way"), (at, goal, "")):
             end = finder.ends(tool[None])
             if not end.reached[0]:

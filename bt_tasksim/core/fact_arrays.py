@@ -54,7 +54,7 @@ class ObjectFacts(FactArrays):
         joint_turns: Boolean ``(...)``: the joint turns, and does not slide.
         joint_origin: A point ``(..., 3)`` on its axis, in the part's frame, metres.
         joint_axis: Unit vectors ``(..., 3)`` in the part's frame.
-        joint_zero: Poses ``(..., 7)`` of the part where it is shut.
+        joint_zero: Poses ``(..., 7)`` of the part where its value is 0.
         joint_limits: Lowest and highest value ``(..., 2)``, metres or radians.
         joint_sensed: Boolean ``(...)``: the robot sees how far it is open.
         handles: Points ``(..., most, 3)`` in the part's frame where two fingers may hold it, metres.

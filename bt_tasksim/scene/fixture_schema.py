@@ -92,7 +92,7 @@ class HoldEntry(Model):
     """Where two fingers may hold a part."""
 
     point: Vector3
-    """Middle between the fingers, fixture's frame where the part is shut, m."""
+    """Middle between the fingers, fixture's frame where the part's value is 0, m."""
     closing: Direction
     """Direction in which the fingers close, likewise."""
     width: Length
@@ -115,7 +115,7 @@ class PartEntry(Model):
     limits: Vector2
     """Lowest and highest value, m or rad; 0 is where the boxes are given."""
     boxes: Annotated[tuple[BoxEntry, ...], Field(strict=False, min_length=1, max_length=100)]
-    """What it is made of, in the fixture's frame where it is shut."""
+    """What it is made of, in the fixture's frame where its value is 0."""
     mass: Annotated[Number, Field(ge=1e-6, le=200.0)] = 1.0
     """kg."""
     friction: Annotated[NotNegative, Field(le=500.0)] = 0.0

@@ -57,7 +57,7 @@ class FixturePlace:
 
 @dataclass(frozen=True)
 class FixturePart:
-    """A part of a fixture that slides or turns, in the fixture's frame where it is shut.
+    """A part of a fixture that slides or turns, in the fixture's frame where its value is 0.
 
     Attributes:
         name: Its name, by which trees speak of it as of an object.

@@ -17,7 +17,7 @@ second under the force that just moves it. With MuJoCo's own it is a centimetre 
 
 
 def add_part_joint(mujoco: ModuleType, body: mj.MjsBody, name: str, joint: Joint) -> None:
-    """The joint of a part, in a body that stands where the part is shut. A latch is the engine's to apply."""
+    """The joint of a part, in a body that stands where its value is 0. A latch is the engine's to apply."""
     kinds = mujoco.mjtJoint
     made = body.add_joint(name=name, type=kinds.mjJNT_HINGE if joint.turns else kinds.mjJNT_SLIDE)
     made.pos, made.axis = joint.origin, joint.axis

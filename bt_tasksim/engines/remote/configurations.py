@@ -166,7 +166,7 @@ def _check_part(actor: ObjectActor, where: str) -> None:
         raise InputError(
             f"{where}: its joint is of unknown kind {shown(joint.kind)}{nearest(joint.kind, JOINTS)}"
         )
-    _pose(joint.zero, f"{where}: where it is shut")
+    _pose(joint.zero, f"{where}: where its value is 0")
     if len(joint.axis) != 3 or abs(math.hypot(*joint.axis) - 1.0) > 1e-3:
         raise InputError(f"{where}: the axis of its joint is a unit vector")
     _within(joint.origin, (-_FAR, _FAR), f"{where}: origin of its joint")
