@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
@@ -47,8 +48,8 @@ def fitting(concept: type[Mover]) -> str:
     return min(found, key=lambda kind: (len(kind.__mro__), kind.__name__)).__name__ if found else ""
 
 
-def is_asked(model: Mover, conditions: Iterable[object]) -> bool:
-    """A tree asks how the part moves, so that it is its own affair what it does about it."""
+def is_asked(model: Any, conditions: Iterable[object]) -> bool:
+    """A tree asks how a leaf's part moves, so that it is its own affair what it does about it."""
     return any(isinstance(one, Slides | Turns) and one.target == model.target for one in conditions)
 
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.checking.part_kinds import Mover, is_asked, of_other_kind, what_to_do
+from bt_tasksim.checking.part_values import asks_for_a_value, beyond
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.concept.leaf import ModelLeaf
-from bt_tasksim.concept_nodes.on_joint import OnJoint
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.joints import JointModel
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 DRAWS = 10
 """Worlds of the scene in which it is asked: how far a part goes may be drawn."""
 LESS = "ask for less, or for furniture that goes farther"
+WITHIN = "ask for a value between these"
 
 
 @dataclass
@@ -44,6 +45,8 @@ class _Leaf:
 def check_parts(tree: Behaviour, scene: WorldSource, report: Report) -> None:
     """Every leaf that moves a part of furniture is for such parts, and asks for no more than they can do.
 
+    Conditions, likewise, ask for no values that a part cannot have.
+
     Args:
         tree: The tree.
         scene: Its scene.
@@ -65,15 +68,19 @@ def check_parts(tree: Behaviour, scene: WorldSource, report: Report) -> None:
         if leaf.reasons:
             level = ERROR if len(leaf.reasons) == drawn else WARNING
             sentence, remedy = leaf.reasons[0]
-            what = f"cannot be done in {len(leaf.reasons)} of {drawn} draws: {sentence}"
+            how = "cannot be done" if isinstance(leaf.model, Mover) else "makes no sense"
+            what = f"{how} in {len(leaf.reasons)} of {drawn} draws: {sentence}"
             report.add(level, "tree", leaf.name, what, remedy)
 
 
 def _leaves(tree: Behaviour) -> Sequence[_Leaf]:
-    """What moves parts; those of the same name are told apart by which leaf of the tree they are."""
+    """What moves parts or compares them with a value.
+
+    Those of the same name are told apart by which leaf of the tree they are.
+    """
     last = [node for node in tree.iterate() if not node.children]
     every = [(k, leaf) for k, leaf in enumerate(last, 1) if isinstance(leaf, ModelLeaf)]
-    asked = [(k, n) for k, n in every if isinstance(n.model, Mover)]
+    asked = [(k, n) for k, n in every if isinstance(n.model, Mover) or asks_for_a_value(n.model)]
     called = Counter(n.name for _, n in asked)
     models = [n.model for _, n in every]
     return [
@@ -84,8 +91,11 @@ def _leaves(tree: Behaviour) -> Sequence[_Leaf]:
 
 def _wrong(leaf: _Leaf, joint: JointModel | None) -> tuple[str, str] | None:
     """What is wrong with a leaf for a part with such a joint, and what to do."""
-    if why := of_other_kind(leaf.model, joint):
-        return None if leaf.guarded else (why, what_to_do(leaf.model, joint))
-    if isinstance(leaf.model, OnJoint) and joint is not None and (why := leaf.model.beyond_its_way(joint)):
-        return why, LESS
+    if isinstance(leaf.model, Mover):
+        if why := of_other_kind(leaf.model, joint):
+            return None if leaf.guarded else (why, what_to_do(leaf.model, joint))
+    elif leaf.guarded:
+        return None
+    if joint is not None and (why := beyond(leaf.model, joint)):
+        return why, LESS if isinstance(leaf.model, Mover) else WITHIN
     return None

@@ -17,7 +17,7 @@ from bt_tasksim.core.joints import SLIDES, JointModel, Joints
 from bt_tasksim.core.outcomes import Reason, register_reason
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.units import METRES, RADIANS, Unit
+from bt_tasksim.core.units import METRES, RADIANS, Unit, degrees_meant
 from bt_tasksim.scene.fixtures import FixturePart
 from bt_tasksim.scene.joint_laws import ValueAsked, opened, set_to, shut
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
@@ -66,9 +66,10 @@ class JointGoal(GoalRelation):
         room = MAY_BE * (high - low)
         if low - room <= goal.value <= high + room:
             return ""
+        meant = "" if part.kind == SLIDES else degrees_meant(goal.value)
         return (
             f"the goal '{goal.relation}' of '{goal.object}' asks for {unit.text(goal.value)}, and it goes "
-            f"from {unit.text(low)} to {unit.text(high)}"
+            f"from {unit.text(low)} to {unit.text(high)}{meant}"
         )
 
     @staticmethod

@@ -9,6 +9,8 @@ from bt_tasksim.concept_nodes import (
     CloseDoor,
     CloseDrawer,
     Grasp,
+    IsOpen,
+    JointAt,
     OpenDoor,
     OpenDrawer,
     PressButton,
@@ -89,3 +91,25 @@ def test_a_knob_of_which_only_some_go_so_far_is_a_warning():
     knob = FixtureSpec("knob", parameters={"turns": (1.0, 4.0)})
     (found,) = findings(TurnKnob("knob", angle=2.5), fixture=knob, part="knob")
     assert found.level == WARNING and "of 10 draws" in found.what
+
+
+@pytest.mark.parametrize("condition", [IsOpen("door", by=60), JointAt("door", at=60)])
+def test_a_condition_in_degrees_is_an_error(condition):
+    (found,) = findings(condition, fixture="door", part="door")
+    assert found.level == ERROR and found.function == condition.name
+    assert "door is asked about at 3437.7 degrees, and it goes from 0.0 degrees to" in found.what
+    assert found.what.endswith("only: values are radians, and 60 degrees are 1.05")
+
+
+def test_a_condition_beyond_the_way_of_what_slides_says_nothing_of_degrees():
+    (found,) = findings(IsOpen("drawer", by=60))
+    assert "60000 mm" in found.what and "radians" not in found.what
+
+
+def test_conditions_within_the_way_are_let_alone():
+    assert findings(IsOpen("drawer"), IsOpen("drawer", by=0.1), JointAt("drawer", at=0.0)) == []
+
+
+def test_a_leaf_in_degrees_is_told_the_radians():
+    (found,) = findings(TurnKnob("knob", angle=90), fixture="knob", part="knob")
+    assert found.level == ERROR and found.what.endswith(": values are radians, and 90 degrees are 1.57")

@@ -81,3 +81,8 @@ def test_what_is_no_part_or_has_no_value_is_refused():
 def test_goals_that_cannot_be_are_refused_before_anything_runs(goal, words):
     with pytest.raises(InputError, match=words):
         Scene(fixtures=["chest"], objects={"cup": "on table"}, goal=goal)
+
+
+def test_a_goal_in_degrees_is_told_the_radians():
+    with pytest.raises(InputError, match=r"3437\.7 degrees, .* radians, and 60 degrees are 1\.05$"):
+        Scene(fixtures=["door"], goal=Goal("door", relation="open", value=60))
