@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bt_tasksim.checking.part_goals import check_part_goals
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.checking.scene_goals import check_together
 from bt_tasksim.checking.scene_reach import check_goals, check_objects
@@ -56,6 +57,7 @@ def check_scene(scene: Scene, report: Report | None = None) -> Report:
         check_room(scene, worlds[:REACHED], report)
         check_objects(scene, worlds[:REACHED], report)
         check_goals(scene, worlds[:REACHED], report)
+        check_part_goals(scene, worlds[:REACHED], report)
         check_together(scene, worlds[:REACHED], report)
         _check_still(scene, worlds[:SETTLED], report)
     things = f"{len(scene.objects)} object{'' if len(scene.objects) == 1 else 's'}"

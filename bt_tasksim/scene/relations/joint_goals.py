@@ -115,6 +115,21 @@ class Open(JointGoal):
 
     reasons = (NOT_OPEN, IS_OPEN)
 
+    def fault(self, goal: Goal, part: FixturePart | None) -> str:
+        """See `GoalRelation.fault`: nor should its tolerance cover all that it asks for."""
+        if (why := super().fault(goal, part)) or part is None or goal.value is None:
+            return why
+        slides, low = part.kind == SLIDES, part.limits[0]
+        name, unit = ("position_tolerance", METRES) if slides else ("angle_tolerance", RADIANS)
+        allowed = goal.position_tolerance if slides else goal.angle_tolerance
+        if goal.value - low > allowed:
+            return ""
+        return (
+            f"the goal 'open' of '{goal.object}' asks for {unit.text(goal.value)} and its {name} is "
+            f"{unit.text(allowed)}, so it is reached with '{goal.object}' shut: give it a smaller tolerance, "
+            "or a larger value"
+        )
+
     def asked(self, goal: Goal, joint: JointModel, value: Array) -> ValueAsked:
         """See `JointGoal.asked`."""
         return opened(value, np.array([joint.limits]), goal.value, self.tolerance(goal, joint))
