@@ -10,6 +10,7 @@ import numpy as np
 
 from bt_tasksim.checking.part_reach import part_tool_poses
 from bt_tasksim.checking.report import ERROR, WARNING, Report
+from bt_tasksim.checking.scene_goals import CARRIED
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import ObjectModel, PlaceModel
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 
 ACROSS = 0.5
 """Largest cosine between the direction in which a hand comes and that in which its fingers close."""
+STANDS = (*CARRIED, "inserted")
+"""Relations in which the object needs room on the place, or in it."""
+THERE = (*STANDS, "pressed")
+"""Those in which it has to come to the place: of others, that says how it is turned or what is beside it."""
 TURNS = 4
 """Headings of an object at its goal that are tried; as many turns about the axis of a round one."""
 
@@ -105,9 +110,11 @@ def check_goals(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repo
             places = {place.name: place for place in world.places}
             if goal.place not in places or goal.object not in scene.object_names:
                 continue
+            if goal.relation not in THERE:
+                continue
             known += 1
             actor, place = _actor(world, goal.object), places[goal.place]
-            small += not _fits(actor.model(), place)
+            small += goal.relation in STANDS and not (_passed(goal, place) or _fits(actor.model(), place))
             far += not _any_reached(robot, _at_goal(robot, actor, place))
         where = f"goal of '{goal.object}'"
         if small:
@@ -179,6 +186,11 @@ def _at_goal(robot: RobotDescription, actor: ObjectActor, place: PlaceModel) -> 
         local = poses.pose([0.0, 0.0, height], poses.yaw(2 * math.pi * k / TURNS))
         out.append(tool_poses(robot, model, poses.multiply(place.pose, local), grips, place.access))
     return np.concatenate(out)
+
+
+def _passed(goal: Goal, place: PlaceModel) -> bool:
+    """A mark that the object only has to have been on, as it goes over it."""
+    return goal.when == "once" and place.kind == "spot"
 
 
 def _fits(model: ObjectModel, place: PlaceModel) -> bool:
