@@ -51,7 +51,7 @@ def check_scene(scene: Scene, report: Report | None = None) -> Report:
         check_room(scene, worlds[:REACHED], report)
         check_objects(scene, worlds[:REACHED], report)
         check_goals(scene, worlds[:REACHED], report)
-        check_part_goals(scene, worlds[:REACHED], report)
+        check_part_goals(scene, worlds, report)
         check_together(scene, worlds[:REACHED], report)
         check_still(scene, worlds[:SETTLED], report)
     things = f"{len(scene.objects)} object{'' if len(scene.objects) == 1 else 's'}"
