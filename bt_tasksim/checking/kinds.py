@@ -20,7 +20,9 @@ FIXTURE = {"boxes", "places"}
 """Likewise of furniture's."""
 
 
-def check_file(file: str, tree: str | None = None, robot: str | None = None) -> Report:
+def check_file(
+    file: str, tree: str | None = None, robot: str | None = None, scene: str | None = None
+) -> Report:
     """Check what a file holds.
 
     See `concept_file.check`, `check_robot`, `check_scene`, `check_object_file` and `check_mesh`.
@@ -29,18 +31,23 @@ def check_file(file: str, tree: str | None = None, robot: str | None = None) -> 
         file: The file, or the name of a robot.
         tree: The tree in which concepts are seen at work.
         robot: Name or file of the robot for a scene or an object; by default the scene's own.
+        scene: Name or file of the scene in which a tree is checked; by default the tree's own.
 
     Raises:
         InputError: There is no such file, it is of no kind that is checked, or it cannot be read.
         MachineError: A library is not installed.
     """
     path = Path(file)
+    if scene is not None and path.suffix not in (".xml", ".py"):
+        raise InputError(f"--scene is the scene of a tree, and '{file}' is none: give an .xml or a .py file")
     if not path.suffix:
         if file not in parts("robot"):
             raise InputError(f"there is no robot '{file}'{nearest(file, parts('robot'))}; or name a file")
         return _robot(file)
     if not path.is_file():
         raise InputError(f"there is no file '{file}'")
+    if path.suffix == ".xml" or (path.suffix == ".py" and scene is not None):
+        return _tree(file, robot, scene)
     if path.suffix == ".py":
         return _code(file, tree, robot)
     from bt_tasksim.scene.mesh_file import FORMATS
@@ -63,8 +70,8 @@ def check_file(file: str, tree: str | None = None, robot: str | None = None) -> 
         return check_object_file(file, **({} if robot is None else {"robot": robot}))
     raise InputError(
         f"'{file}' is neither a robot's file (urdf, arm, hand ...) nor a scene's (objects, goal ...) nor an "
-        "object's (mesh, kind, grasps ...): give one of these, a mesh, or a Python file with a concept or a "
-        "scene()"
+        "object's (mesh, kind, grasps ...): give one of these, a mesh, a tree's .xml file, or a Python file "
+        "with a concept or a scene()"
     )
 
 
@@ -80,18 +87,25 @@ def _code(file: str, tree: str | None, robot: str | None) -> Report:
 
 def _scene_and_tree(file: str, robot: str | None) -> Report:
     """The scene of a Python file, and its tree, if it builds one: its names have to be in the scene."""
-    from bt_tasksim.checking.tree_parts import check_parts
-    from bt_tasksim.trees.load import has_tree, load_source
+    from bt_tasksim.trees.load import has_tree
 
-    if not has_tree(file):
-        return _scene(file, robot)
-    source = load_source(file, robot)
-    report, tree = _scene(file, robot), source.build()
+    return _tree(file, robot) if has_tree(file) else _scene(file, robot)
+
+
+def _tree(file: str, robot: str | None, scene: str | None = None) -> Report:
+    """A tree and the scene that it runs in, its own unless another one is named."""
+    from bt_tasksim.checking.scene_file import check_scene
+    from bt_tasksim.checking.tree_parts import check_parts
+    from bt_tasksim.scene.scene import Scene
+    from bt_tasksim.trees.load import load_source
+
+    source = load_source(file, robot, scene)
+    assert isinstance(source.scene, Scene), "no engine brings a world of its own here"
+    report, tree = check_scene(source.scene), source.build()
     check_parts(tree, source.scene, report)
-    nodes = sum(1 for _ in tree.iterate())
-    report.done(
-        f"tree {source.name}, {nodes} nodes: shape, memory, names of objects and places, ways of parts"
-    )
+    count = sum(1 for _ in tree.iterate())
+    nodes = f"{count} node{'' if count == 1 else 's'}"
+    report.done(f"tree {source.name}, {nodes}: shape, memory, names of objects and places, ways of parts")
     return report
 
 

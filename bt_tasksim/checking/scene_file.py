@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bt_tasksim.checking.part_goals import check_part_goals
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.checking.scene_goals import check_together
 from bt_tasksim.checking.scene_reach import check_goals, check_objects
 from bt_tasksim.checking.scene_room import check_room
+from bt_tasksim.checking.scene_still import check_still
 from bt_tasksim.core import poses
 from bt_tasksim.core.errors import InputError, NoDrawError
-from bt_tasksim.core.world import Command
 from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.overlap import check_configuration
-from bt_tasksim.scene.success import at_rest
 
 if TYPE_CHECKING:
     from bt_tasksim.scene.scene import Scene
@@ -31,10 +30,6 @@ REACHED = 6
 """Worlds of which it is seen what the arm reaches."""
 SETTLED = 3
 """Worlds that are simulated for a moment."""
-MOMENT = 1.0
-"""Seconds for which nothing should move."""
-MOVED, TILTED = 0.01, math.radians(5.0)
-"""Metres and radians by which an object may move in that moment."""
 
 
 def check_scene(scene: Scene, report: Report | None = None) -> Report:
@@ -56,8 +51,9 @@ def check_scene(scene: Scene, report: Report | None = None) -> Report:
         check_room(scene, worlds[:REACHED], report)
         check_objects(scene, worlds[:REACHED], report)
         check_goals(scene, worlds[:REACHED], report)
+        check_part_goals(scene, worlds, report)
         check_together(scene, worlds[:REACHED], report)
-        _check_still(scene, worlds[:SETTLED], report)
+        check_still(scene, worlds[:SETTLED], report)
     things = f"{len(scene.objects)} object{'' if len(scene.objects) == 1 else 's'}"
     report.done(
         f"scene {scene.name}, {things} for {load_robot(scene.robot).name}: "
@@ -114,39 +110,3 @@ def _check_places(scene: Scene, worlds: list[ActorConfiguration], report: Report
         if high:
             what = f"is higher than the free space above '{on}' in {high} of {len(worlds)} draws"
             report.add(ERROR, scene.name, name, what, "take a lower object, or another place")
-
-
-def _check_still(scene: Scene, worlds: list[ActorConfiguration], report: Report) -> None:
-    """Nothing moves by itself in the first moment."""
-    from bt_tasksim.execution.pipelines import EngineOptions, build_pipeline
-
-    robot = load_robot(scene.robot)
-    moved: dict[str, tuple[float, float]] = {}
-    restless = 0
-    pipeline = build_pipeline(robot, EngineOptions(noise="none"))
-    try:
-        for world in worlds:
-            pipeline.reset(world, world.world_model([tip.name for tip in robot.tips], robot.opening))
-            for _ in range(round(MOMENT * world.control_frequency)):
-                pipeline.step(Command())
-            hidden = pipeline.hidden()
-            assert hidden is not None
-            restless += not at_rest(hidden.velocities[: len(world.objects)])
-            for k, actor in enumerate(world.objects):
-                shift = float(poses.norm(hidden.objects[k, :3] - np.array(actor.pose[:3])))
-                up = poses.z_axis(hidden.objects[k, 3:]) @ poses.z_axis(np.array(actor.pose[3:]))
-                tilt = math.acos(min(1.0, max(-1.0, float(up))))
-                before = moved.get(actor.name, (0.0, 0.0))
-                moved[actor.name] = max(before[0], shift), max(before[1], tilt)
-    finally:
-        pipeline.close()
-    for name, (shift, tilt) in moved.items():
-        if shift > MOVED or tilt > TILTED:
-            what = (
-                f"does not stand where it is put: in {MOMENT:g} s it moves by {1000 * shift:.0f} mm and "
-                f"tilts by {math.degrees(tilt):.0f} degrees"
-            )
-            report.add(ERROR, scene.name, name, what, "give it a foot to stand on, or another place")
-    if restless and not any(shift > MOVED or tilt > TILTED for shift, tilt in moved.values()):
-        what = f"is still in motion {MOMENT:g} s after the start in {restless} of {len(worlds)} draws"
-        report.add(WARNING, scene.name, "objects", what, "see that nothing rolls or rocks")

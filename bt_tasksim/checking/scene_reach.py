@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bt_tasksim.checking.part_reach import part_tool_poses
 from bt_tasksim.checking.report import ERROR, WARNING, Report
+from bt_tasksim.checking.scene_goals import CARRIED
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import ObjectModel, PlaceModel
@@ -24,6 +26,10 @@ if TYPE_CHECKING:
 
 ACROSS = 0.5
 """Largest cosine between the direction in which a hand comes and that in which its fingers close."""
+STANDS = (*CARRIED, "inserted")
+"""Relations in which the object needs room on the place, or in it."""
+THERE = (*STANDS, "pressed")
+"""Those in which it has to come to the place: of others, that says how it is turned or what is beside it."""
 TURNS = 4
 """Headings of an object at its goal that are tried; as many turns about the axis of a round one."""
 
@@ -38,14 +44,22 @@ def check_objects(scene: Scene, worlds: Sequence[ActorConfiguration], report: Re
     """
     robot = load_robot(scene.robot)
     for name in scene.object_names:
-        wide, far, held = [], 0, 0
+        wide, far, held, none = [], 0, 0, 0
         for world in worlds:
-            grips = grips_of(_actor(world, name))
+            actor = _actor(world, name)
+            grips = grips_of(actor)
+            if not len(grips):  # such a part, a button, is not for a hand to take
+                none += actor.joint is None
+                continue
             if not fits_between(grips.widths, robot.opening).any():
-                wide.append(float(grips.widths.min()) if len(grips) else math.inf)
+                wide.append(float(grips.widths.min()))
                 continue
             held += 1
             far += not is_reached(robot, world, name)
+        if none:
+            what = f"has nothing that two fingers could close on, in {none} of {len(worlds)} draws"
+            level = ERROR if none == len(worlds) else WARNING
+            report.add(level, scene.name, name, what, "give it 'grasps', or another shape")
         if wide:
             what = (
                 f"is {1000 * min(wide):.0f} mm wide where it is narrowest, in {len(wide)} of {len(worlds)} "
@@ -54,20 +68,30 @@ def check_objects(scene: Scene, worlds: Sequence[ActorConfiguration], report: Re
             level = ERROR if len(wide) == len(worlds) else WARNING
             report.add(level, scene.name, name, what, "make it narrower, or take another hand")
         if far:
-            place = _place(worlds[0], _actor(worlds[0], name).on)
-            what = f"is out of reach on '{place.name}' in {far} of {held} draws, from {_said(place.access)}"
-            level = ERROR if far == held else WARNING
-            remedy = f"move it nearer to {_ahead(robot)}, or give its place another 'access'"
-            report.add(level, scene.name, name, what, remedy)
+            where, remedy = _out_of_reach(robot, worlds[0], name, f"{far} of {held} draws")
+            report.add(ERROR if far == held else WARNING, scene.name, name, where, remedy)
+
+
+def _out_of_reach(
+    robot: RobotDescription, world: ActorConfiguration, name: str, often: str
+) -> tuple[str, str]:
+    """What is wrong with an object or a part that is too far away, and what to do."""
+    actor, nearer = _actor(world, name), f"nearer to {_ahead(robot)}"
+    if actor.joint is not None:
+        return f"is out of reach by its own grasps in {often}", f"move its furniture {nearer}"
+    access = _said(_place(world, actor.on).access)
+    what = f"is out of reach on '{actor.on}' in {often}, from {access}"
+    return what, f"move it {nearer}, or give its place another 'access'"
 
 
 def is_reached(robot: RobotDescription, world: ActorConfiguration, name: str) -> bool:
-    """The arm brings the hand to where an object is held, as hands come to its place."""
+    """The arm brings the hand to where an object is held, as hands come to its place, or to that part."""
     actor = _actor(world, name)
+    grips, pose = grips_of(actor), np.array(actor.pose)
+    if actor.joint is not None:
+        return _any_reached(robot, part_tool_poses(robot, pose, grips))
     access = _place(world, actor.on).access
-    return _any_reached(
-        robot, tool_poses(robot, actor.model(), np.array(actor.pose), grips_of(actor), access)
-    )
+    return _any_reached(robot, tool_poses(robot, actor.model(), pose, grips, access))
 
 
 def check_goals(scene: Scene, worlds: Sequence[ActorConfiguration], report: Report) -> None:
@@ -86,9 +110,11 @@ def check_goals(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repo
             places = {place.name: place for place in world.places}
             if goal.place not in places or goal.object not in scene.object_names:
                 continue
+            if goal.relation not in THERE:
+                continue
             known += 1
             actor, place = _actor(world, goal.object), places[goal.place]
-            small += not _fits(actor.model(), place)
+            small += goal.relation in STANDS and not (_passed(goal, place) or _fits(actor.model(), place))
             far += not _any_reached(robot, _at_goal(robot, actor, place))
         where = f"goal of '{goal.object}'"
         if small:
@@ -160,6 +186,11 @@ def _at_goal(robot: RobotDescription, actor: ObjectActor, place: PlaceModel) -> 
         local = poses.pose([0.0, 0.0, height], poses.yaw(2 * math.pi * k / TURNS))
         out.append(tool_poses(robot, model, poses.multiply(place.pose, local), grips, place.access))
     return np.concatenate(out)
+
+
+def _passed(goal: Goal, place: PlaceModel) -> bool:
+    """A mark that the object only has to have been on, as it goes over it."""
+    return goal.when == "once" and place.kind == "spot"
 
 
 def _fits(model: ObjectModel, place: PlaceModel) -> bool:

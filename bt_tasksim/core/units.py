@@ -95,3 +95,14 @@ SHARE = Unit("1", "%", 100.0)
 """From 0 to 1."""
 COUNT = Unit("", "")
 """A number of things."""
+
+
+def degrees_meant(value: float) -> str:
+    """What to add to a sentence about an angle in radians that is more than a turn; empty for others.
+
+    Args:
+        value: The angle, radians.
+    """
+    if not 2.0 * math.pi + 1e-9 < abs(value) < math.inf:
+        return ""
+    return f": values are radians, and {value:g} degrees are {math.radians(value):.3g}"

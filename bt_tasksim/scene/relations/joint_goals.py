@@ -17,7 +17,7 @@ from bt_tasksim.core.joints import SLIDES, JointModel, Joints
 from bt_tasksim.core.outcomes import Reason, register_reason
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
-from bt_tasksim.core.units import METRES, RADIANS, Unit
+from bt_tasksim.core.units import METRES, RADIANS, Unit, degrees_meant
 from bt_tasksim.scene.fixtures import FixturePart
 from bt_tasksim.scene.joint_laws import ValueAsked, opened, set_to, shut
 from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
@@ -66,9 +66,10 @@ class JointGoal(GoalRelation):
         room = MAY_BE * (high - low)
         if low - room <= goal.value <= high + room:
             return ""
+        meant = "" if part.kind == SLIDES else degrees_meant(goal.value)
         return (
             f"the goal '{goal.relation}' of '{goal.object}' asks for {unit.text(goal.value)}, and it goes "
-            f"from {unit.text(low)} to {unit.text(high)}"
+            f"from {unit.text(low)} to {unit.text(high)}{meant}"
         )
 
     @staticmethod
@@ -113,6 +114,21 @@ class Open(JointGoal):
     """Open by ``value`` at least, up to the goal's tolerance; by default by most of its way."""
 
     reasons = (NOT_OPEN, IS_OPEN)
+
+    def fault(self, goal: Goal, part: FixturePart | None) -> str:
+        """See `GoalRelation.fault`: nor should its tolerance cover all that it asks for."""
+        if (why := super().fault(goal, part)) or part is None or goal.value is None:
+            return why
+        slides, low = part.kind == SLIDES, part.limits[0]
+        name, unit = ("position_tolerance", METRES) if slides else ("angle_tolerance", RADIANS)
+        allowed = goal.position_tolerance if slides else goal.angle_tolerance
+        if goal.value - low > allowed:
+            return ""
+        return (
+            f"the goal 'open' of '{goal.object}' asks for {unit.text(goal.value)} and its {name} is "
+            f"{unit.text(allowed)}, so it is reached with '{goal.object}' shut: give it a smaller tolerance, "
+            "or a larger value"
+        )
 
     def asked(self, goal: Goal, joint: JointModel, value: Array) -> ValueAsked:
         """See `JointGoal.asked`."""

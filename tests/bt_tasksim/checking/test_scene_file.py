@@ -11,6 +11,7 @@ from bt_tasksim.checking.kinds import check_file
 from bt_tasksim.checking.report import ERROR, WARNING, Report
 from bt_tasksim.checking.scene_file import DRAWS, check_scene
 from bt_tasksim.checking.scene_goals import check_together
+from bt_tasksim.checking.scene_reach import check_goals
 from bt_tasksim.checking.scene_room import check_room
 from bt_tasksim.core.resources import asset
 from bt_tasksim.trees.load import load_source
@@ -68,6 +69,23 @@ def test_goals_that_cannot_be_are_named():
     said = only(check_scene(scene), "goal of 'box'")
     assert [level for level, _ in said] == [WARNING, ERROR], "a spot is a mark, and bears nothing"
     assert "too small for it in 6 of 6 draws" in said[0][1] and "out of reach on 'coin'" in said[1][1]
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [
+        Goal("box", "coin", relation="pressed"),
+        Goal("box", "coin", when="once"),
+        Goal("box", "coin", relation="oriented", value=0.0),
+    ],
+)
+def test_a_mark_on_which_nothing_has_to_stand_may_be_small(goal):
+    scene = Scene(
+        objects={"box": "on table"}, spots=[SpotSpec("coin", on="table", extent=(0.02, 0.02))], goal=goal
+    )
+    report = Report()
+    check_goals(scene, [scene.sample(seed) for seed in range(2)], report)
+    assert not report.findings
 
 
 def in_the_robot(robot="panda", **scene):

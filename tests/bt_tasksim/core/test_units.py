@@ -5,7 +5,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_tasksim.core.units import METRES, MORE_DIGITS, NEWTONS, SECONDS, Measured, told_apart
+from bt_tasksim.core.units import METRES, MORE_DIGITS, NEWTONS, SECONDS, Measured, degrees_meant, told_apart
 
 numbers = st.builds(
     Measured,
@@ -31,3 +31,8 @@ def test_equal_numbers_read_alike(values):
     for a, said_a in zip(values, texts, strict=True):
         for b, said_b in zip(values, texts, strict=True):
             assert (a == b) == (said_a == said_b)
+
+
+def test_only_what_is_more_than_a_turn_may_be_degrees():
+    assert degrees_meant(-90) == ": values are radians, and -90 degrees are -1.57"
+    assert degrees_meant(2 * math.pi) == degrees_meant(math.inf) == degrees_meant(math.nan) == ""

@@ -81,3 +81,27 @@ def test_what_is_no_part_or_has_no_value_is_refused():
 def test_goals_that_cannot_be_are_refused_before_anything_runs(goal, words):
     with pytest.raises(InputError, match=words):
         Scene(fixtures=["chest"], objects={"cup": "on table"}, goal=goal)
+
+
+def test_a_goal_in_degrees_is_told_the_radians():
+    with pytest.raises(InputError, match=r"3437\.7 degrees, .* radians, and 60 degrees are 1\.05$"):
+        Scene(fixtures=["door"], goal=Goal("door", relation="open", value=60))
+
+
+@pytest.mark.parametrize(
+    ("fixture", "goal", "words"),
+    [
+        ("chest", {"value": 0.15, "position_tolerance": 0.2}, "150 mm and its position_tolerance is 200 mm"),
+        ("chest", {"value": 0.01}, "10 mm and its position_tolerance is 10 mm"),
+        ("door", {"value": 0.5, "angle_tolerance": 1.0}, "28.6 degrees and its angle_tolerance is 57.3"),
+    ],
+)
+def test_a_tolerance_that_covers_all_that_is_asked_is_refused(fixture, goal, words):
+    part = "drawer" if fixture == "chest" else fixture
+    with pytest.raises(InputError, match=f"{words}.* reached with '{part}' shut: give it a smaller"):
+        Scene(fixtures=[fixture], goal=Goal(part, relation="open", **goal))
+
+
+def test_a_tolerance_that_leaves_something_to_do_is_taken():
+    Scene(fixtures=["chest"], goal=Goal("drawer", relation="open", value=0.02))
+    Scene(fixtures=["chest"], goal=Goal("drawer", relation="set", value=0.0, position_tolerance=0.01))
