@@ -461,8 +461,8 @@ def _check_no_part(name: str, reference: str, fixtures: Sequence[Fixture]) -> No
         if reference in [part.name for part in fixture.parts]:
             near = next((place.name for place in fixture.places), "table")
             raise FieldError(
-                f"object '{name}' is on '{reference}', which is a part that moves, and no place: name a place of "
-                f"the furniture, such as '{near}', or write 'inside {reference}' where that is hollow",
+                f"object '{name}' is on '{reference}', which is a part that moves, and no place: name a "
+                f"place of the furniture, such as '{near}', or write 'inside {reference}' where that is hollow",
                 "objects",
                 name,
                 "on",
