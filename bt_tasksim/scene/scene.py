@@ -462,7 +462,7 @@ def _check_no_part(name: str, reference: str, fixtures: Sequence[Fixture]) -> No
             near = next((place.name for place in fixture.places), "table")
             raise FieldError(
                 f"object '{name}' is on '{reference}', which is a part that moves, and no place: name a "
-                f"place of the furniture, such as '{near}', or write 'inside {reference}' where that is hollow",
+                f"place of the furniture, such as '{near}', or 'inside {reference}' where that is hollow",
                 "objects",
                 name,
                 "on",
