@@ -7,7 +7,7 @@ import importlib
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from bt_tasksim.policy.policy import concept_name
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.scene.scene import Scene, WorldSource
 from bt_tasksim.trees.check import check_tree
+from bt_tasksim.trees.named_files import scene_beside
 
 Leaves = dict[str, type[ConceptModel] | type[Condition]]
 """Concepts and conditions by name."""
@@ -79,7 +80,8 @@ def load_source(
             take the robot that is named, or a scene is named beside the engines' own world.
         NoSceneError: The tree says nothing of its scene, and none is named.
     """
-    path = Path(tree)
+    path, policies = Path(tree), tuple(policies)
+    given = frozenset(concept.lower() for concept, _ in policies)
     if robot is not None:
         load_robot(robot)
     if world is not None and scene is not None:
@@ -98,13 +100,13 @@ def load_source(
                 world = _made(_function(module, "scene", path), robot, path)
         source = TreeSource(path.stem, build, world)
     elif path.suffix == ".xml":
-        source = _from_xml(path, robot, scene, world)
+        source = _from_xml(path, robot, scene, world, given)
     else:
         source = TreeSource(tree, _scenario(tree).build, world or _scene(scene or tree, robot))
     if path.suffix == ".xml":
         from bt_tasksim.trees.xml_reader import load_tree_with_lines
 
-        root, where = load_tree_with_lines(path)
+        root, where = load_tree_with_lines(path, given=given)
         check_names(root, source.scene, where)
     else:
         check_names(_checked(source.build(), tree), source.scene)
@@ -113,11 +115,12 @@ def load_source(
     return source
 
 
-def load_root(tree: str) -> Behaviour:
+def load_root(tree: str, given: Collection[str] = frozenset()) -> Behaviour:
     """The tree that a name stands for, whatever its scene.
 
     Args:
         tree: Name of a scenario, or path of a ``.py`` or ``.xml`` file.
+        given: Concepts, in lower case, whose policies the caller gives, see `load_tree`.
 
     Raises:
         InputError: There is no such tree, or the file is no good.
@@ -126,7 +129,7 @@ def load_root(tree: str) -> Behaviour:
 
     path = Path(tree)
     if path.suffix == ".xml":
-        return load_tree(path)
+        return load_tree(path, given=given)
     if path.suffix == ".py":
         root = _called(_function(_module(path), "build", path), path)
     else:
@@ -294,12 +297,15 @@ def _checked(root: Any, tree: str) -> Behaviour:
     return root
 
 
-def _from_xml(path: Path, robot: str | None, scene: str | None, world: WorldSource | None) -> TreeSource:
+def _from_xml(
+    path: Path, robot: str | None, scene: str | None, world: WorldSource | None, given: Collection[str]
+) -> TreeSource:
     from bt_tasksim.trees.xml_reader import load_tree, scene_of_tree
 
-    root = load_tree(path)
+    build = functools.partial(load_tree, path, given=given)
+    root = build()
     if world is not None:
-        return TreeSource(path.stem, lambda: load_tree(path), world)
+        return TreeSource(path.stem, build, world)
     named = scene or scene_of_tree(path)
     if named is None:
         if robot is not None:
@@ -319,8 +325,8 @@ def _from_xml(path: Path, robot: str | None, scene: str | None, world: WorldSour
                 f"give --scene {path.parent / named}"
             )
         if named.endswith((".yaml", ".yml")):
-            named = str(path.parent / named)
-    return TreeSource(path.stem, lambda: load_tree(path), _scene(named, robot))
+            named = scene_beside(named, path)
+    return TreeSource(path.stem, build, _scene(named, robot))
 
 
 def _fits(root: Behaviour, scenario: str, robot: str | None) -> bool:

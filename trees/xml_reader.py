@@ -6,7 +6,7 @@ element that uses it, and is put in place while the tree is read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,10 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.core.bounded_text import read_bytes
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.plain import shown
+from bt_tasksim.policy.policy import concept_name
 from bt_tasksim.trees.check import DEEPEST, find_problem
 from bt_tasksim.trees.leaf_ports import Leaf, Nodes, is_concept, is_reference, port_from_text
+from bt_tasksim.trees.named_files import policy_beside
 from bt_tasksim.trees.nodes.base import NodeKind
 from bt_tasksim.trees.nodes.subtree import subtree
 from bt_tasksim.trees.vocabulary import CATEGORIES, OUTSIDE, node_kinds
@@ -32,12 +34,16 @@ HARMLESS = frozenset(("_autoremap", "_collapsed", "_fullpath", "_uid", "_descrip
 SCRIPTED = ("_skipIf", "_failureIf", "_successIf", "_while", "_onSuccess", "_onFailure", "_onHalted", "_post")
 
 
-def load_tree(path: str | Path, nodes: Nodes | None = None) -> Behaviour:
-    """Read a tree from a file.
+def load_tree(
+    path: str | Path, nodes: Nodes | None = None, *, given: Collection[str] = frozenset()
+) -> Behaviour:
+    """Read a tree from a file, which opens nothing but what lies with it.
 
     Args:
         path: The file.
         nodes: Concepts and conditions by name, besides those of `concept_nodes.catalogue`.
+        given: Concepts, in lower case, whose policies the caller gives: what the file says of these does not
+            count.
 
     Returns:
         The root; its tree has passed `check_tree`.
@@ -45,11 +51,11 @@ def load_tree(path: str | Path, nodes: Nodes | None = None) -> Behaviour:
     Raises:
         InputError: The file cannot be read, or holds something that is not read; the sentence says where.
     """
-    return load_tree_with_lines(path, nodes)[0]
+    return load_tree_with_lines(path, nodes, given)[0]
 
 
 def load_tree_with_lines(
-    path: str | Path, nodes: Nodes | None = None
+    path: str | Path, nodes: Nodes | None = None, given: Collection[str] = frozenset()
 ) -> tuple[Behaviour, Callable[[Behaviour], str]]:
     """Read a tree from a file, see `load_tree`.
 
@@ -61,6 +67,7 @@ def load_tree_with_lines(
     """
     content = _content(path)
     reader = _reader(content, nodes, str(path))
+    reader.folder, reader.given = Path(path).parent, given
     root = reader.tree()
     return root, lambda node: f"{path}, line {reader.lines[id(node)]}: "
 
@@ -120,6 +127,8 @@ class _Reader:
         self.nodes = nodes
         self.kinds = node_kinds()
         self.source = source
+        self.folder: Path | None = None  # where its policies lie; None: wherever they are
+        self.given: Collection[str] = ()
         self.lines: dict[int, int] = {}
         self.trees: dict[str, Element] = {}
         self.defaults: dict[str, dict[str, str]] = {}
@@ -310,6 +319,11 @@ class _Reader:
             arguments: dict[str, Any] = {k: port_from_text(leaf, k, text, name) for k, text in texts.items()}
             if element.attributes.get("name"):
                 arguments["name"] = element.attributes["name"]
+            if is_concept(leaf) and self.folder is not None and arguments.get("policy"):
+                concept, policy = concept_name(leaf), arguments["policy"]
+                arguments["policy"] = (
+                    None if concept in self.given else policy_beside(policy, concept, self.folder)
+                )
             return leaf(**arguments)
         except InputError as error:
             raise self._wrong(element, str(error)) from None

@@ -10,10 +10,11 @@ from xml.sax.saxutils import escape, quoteattr
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept.leaf import ModelLeaf
+from bt_tasksim.concept.leaf import ConceptNode, ModelLeaf
 from bt_tasksim.concept.parameters import Parameter
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.files import write_text
+from bt_tasksim.policy.policy import concept_name
 from bt_tasksim.trees.check import check_tree
 from bt_tasksim.trees.leaf_ports import (
     SETTING_DOCS,
@@ -24,6 +25,7 @@ from bt_tasksim.trees.leaf_ports import (
     leaf_ports,
     port_to_text,
 )
+from bt_tasksim.trees.named_files import policy_from_beside
 from bt_tasksim.trees.nodes.base import NodeKind, Port
 from bt_tasksim.trees.nodes.subtree import SubTree
 from bt_tasksim.trees.vocabulary import CATEGORIES, OUTSIDE, kind_of, node_kinds
@@ -52,26 +54,31 @@ def save_tree(root: Behaviour, path: str | Path, *, scene: str | None = None) ->
         path: The file.
         scene: Name or file of the scene that it is meant for.
 
+    Policies that lie with the file are named by their path from its folder.
+
     Raises:
-        InputError: The tree has a node outside the subset, or the folder does not exist.
+        InputError: The tree has a node outside the subset, the folder does not exist, or a leaf's policy lies
+            elsewhere.
         MachineError: The file cannot be written.
     """
-    write_text(path, tree_to_xml(root, scene=scene))
+    write_text(path, tree_to_xml(root, scene=scene, file=path))
 
 
-def tree_to_xml(root: Behaviour, *, scene: str | None = None) -> str:
+def tree_to_xml(root: Behaviour, *, scene: str | None = None, file: str | Path | None = None) -> str:
     """A tree as XML of BehaviorTree.CPP v4, with the models of its leaves.
 
     Args:
         root: The tree's root.
         scene: Name or file of the scene that it is meant for; an attribute of ``<root>`` that
             BehaviorTree.CPP passes over.
+        file: The file that it is written to, from whose folder policies are named; None: as leaves name them.
 
     Raises:
-        InputError: The tree is no good (`check_tree`), or has a node outside the subset.
+        InputError: The tree is no good (`check_tree`), has a node outside the subset, or a leaf's policy does
+            not lie with the file.
     """
     check_tree(root)
-    return _Writer(root).document(scene)
+    return _Writer(root, None if file is None else Path(file)).document(scene)
 
 
 def node_models(leaves: Mapping[str, Leaf], own: Iterable[NodeKind[Any]] | None = None) -> str:
@@ -104,10 +111,10 @@ def _model(category: str, name: str, ports: list[str]) -> list[str]:
 class _Writer:
     """Writes each subtree once, and gives it an ID of its own."""
 
-    def __init__(self, root: Behaviour) -> None:
+    def __init__(self, root: Behaviour, file: Path | None) -> None:
         from bt_tasksim.concept_nodes import catalogue
 
-        self.root = root
+        self.root, self.file = root, file
         self.leaves: dict[str, Leaf] = {}
         self.own: dict[str, NodeKind[Any]] = {}
         taken = {*node_kinds(), *OUTSIDE, *CATEGORIES}
@@ -185,7 +192,10 @@ class _Writer:
         owner = f"'{node.name}'"
         for port in leaf_ports(type(node.model)):
             if port in arguments:
-                attributes[port] = port_to_text(type(node.model), port, arguments[port], owner)
+                value = arguments[port]
+                if port == "policy" and isinstance(node, ConceptNode) and self.file is not None:
+                    value = policy_from_beside(value, concept_name(type(node.model)), self.file)
+                attributes[port] = port_to_text(type(node.model), port, value, owner)
         return attributes
 
     def _subtree(self, node: SubTree, names: set[str]) -> dict[str, str]:

@@ -13,8 +13,6 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept.leaf import ConceptNode
@@ -24,7 +22,7 @@ from bt_tasksim.core.registry import parts
 from bt_tasksim.core.renamed import former_names, with_present_names
 from bt_tasksim.core.resources import asset
 from bt_tasksim.core.world import PlaceModel
-from bt_tasksim.demos_decomp.log import Demonstration
+from bt_tasksim.demos_decomp.log import Demonstration, Log
 from bt_tasksim.engines.base import engine_class
 from bt_tasksim.engines.remote.configurations import check
 from bt_tasksim.engines.remote.plain import from_plain, shown
@@ -83,6 +81,9 @@ class Recorded:
         policies: For each concept, the number of its node and what it named to get its policy.
         success: Whether it says that it succeeded; None where it does not say it.
         reason: Why not, by name; empty where it does not say it.
+        about: All that it says about the run, by name.
+        description: What the whole log says of it; may be empty.
+        robot_named: The robot is the caller's, and may be called otherwise.
     """
 
     demonstration: Demonstration
@@ -95,19 +96,23 @@ class Recorded:
     policies: Sequence[tuple[int, str]]
     success: bool | None
     reason: str
+    about: Mapping[str, Any]
+    description: str
+    robot_named: bool
 
 
-def recorded_run(demonstration: Demonstration, given: Given, where: str) -> Recorded:
+def recorded_run(log: Log, given: Given, where: str) -> Recorded:
     """The run in a log.
 
     Args:
-        demonstration: The log's content.
+        log: The log, of one run.
         given: What the caller names.
         where: The log, for messages.
 
     Raises:
         InputError: It is no run's, its content is faulty, or it wants something that the caller has to name.
     """
+    demonstration = log.demonstrations[0]
     texts = {name: _text(demonstration, name, where) for name in ("about", "configuration", "tree")}
     about = _mapping(_json(texts["about"], f"{where}: run/about"), f"{where}: run/about")
     for key in about:
@@ -134,6 +139,9 @@ def recorded_run(demonstration: Demonstration, given: Given, where: str) -> Reco
         policies=_policies(demonstration, where),
         success=from_plain(bool, about["success"], f"{where}: success") if "success" in about else None,
         reason=from_plain(str, about.get("reason", ""), f"{where}: reason"),
+        about=about,
+        description=log.description,
+        robot_named=given.robot is not None,
     )
 
 
@@ -342,20 +350,3 @@ def _mesh(path: str, given: Given, where: str) -> str:
         f"{where} was run with the mesh file {path[:200]!r}, which is not a bundled one; name its folder: "
         "--objects FOLDER"
     )
-
-
-def comparable(demonstration: Demonstration, names: Sequence[str], where: str) -> dict[str, NDArray[Any]]:
-    """Arrays of a log that are compared row by row.
-
-    Raises:
-        InputError: One of them does not hold numbers, one row for each tick.
-    """
-    found = {}
-    for name in names:
-        values = demonstration.extra.get(name)
-        if values is None:
-            continue
-        if values.dtype.kind not in "biuf" or values.ndim < 1 or len(values) != len(demonstration.time):
-            raise InputError(f"{where}: {name} should hold numbers, one row for each tick")
-        found[name] = np.asarray(values)
-    return found

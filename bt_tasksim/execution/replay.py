@@ -2,38 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.demos_decomp.log import Demonstration
 from bt_tasksim.demos_decomp.log_file import read_log
-from bt_tasksim.execution.recorded import Given, Recorded, comparable, recorded_run, take_policies
+from bt_tasksim.execution.recorded import Given, Recorded, recorded_run, take_policies
+from bt_tasksim.execution.recorded_arrays import Arrays, arrays_of, gaps, sizes
 from bt_tasksim.execution.result import Result
 from bt_tasksim.execution.run_log import RunRecorder, versions
 from bt_tasksim.execution.runner import Runner
+from bt_tasksim.execution.told import told_otherwise
 from bt_tasksim.scene.scene import Scene
 from bt_tasksim.trees.load import Leaves
-
-COMPARED = {
-    "state/joint_position": ("joint positions", "rad or m"),
-    "state/joint_velocity": ("joint velocities", "rad/s or m/s"),
-    "state/objects": ("object poses", "m"),
-    "state/velocities": ("object velocities", "m/s or rad/s"),
-    "observations/objects": ("estimated object poses", "m"),
-    "observations/wrench": ("the wrist's wrench", "N or Nm"),
-    "observations/contact_force": ("contact forces", "N"),
-    "commands/tool": ("the tool's command", "m"),
-    "commands/hand": ("the hand's command", ""),
-    "tree/status": ("statuses", ""),
-}
-"""What is compared bit for bit: how a sentence names it, and its unit."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +80,8 @@ def replay(
     log = read_log(path)
     if log.source != "simulation" and "run/about" in log.demonstrations[0].extra:
         raise InputError(f"{where} was recorded on a robot; only runs in simulation can be replayed")
-    recorded = recorded_run(log.demonstrations[0], given, where)
-    compared = comparable(recorded.demonstration, tuple(COMPARED), where)
+    recorded = recorded_run(log, given, where)
+    compared = arrays_of(recorded.demonstration, where)
     root = tree if tree is not None else _tree(recorded.tree, given, where)
     take_policies(root, recorded, given, where, trusted=tree is not None)
     own, robot = recorded.options.own_world(), recorded.configuration.robot
@@ -129,7 +115,7 @@ def _tree(text: str, given: Given, where: str) -> Behaviour:
 
 def _compared(
     run: Recorded,
-    compared: Mapping[str, NDArray[Any]],
+    compared: Arrays,
     repeated: Demonstration,
     result: Result,
     changed: dict[str, tuple[str, str]],
@@ -140,33 +126,24 @@ def _compared(
     if until is not None:  # what comes after it, and how it is judged there, is the shorter run's own
         lengths = [int(np.searchsorted(one.time, until)) for one in (recorded, repeated)]
     count = min(lengths)
-    first, differences = count, {}
-    for name in COMPARED:
-        if name not in compared and name not in repeated.extra:
-            continue
-        if name not in compared or name not in repeated.extra:
-            first, differences[name] = 0, float("inf")
-            continue
-        gap = _gap(compared[name], repeated.extra[name], count)
-        if (gap > 0).any():
-            first = min(first, int(np.argmax(gap > 0)))
-            differences[name] = float(gap.max())
+    apart = gaps(compared, arrays_of(repeated, "the repetition"), count)
+    first = min((int(np.argmax(gap > 0)) for gap in apart.values()), default=count)
+    differences = {name: float(gap.max()) for name, gap in apart.items()}
     same_length = lengths[0] == lengths[1]
-    if not differences and same_length and until is None and (judged := _judged_otherwise(run, result)):
-        why = f"the same states over {count} ticks, and yet {judged}"
+    said = ", ".join(f"{name} {old}, now {new}" for name, (old, new) in changed.items())
+    if not differences and same_length and until is None and (told := told_otherwise(run, repeated, result)):
+        why = f"the same states over {count} ticks, and yet {told}{f'; recorded with {said}' if said else ''}"
         return ReplayResult(False, why, float(recorded.time[-1]), {}, changed, result)
     if not differences and same_length:
-        said = result.why if until is None else f"the first {until:g} s"
-        why = f"identical bit for bit over {count} ticks: {said}"
+        what = result.why if until is None else f"the first {until:g} s"
+        why = f"identical bit for bit over {count} ticks: {what}{f'; recorded with {said}' if said else ''}"
         return ReplayResult(True, why, None, {}, changed, result)
     time = float(recorded.time[min(first, count - 1)])
     if differences:
-        sizes = ", ".join(_size(name, size) for name, size in differences.items())
-        what = f"different from {time:.2f} s on, at most by: {sizes}"
+        what = f"different from {time:.2f} s on, at most by: {sizes(differences)}"
     else:
         longer = "recorded" if lengths[0] > lengths[1] else "repeated"
         what = f"the same up to {time:.2f} s, where the {longer} run goes on and the other ends"
-    said = ", ".join(f"{name} {old}, now {new}" for name, (old, new) in changed.items())
     return ReplayResult(
         False,
         f"{what}; {f'recorded with {said}' if said else 'versions are the same'}",
@@ -175,30 +152,3 @@ def _compared(
         changed,
         result,
     )
-
-
-def _judged_otherwise(run: Recorded, result: Result) -> str:
-    """In words, where a log says something else of its run than is said of the repetition; else nothing."""
-    said = ("fails" if run.success is False else "succeeds") + (f" ({run.reason})" if run.reason else "")
-    same = run.success in (None, result.success) and run.reason in ("", result.reason)
-    if same or not result.judged:  # a goal that is a function is not in a log
-        return ""
-    return f"the log says that it {said}, and it is judged now: {result.why}"
-
-
-def _gap(a: NDArray[Any], b: NDArray[Any], count: int) -> NDArray[np.float64]:
-    """Largest difference ``(count,)`` in each tick; infinite where only one is a number."""
-    if a.shape[1:] != b.shape[1:]:
-        return np.full(count, np.inf)
-    rows_a = a[:count].reshape(count, -1).astype(np.float64)
-    rows_b = b[:count].reshape(count, -1).astype(np.float64)
-    missing = np.isnan(rows_a) != np.isnan(rows_b)
-    gap: NDArray[np.float64] = np.where(missing, np.inf, np.nan_to_num(np.abs(rows_a - rows_b)))
-    return np.asarray(gap.max(axis=1, initial=0.0))
-
-
-def _size(name: str, size: float) -> str:
-    title, unit = COMPARED[name]
-    if name == "tree/status":
-        return title
-    return f"{title} {size:.2g} {unit}".strip() if np.isfinite(size) else f"{title} (one has none)"

@@ -7,6 +7,7 @@ So nothing that a file names is opened, and nothing makes many of one.
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError, tostring
@@ -16,6 +17,7 @@ import numpy as np
 from bt_tasksim.core import poses
 from bt_tasksim.core.bounded_text import read_text
 from bt_tasksim.core.errors import InputError, MachineError
+from bt_tasksim.core.mujoco_log import write_none
 from bt_tasksim.core.names import name_fault
 from bt_tasksim.core.plain import Plain, shown
 from bt_tasksim.core.poses import Array
@@ -39,6 +41,9 @@ _URDF_SEEN = "visual material gazebo transmission ros2_control mujoco safety_con
 _MJCF_SEEN = "visual statistic option size sensor actuator keyframe custom light camera site texture contact"
 _LEFT_OUT = {"robot": frozenset(_URDF_SEEN.split()), "mujoco": frozenset(_MJCF_SEEN.split())}
 """Those that do not matter for furniture, and are left out."""
+_NOT_FINITE = frozenset({"nan", "inf", "infinity"})
+_WORDS = frozenset(["name", "type", "link", "joint", "class", "childclass", "material", "effort", "velocity"])
+"""Attributes that hold words, or limits that do not matter for furniture."""
 _NAMES_FILE = {"mesh", "include", "model", "plugin", "hfield", "skin"}
 
 
@@ -56,8 +61,10 @@ def articulated(path: Path) -> dict[str, Plain]:
             "a fixture from URDF or MJCF needs the package mujoco: install bt-tasksim with 'sim'"
         ) from None
     root = _root(path)
+    write_none(mujoco)
     try:
-        model = mujoco.MjSpec.from_string(tostring(root, encoding="unicode")).compile()
+        with warnings.catch_warnings(action="ignore"):  # numbers beyond all bounds are refused later
+            model = mujoco.MjSpec.from_string(tostring(root, encoding="unicode")).compile()
     except (ValueError, RuntimeError) as error:
         raise InputError(f"fixture file '{path}': {' '.join(str(error).split())}") from None
     data = mujoco.MjData(model)
@@ -97,6 +104,8 @@ def _root(path: Path) -> Element:
             )
     for joint in root.iter("joint"):
         _check_limits(joint, path)
+    for element in root.iter():
+        _check_finite(element, path)
     if root.tag == "robot":  # links that are fixed to others keep their names, and shapes have different ones
         for link in root.iter("link"):
             for k, shape in enumerate(link.iter("collision")):
@@ -126,6 +135,18 @@ def _check_limits(joint: Element, path: Path) -> None:
             f"fixture file '{path}': the limits of a joint should be two numbers, the lower one first, found "
             f"{said}: a joint that cannot move is a fixed one"
         )
+
+
+def _check_finite(element: Element, path: Path) -> None:
+    """Check that all numbers of an element are finite: MuJoCo would go on with others."""
+    for name, text in element.attrib.items():
+        odd = [word for word in text.split() if word.lower().lstrip("+-") in _NOT_FINITE]
+        if odd and name not in _WORDS:
+            owner = element.get("name") or ""
+            raise InputError(
+                f"fixture file '{path}': '{name}' of {shown(element.tag)} '{shown(owner)}' should be finite "
+                f"numbers, found '{shown(text)}'".replace(" ''", "")
+            )
 
 
 class _Reader:

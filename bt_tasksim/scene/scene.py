@@ -18,7 +18,7 @@ from bt_tasksim.core.world import HOLE
 from bt_tasksim.scene import sampling
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor, check_seed, generator
 from bt_tasksim.scene.fixture_overlap import check_fixtures
-from bt_tasksim.scene.fixtures import check_parameters, load_fixture
+from bt_tasksim.scene.fixtures import Fixture, check_parameters, load_fixture
 from bt_tasksim.scene.goal_functions import GoalFunction, Judge
 from bt_tasksim.scene.parts import draw_parts
 from bt_tasksim.scene.placing import draw_fixtures
@@ -229,6 +229,8 @@ class Scene:
                 )
         for name, spec in specs.items():
             word, reference = spec.start
+            if word == "on":
+                _check_no_part(name, reference, fixtures)
             known = set(specs) if word == "beside" else {*places, *specs, *moving}
             _require_place(f"object '{name}'", word, reference, known, ("objects", name, word))
         draw_order(specs)
@@ -451,6 +453,20 @@ def _require(what: str, name: str, known: Collection[str], where: tuple[str | in
         raise FieldError(
             f"the scene's {what} names '{name}', which is not in it{nearest(name, known)}", *where
         )
+
+
+def _check_no_part(name: str, reference: str, fixtures: Sequence[Fixture]) -> None:
+    """An object starts on no part of a fixture, which has no surface for it as a place has."""
+    for fixture in fixtures:
+        if reference in [part.name for part in fixture.parts]:
+            near = next((place.name for place in fixture.places), "table")
+            raise FieldError(
+                f"object '{name}' is on '{reference}', which is a part that moves, and no place: name a "
+                f"place of the furniture, such as '{near}', or 'inside {reference}' where that is hollow",
+                "objects",
+                name,
+                "on",
+            )
 
 
 def _require_place(

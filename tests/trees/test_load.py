@@ -11,8 +11,8 @@ from bt_tasksim.concept_nodes import Grasp, Pick
 from bt_tasksim.core import plugins
 from bt_tasksim.core.errors import InputError
 from bt_tasksim.core.resources import asset
-from bt_tasksim.trees import save_tree, sequence
-from bt_tasksim.trees.load import load_source, names_in, own_nodes, scenarios
+from bt_tasksim.trees import load_tree, save_tree, sequence
+from bt_tasksim.trees.load import load_root, load_source, names_in, own_nodes, scenarios
 
 GOOD = """
 from bt_tasksim import Scene
@@ -329,6 +329,72 @@ def test_a_python_file_without_a_scene_and_a_tree_that_names_one(tmp_path):
     text = (tmp_path / "lift.xml").read_text().replace("pick_and_throw", "room.py")
     (tmp_path / "lift.xml").write_text(text)
     assert "a tree's file runs no Python" in refused(str(tmp_path / "lift.xml"))
+
+
+@pytest.mark.parametrize("name", ["../room.yaml", "{folder}/room.yaml", "link.yaml", "..\\\\room.yaml"])
+def test_a_tree_file_opens_no_scene_elsewhere(tmp_path, name):
+    (tmp_path / "room.yaml").write_text("name: room\nobjects:\n  cup: {kind: cup, on: table}\n")
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "link.yaml").symlink_to(tmp_path / "room.yaml")
+    tree = tmp_path / "sub" / "lift.xml"
+    save_tree(lift(), tree, scene=name.format(folder=tmp_path))
+    sentence = refused(str(tree))
+    assert "a scene" in sentence and "folder of the file that names it" in sentence
+    assert sentence.endswith("or give --scene FILE")
+    assert load_source(str(tree), scene=str(tmp_path / "room.yaml")).scene.name == "room"
+
+
+@pytest.fixture
+def with_policy(tmp_path):
+    """A tree's file of a folder ``sub`` whose grasp has this policy."""
+    (tmp_path / "sub").mkdir()
+
+    def make(name):
+        file = tmp_path / "sub" / "lift.xml"
+        save_tree(lift(), file)
+        file.write_text(
+            file.read_text().replace('<Grasp target="cup"', f'<Grasp target="cup" policy="{name}"')
+        )
+        return str(file)
+
+    return make
+
+
+@pytest.mark.parametrize("name", ["../mine", "{folder}/mine", "link", "inner/../../mine", "half"])
+def test_a_tree_file_opens_no_policy_elsewhere(tmp_path, monkeypatch, with_policy, name):
+    for folder in ("mine", "sub/half"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "mine" / "card.json").write_text("{}")
+    (tmp_path / "sub" / "link").symlink_to(tmp_path / "mine")
+    (tmp_path / "sub" / "half" / "card.json").symlink_to(tmp_path / "mine" / "card.json")
+    tree = with_policy(name.format(folder=tmp_path))
+    for read in (load_source, load_root, load_tree):
+        with pytest.raises(InputError, match=r"lift.xml, line \d+: .*, or give --policy grasp=FOLDER$"):
+            read(tree)
+    source = load_source(tree, policies=[("Grasp", "programmed")])
+    assert next(leaf for leaf in source.build().iterate() if leaf.name == "grasp cup").policy == "programmed"
+    assert load_root(tree, {"grasp"}) is not None
+
+
+def test_a_policy_beside_the_tree_is_found_from_anywhere(tmp_path, monkeypatch, with_policy):
+    folder = tmp_path / "sub" / "policies" / "mine"
+    folder.mkdir(parents=True)
+    tree = with_policy("policies/mine")
+    (grasp,) = (leaf for leaf in load_root(tree).iterate() if leaf.name == "grasp cup")
+    assert grasp.policy == str(folder)
+    save_tree(grasp, tmp_path / "sub" / "again.xml")
+    assert 'policy="policies/mine"' in (tmp_path / "sub" / "again.xml").read_text()
+    (tmp_path / "other").mkdir()
+    with pytest.raises(InputError, match=r"does not lie in the folder of .*--policy grasp="):
+        save_tree(grasp, tmp_path / "other" / "again.xml")
+    monkeypatch.chdir(tmp_path / "sub")
+    (grasp,) = (leaf for leaf in load_root(tree).iterate() if leaf.name == "grasp cup")
+    assert grasp.policy == "policies/mine"
+
+
+def test_a_tree_file_names_bundled_policies(with_policy):
+    (grasp,) = (leaf for leaf in load_root(with_policy("programmed")).iterate() if leaf.name == "grasp cup")
+    assert grasp.policy == "programmed"
 
 
 def test_a_tree_that_fits_no_scene(tmp_path):

@@ -64,7 +64,7 @@ def decompose(
         contents[json_] = json.dumps(found.to_json(), indent=2) + "\n"
     if xml is not None:
         tree = tree_from_graph(found.graph, scene or Path(logs[0]).stem)
-        contents[xml] = tree_to_xml(tree, scene=scene)
+        contents[xml] = tree_to_xml(tree, scene=scene, file=xml)
     if picture is not None:
         contents[picture] = picture_of(found.graph)
     write_texts(contents)

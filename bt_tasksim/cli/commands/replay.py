@@ -46,8 +46,9 @@ def replay(
     from bt_tasksim.execution import replay
     from bt_tasksim.trees.load import load_root
 
-    root = None if tree is None else load_root(tree)
+    named = policies(policy)
+    root = None if tree is None else load_root(tree, {concept.lower() for concept, _ in named})
     with progress("replaying", None):
-        found = replay.replay(run, root, robot=robot, policies=policies(policy), objects=objects)
+        found = replay.replay(run, root, robot=robot, policies=named, objects=objects)
     say(found.why)
     return 0 if found.identical else 1

@@ -39,7 +39,7 @@ def show(
         contents[picture] = tree_svg(root)
     if xml is not None:
         named = tree.scene or (scene if scene in scenarios() else None)
-        contents[xml] = tree_to_xml(root, scene=named)
+        contents[xml] = tree_to_xml(root, scene=named, file=xml)
     write_texts(contents)
     for path in contents:
         say(f"wrote {path}")

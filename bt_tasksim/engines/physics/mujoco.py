@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from bt_tasksim.core.errors import MachineError
+from bt_tasksim.core.mujoco_log import write_none
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.world import Hidden, WorldState
@@ -22,10 +23,6 @@ from bt_tasksim.engines.physics.single import SimulatedPhysics
 from bt_tasksim.engines.physics.threaded import ThreadedBatch
 from bt_tasksim.robot.description import RobotDescription
 from bt_tasksim.scene.configuration import ActorConfiguration
-
-
-def _ignored(warning: str) -> None:
-    """What MuJoCo warns of is counted in its data, and `MujocoWorld.advance` looks there."""
 
 
 class MujocoBatch(ThreadedBatch[MujocoWorld]):
@@ -56,8 +53,7 @@ class MujocoBatch(ThreadedBatch[MujocoWorld]):
             ) from error
         super().__init__(robot, worlds, threads)
         self._mujoco = mujoco
-        if mujoco.get_mju_user_warning() is None:  # else it writes MUJOCO_LOG.TXT where the user stands
-            mujoco.set_mju_user_warning(_ignored)
+        write_none(mujoco)
 
     def _build(self, row: int, configuration: ActorConfiguration, start: Array) -> MujocoWorld:
         return MujocoWorld(self._mujoco, self.robot, configuration, start)

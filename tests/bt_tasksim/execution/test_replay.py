@@ -15,6 +15,7 @@ from bt_tasksim.execution.run_log import RunRecorder, read_text
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.report.write import write_run
 from bt_tasksim.trees.scenarios import pick_and_place, shelf_to_shelf
+from bt_tasksim.trees.xml_reader import tree_from_xml
 
 
 @pytest.fixture(scope="module")
@@ -28,13 +29,15 @@ def folder(tmp_path_factory):
 def tampered(folder, tmp_path):
     """Writes the run's log again, changed."""
 
-    def make(source=None, **extra):
-        log = read_log(folder / "run.h5")
-        (run,) = log.demonstrations
-        run = dataclasses.replace(run, extra={**run.extra, **extra})
-        write_log(
-            tmp_path / "run.h5", dataclasses.replace(log, source=source or log.source, demonstrations=(run,))
-        )
+    def make(source=None, run=folder, fields=None, without=(), **extra):
+        log, fields = read_log(run / "run.h5"), dict(fields or {})
+        (found,) = log.demonstrations
+        fields["notes"] = {**found.notes, **fields.get("notes", {})}
+        fields["extra"] = {k: v for k, v in {**found.extra, **extra}.items() if k not in without}
+        changed = dataclasses.replace(found, **fields)
+        description = changed.notes["why"]
+        log = dataclasses.replace(log, description=description, demonstrations=(changed,))
+        write_log(tmp_path / "run.h5", dataclasses.replace(log, source=source or log.source))
         return tmp_path / "run.h5"
 
     return make
@@ -84,6 +87,147 @@ def test_a_run_that_is_said_to_have_ended_otherwise_is_not_the_same(folder, tamp
     said = f"fails ({changes['reason']})" if "reason" in changes else "fails"
     assert f"the log says that it {said}, and it is judged now: " in found.why
     assert replay(folder, until=1.5).identical, "how a run ends is no matter of its first seconds"
+
+
+UNTITLED = [
+    "commands/posture",
+    "state/joint_effort",
+    "observations/arm_position",
+    "observations/contacts",
+    "observations/tips",
+    "tree/necessary_cost",
+]
+
+
+@pytest.mark.parametrize("name", UNTITLED)
+def test_every_array_of_numbers_is_compared(folder, tampered, name):
+    values = read_log(folder / "run.h5").demonstrations[0].extra[name].astype(float)
+    values[30] = np.where(np.isnan(values[30]), 1.0, values[30] + 1.0)
+    found = replay(tampered(**{name: values}))
+    assert not found.identical and found.time == pytest.approx(1.5)
+    assert list(found.differences) == [name] and f"at most by: {name}" in found.why
+
+
+ASIDE = np.array([0.5, 0, 0, 0, 0, 0, 0])
+
+OTHER_FIELDS = {
+    "time": lambda run: {"time": run.time * 1.001},
+    "hand/pose": lambda run: {"hand_pose": run.hand_pose + ASIDE},
+    "hand/opening": lambda run: {"hand_opening": run.hand_opening + 1e-6},
+    "objects/target/pose": lambda run: {
+        "objects": {
+            **run.objects,
+            "target": dataclasses.replace(run.objects["target"], pose=run.objects["target"].pose + ASIDE),
+        }
+    },
+}
+
+
+@pytest.mark.parametrize("name", OTHER_FIELDS)
+def test_what_a_demonstration_holds_of_a_run_is_compared(folder, tampered, name):
+    run = read_log(folder / "run.h5").demonstrations[0]
+    found = replay(tampered(fields=OTHER_FIELDS[name](run)))
+    assert not found.identical and list(found.differences) == [name]
+
+
+SAID = {
+    "status": (lambda about: about.update(status="FAILURE"), "its status 'FAILURE', and now it is 'SUCCESS'"),
+    "why": (lambda about: about.update(why="on the moon"), "its why 'on the moon', and now it is "),
+    "judged": (lambda about: about.update(judged=False), "its judged False, and now it is True"),
+    "verdict": (lambda about: about["verdict"].update(position_error=0.0), "its verdict.position_error 0.0"),
+    "leaf": (lambda about: about.update(leaf="nobody"), "its leaf 'nobody', and now it is ''"),
+    "robot": (lambda about: about.update(robot="ur5e"), "its robot 'ur5e', and now it is 'panda'"),
+}
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_all_that_a_log_says_of_its_run_is_compared(folder, tampered, name):
+    change, said = SAID[name]
+    found = replay(tampered(**changed(folder, "about", change)))
+    assert not found.identical and found.differences == {}
+    assert f"the log says of {said}" in found.why
+
+
+ATTRIBUTES = {
+    "success": {"notes": {"success": "no"}},
+    "status": {"notes": {"status": "FAILURE"}},
+    "why": {"notes": {"why": "on the moon"}},
+    "task": {"task": "push"},
+    "seed": {"seed": 99},
+}
+
+
+@pytest.mark.parametrize("name", ATTRIBUTES)
+def test_attributes_that_say_something_else_are_told(folder, tampered, name):
+    found = replay(tampered(fields=ATTRIBUTES[name]))
+    assert not found.identical and f"the log says of its attribute.{name} " in found.why
+
+
+def test_what_nodes_said_is_compared(folder, tampered):
+    texts = read_log(folder / "run.h5").demonstrations[0].extra["messages/text"]
+    found = replay(tampered(**{"messages/text": np.array([b"a lie"] * len(texts))}))
+    assert not found.identical and "the log says of its messages.text[0] 'a lie', and now it is " in found.why
+
+
+def test_what_a_log_lacks_is_not_compared(folder, tampered):
+    def change(about):
+        for name in ("status", "success", "judged", "reason", "why", "leaf", "outcome", "verdict"):
+            del about[name]
+
+    path = tampered(
+        without=("commands/posture", "messages/text", "run/nodes"), **changed(folder, "about", change)
+    )
+    assert replay(path).identical
+
+
+@pytest.fixture(scope="module")
+def idle(tmp_path_factory):
+    """A run whose tree succeeds and whose goal is missed."""
+    path = tmp_path_factory.mktemp("runs") / "idle"
+    scene = pick_and_place.scene()
+    result, _ = write_run(path, Runner(tree_from_xml(WAIT, {}), scene), 5)
+    assert result.status.name == "SUCCESS" and not result.success and result.judged
+    return path
+
+
+WAIT = '<root BTCPP_format="4"><BehaviorTree ID="wait"><Wait duration="0.5"/></BehaviorTree></root>'
+
+
+def said_to_succeed(about):
+    about.update(success=True, judged=True, reason="", why="all is well", outcome=None, verdict=None)
+
+
+@pytest.mark.parametrize("functions", [[], [{"name": "mine"}]])
+def test_a_failure_is_no_success_where_its_goals_were_taken_out(idle, tampered, functions):
+    """Goals that are functions cannot be asked again, and this is said."""
+
+    def change(world):
+        world.update(goals=[], functions=functions)
+
+    notes = {"success": "yes", "why": "all is well"}
+    extra = changed(idle, "configuration", change) | changed(idle, "about", said_to_succeed)
+    found = replay(tampered(run=idle, fields={"notes": notes}, **extra))
+    assert found.identical == bool(functions)
+    assert (
+        "was not judged: it is a function" if functions else "the log says of its judged True"
+    ) in found.why
+
+
+def test_a_function_excuses_no_goal_that_is_missed(idle, tampered):
+    extra = changed(idle, "configuration", lambda world: world.update(functions=[{"name": "mine"}]))
+    found = replay(tampered(run=idle, **extra, **changed(idle, "about", said_to_succeed)))
+    assert not found.identical and "the log says that it succeeds, and it is judged now: " in found.why
+
+
+def test_a_run_with_a_goal_that_is_a_function_is_replayed(tmp_path):
+    def stands(final):
+        return False, "never good enough"
+
+    scene = dataclasses.replace(pick_and_place.scene(), goals=(stands,))
+    result, _ = write_run(tmp_path, Runner(pick_and_place.build(), scene), 5)
+    assert not result.success
+    found = replay(tmp_path)
+    assert found.identical and "was not judged: it is a function" in found.why
 
 
 def test_another_version_is_named(folder, tampered):

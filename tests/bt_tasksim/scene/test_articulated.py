@@ -1,5 +1,7 @@
 """A user's own URDF or MJCF as a fixture."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -123,10 +125,25 @@ def test_in_scenes_and_scene_files(write, tmp_path):
             "another file",
         ),
         (MJCF.replace("<worldbody>", "<worldbody>" + "<body/>" * 6000), "more than 5000 elements"),
+        (
+            URDF.replace('"0 0.2 0.2"', '"nan 0 0"'),
+            "'xyz' of origin should be finite .* 'nan 0 0'",
+        ),
+        (MJCF.replace('name="grip"', 'name="grip" pos="0 -INF 0"'), "'pos' of geom 'grip' should be finite"),
+        (URDF.replace('"0 0.2 0.2"', '"1e30 0 0"'), "should be at most 100, found 1e"),
         (URDF.replace("<axis", "<mimic joint='other'/><axis"), "'mimic' is none of them"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_sentence(write, text, words):
-    with pytest.raises(InputError, match=words) as refused:
+def test_what_cannot_be_is_refused_in_one_sentence(write, tmp_path, monkeypatch, capfd, text, words):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    with warnings.catch_warnings(record=True) as warned, pytest.raises(InputError, match=words) as refused:
         load_fixture(write(text))
     assert "\n" not in str(refused.value)
+    assert not warned and capfd.readouterr() == ("", ""), "no library says anything by itself"
+    assert not list((tmp_path / "here").iterdir())
+
+
+def test_a_name_may_read_like_a_number(write):
+    (valve,) = load_fixture(write(MJCF.replace('"valve"', '"nan"'), "valve.xml")).parts
+    assert valve.name == "nan"

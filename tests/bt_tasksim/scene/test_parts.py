@@ -136,3 +136,11 @@ def test_a_handle_is_grasped_and_the_run_is_the_same_again(run):
     assert told["success"] and told["seed"] == 500000
     found = replay(path)
     assert found.identical and found.result.success
+
+
+@pytest.mark.parametrize(
+    ("fixture", "part", "place"), [("drawer", "drawer", "chest"), ("knob", "knob", "table")]
+)
+def test_nothing_starts_on_a_part(fixture, part, place):
+    with pytest.raises(FieldError, match=f"is on '{part}', which is a part that moves.*such as '{place}'"):
+        Scene(fixtures=[fixture], objects={"c": f"cup on {part}"})

@@ -46,6 +46,13 @@ def test_the_bundled_example():
     check_configuration(world)
 
 
+@pytest.mark.parametrize("entry", ["cup on drawer", "{kind: cup, on: drawer, at: [0, 0]}"])
+def test_nothing_starts_on_a_part_of_furniture(tmp_path, entry):
+    file = write(tmp_path, f"fixtures: [drawer]\nobjects:\n  c: {entry}\n")
+    with pytest.raises(InputError, match=r"line 3: object 'c' is on 'drawer', .*a place.* such as 'chest'"):
+        load_scene(file)
+
+
 def test_everything_that_may_be_said(tmp_path):
     save(tmp_path / "part.obj", block(0.05, 0.04, 0.1))
     file = write(
