@@ -65,9 +65,9 @@ def parse(content: str | bytes, source: str) -> Element:
         raise InputError(
             f"{source}, line {error.getLineNumber()}: malformed XML: {error.getMessage()}"
         ) from None
+    except InputError as error:  # it comes from within expat, and this is no place to name
+        raise InputError(str(error)) from None
     except (ValueError, LookupError) as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(f"{source}: malformed XML: {error}") from None
     if builder.root is None:
         raise InputError(f"{source}: the file is empty")

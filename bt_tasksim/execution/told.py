@@ -98,10 +98,12 @@ def _things(log: Demonstration) -> dict[str, Any]:
 
 
 def _surfaces(log: Demonstration) -> dict[str, Any]:
-    return {
-        name: {k: np.asarray(v).tolist() for k, v in vars(replace(place, pose=as_read(place.pose))).items()}
+    """Places as a log that was read has them: a place of no fixture names none."""
+    read = {
+        name: replace(place, pose=as_read(place.pose), fixture=place.fixture or None)
         for name, place in log.places.items()
     }
+    return {name: {k: np.asarray(v).tolist() for k, v in vars(place).items()} for name, place in read.items()}
 
 
 def _nodes(log: Demonstration) -> Any:

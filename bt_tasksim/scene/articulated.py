@@ -16,11 +16,14 @@ import numpy as np
 
 from bt_tasksim.core import poses
 from bt_tasksim.core.bounded_text import read_text
+from bt_tasksim.core.document import Document
 from bt_tasksim.core.errors import InputError, MachineError
 from bt_tasksim.core.mujoco_log import write_none
 from bt_tasksim.core.names import name_fault
 from bt_tasksim.core.plain import Plain, shown
 from bt_tasksim.core.poses import Array
+from bt_tasksim.core.typed_file import validate
+from bt_tasksim.scene.fixture_schema import PartEntry
 
 HANDLES = ("handle", "knob", "grip")
 """What the name of a link or of a shape contains by which two fingers may hold the part."""
@@ -30,6 +33,8 @@ UNLIMITED = 3.0
 """Radians either way between which a hinge without limits turns: one that goes round would have no value."""
 MOST = 5000
 """Elements that a file may have."""
+DEEPEST = 50
+"""Elements within one another that a file may have."""
 _URDF = (
     "robot link joint collision inertial origin mass inertia geometry box cylinder sphere axis parent child "
     "limit dynamics"
@@ -86,6 +91,11 @@ def _root(path: Path) -> Element:
         raise InputError(f"fixture file '{path}' is neither URDF nor MJCF: its root is '{shown(root.tag)}'")
     if sum(1 for _ in root.iter()) > MOST:
         raise InputError(f"fixture file '{path}' has more than {MOST} elements: make a simpler model of it")
+    if _deeper_than(DEEPEST, root):
+        raise InputError(
+            f"fixture file '{path}' has more than {DEEPEST} elements within one another: make a simpler "
+            f"model of it"
+        )
     for parent in root.iter():
         for child in [c for c in parent if c.tag in _LEFT_OUT[root.tag]]:
             parent.remove(child)
@@ -114,6 +124,14 @@ def _root(path: Path) -> Element:
         own.append(Element("compiler", {"fusestatic": "false", "discardvisual": "true"}))
         root.append(own)
     return root
+
+
+def _deeper_than(levels: int, root: Element) -> bool:
+    """Whether there are more levels of elements, without a call for each."""
+    level = [root]
+    for _ in range(levels):
+        level = [child for element in level for child in element]
+    return bool(level)
 
 
 def _check_limits(joint: Element, path: Path) -> None:
@@ -173,8 +191,15 @@ class _Reader:
         for body, part in parts.items():
             if masses[body] > 0.0:
                 part["mass"] = float(masses[body])
+            self._check(body, part)
         listed: list[Plain] = list(parts.values())
         return {"name": self.path.stem, "boxes": still, "places": [], "parts": listed}
+
+    def _check(self, body: int, part: dict[str, Any]) -> None:
+        """Refuse what no part of a fixture can have, by the names that the file has for it."""
+        joint = self.model.joint(int(self.model.body_jntadr[body])).name
+        named = f"joint '{shown(joint)}' of link '{part['name']}'" if joint else f"link '{part['name']}'"
+        validate(PartEntry, Document(f"fixture file '{self.path}', {named}", part))
 
     def _carrier(self, body: int) -> int:
         """The body on a joint that a body is fixed to, or 0 where it stands still."""

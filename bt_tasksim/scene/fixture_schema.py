@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from bt_tasksim.core.joints import check_way
 from bt_tasksim.core.typed_file import (
@@ -27,6 +27,18 @@ from bt_tasksim.core.typed_file import (
 )
 
 Colour = Annotated[tuple[Share, Share, Share], Field(strict=False), sized(3)]
+
+
+def _opening(value: object) -> object:
+    """Check that a value is one number or two: of a union nothing better would be said."""
+    numbers = list(value) if isinstance(value, (list, tuple)) else [value, value]
+    fits = len(numbers) == 2
+    for number in numbers:
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or not abs(number) <= 100.0:
+            fits = False
+    if not fits:
+        raise ValueError("should be a number or two, the lower one first, from -100 to 100")
+    return value
 
 
 class BoxEntry(Model):
@@ -128,7 +140,7 @@ class PartEntry(Model):
     """Value at which the spring is at rest, m or rad."""
     latch: Annotated[NotNegative, Field(le=500.0)] = 0.0
     """What a latch holds it shut with, N or Nm."""
-    value: Number | Vector2 = 0.0
+    value: Annotated[Number | Vector2, BeforeValidator(_opening)] = 0.0
     """How far it is open at the start, m or rad; two numbers: drawn between them."""
     grasps: Annotated[tuple[HoldEntry, ...], Field(strict=False, max_length=64)] = ()
     """Where two fingers may hold it."""

@@ -308,13 +308,13 @@ def _put(fixture: Fixture, spec: FixtureSpec) -> Fixture:
 @lru_cache(maxsize=64)
 def _load(path: Path, version: tuple[int, ...]) -> Fixture:
     """The fixture in this version of a file."""
-    from bt_tasksim.core.typed_file import load_typed
+    from bt_tasksim.core.typed_file import load_typed, validate
     from bt_tasksim.scene.fixture_schema import FixtureFile
 
     if path.suffix in FURNITURE:
         from bt_tasksim.scene.articulated import articulated
 
-        return Fixture.from_data(articulated(path))
+        return Fixture.from_file(validate(FixtureFile, Document(f"fixture file '{path}'", articulated(path))))
     return Fixture.from_file(load_typed(FixtureFile, path, "fixture file")[0])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import traceback
 
 import numpy as np
 import pytest
@@ -374,3 +375,11 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(damages):
         trees.tree_from_xml(content, NODES)
     except InputError as error:
         assert "\n" not in str(error)
+
+
+def test_a_file_too_deep_is_refused_as_the_file_and_not_within_expat():
+    """The command line names the code that an error comes from, and nobody wrote ``pyexpat.c``."""
+    text = f'<root BTCPP_format="4"><BehaviorTree ID="a">{"<Inverter>" * 50_000}'
+    with pytest.raises(InputError, match=r"^tree, line 1: more than 250 levels of elements$") as refused:
+        trees.tree_from_xml(text)
+    assert not [place for place in traceback.extract_tb(refused.tb) if "pyexpat" in place.filename]

@@ -130,7 +130,18 @@ def test_in_scenes_and_scene_files(write, tmp_path):
             "'xyz' of origin should be finite .* 'nan 0 0'",
         ),
         (MJCF.replace('name="grip"', 'name="grip" pos="0 -INF 0"'), "'pos' of geom 'grip' should be finite"),
-        (URDF.replace('"0 0.2 0.2"', '"1e30 0 0"'), "should be at most 100, found 1e"),
+        (
+            URDF.replace('"0 0.2 0.2"', '"1e30 0 0"'),
+            r"cabinet.urdf', joint 'hinge' of link 'door': 'origin\[0\]' should be at most 100, found 1e",
+        ),
+        (URDF.replace('upper="1.5"', 'upper="7"'), "cabinet.urdf', joint 'hinge' of link 'door': .* found 7"),
+        (URDF.replace('"0.3 0.4 0.4"', '"300 0.4 0.4"'), r"cabinet.urdf': 'boxes\[0\].size\[0\]' should be"),
+        (
+            MJCF.replace("<worldbody>", "<worldbody>" + "<body>" * 2000).replace(
+                "</worldbody>", "</body>" * 2000 + "</worldbody>"
+            ),
+            "more than 50 elements within one another",
+        ),
         (URDF.replace("<axis", "<mimic joint='other'/><axis"), "'mimic' is none of them"),
     ],
 )
