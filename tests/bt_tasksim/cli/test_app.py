@@ -53,7 +53,7 @@ def test_old_command_lines_mean_what_they_meant(line):
     if line.startswith("new "):
         was = {"like": None, "urdf": None, **was}
     if line.startswith("check "):
-        was = {"robot": None, **was}
+        was = {"robot": None, "scene": None, **was}
     if line.startswith("decompose"):
         was = {**was, "logs": [was["log"]]}
         del was["log"]
