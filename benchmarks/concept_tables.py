@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 from benchmarks.any_tree_tables import NOT_YET
@@ -99,8 +98,11 @@ def gentleness(results: Results) -> str:
         cells = []
         for what, (_, factor, _) in UNITS.items():
             having = [row[what] for row in felt if what in row]
-            worst = max((factor * found["usual"] for found in having), default=math.nan)
-            cells.append(f"{worst:.1f} of {factor * having[0]['limit']:.0f}" if having else "not felt")
+            if not having:
+                cells.append("not felt")
+                continue
+            worst = max(factor * found["usual"] for found in having)
+            cells.append(f"{worst:.1f} of {factor * having[0]['limit']:.0f}")
         lines.append(f"| `{scenario}` | {' | '.join(cells)} | {min(map(_within, felt))} |")
     return "\n".join(lines) if len(lines) > 2 else NOT_YET.capitalize() + "."
 

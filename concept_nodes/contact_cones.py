@@ -57,22 +57,38 @@ def padded(sets: Sequence[ArrayLike]) -> tuple[Floats, Booleans]:
     return vectors, there
 
 
-def vectors(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Numbers of a shape.
+def numbers(what: str, values: ArrayLike, asked: str) -> Floats:
+    """What somebody gives as an array.
 
     Args:
         what: What they are, for the sentence.
         values: The numbers.
-        shape: Their shape; -1 for any length.
+        asked: What should be given, for the sentence.
+
+    Raises:
+        InputError: They are no numbers of one shape.
+    """
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{what}: no numbers of one shape; {asked}") from None
+
+
+def vectors(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    """Finite numbers of a shape.
+
+    Args:
+        what: What they are, for the sentence.
+        values: The numbers.
+        shape: Their shape; -1 for any length, of which none at all may be given in any way.
 
     Raises:
         InputError: They have another shape, or are no finite numbers.
     """
     asked = f"give finite numbers of shape ({', '.join('n' if size < 0 else str(size) for size in shape)})"
-    try:
-        found = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{what}: no numbers of one shape; {asked}") from None
+    found = numbers(what, values, asked)
+    if not found.size and -1 in shape:
+        return np.zeros([max(size, 0) for size in shape])
     fits = found.ndim == len(shape) and all(n in (-1, m) for n, m in zip(shape, found.shape, strict=True))
     if not fits or not np.isfinite(found).all():
         raise InputError(f"{what}: shape {found.shape}, or not finite; {asked}")

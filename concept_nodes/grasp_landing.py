@@ -33,6 +33,7 @@ STANDS = -CAREFUL / EAGER
 SLOWEST = 0.05
 """The least share of its own speed at which the reference motion goes on otherwise."""
 _MOVED = 1e-4
+"""Metres by which it is above the middle of an action once it has landed, at least."""
 
 
 class Landing(NamedTuple):
@@ -43,11 +44,13 @@ class Landing(NamedTuple):
         pace: The time scaling to ask for there, as an action.
         back: Metres by which they go back against the reference motion in the next control period: as far as
             that goes on, once they have landed.
+        goes: Metres that the reference motion goes in a control period at its own speed.
     """
 
     near: Array
     pace: Array
     back: Array
+    goes: Array
 
 
 def reaches_palm(half: Array, depth: float) -> Array:
@@ -70,20 +73,16 @@ def landing(seen: Seen, memory: GraspMemory) -> Landing:
     period = seen.world.control_period
     slow = SPEED * period * gentler(seen.tool)
     most = xp.where(has_landed, xp.full_like(slow, LIFTED), slow)
-    goes = poses.norm(advance(seen, memory))
+    now = seen.elapsed - memory.delay
+    goes = poses.norm(position(memory.path, now + period) - position(memory.path, now))
     pace = paced(goes, most)
     held = xp.where(has_landed, xp.minimum(most, goes), xp.zeros_like(goes))
     return Landing(
         near,
         xp.where(presses, xp.full_like(pace, STANDS), pace),
         xp.where(presses, xp.full_like(held, LIFTED), held),
+        goes,
     )
-
-
-def advance(seen: Seen, memory: GraspMemory) -> Array:
-    """How far ``(N, 3)`` the reference motion goes in a control period at its own speed, metres."""
-    now, period = seen.elapsed - memory.delay, seen.world.control_period
-    return position(memory.path, now + period) - position(memory.path, now)
 
 
 def paced(goes: Array, most: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bt_tasksim.concept.seen import Seen
 from bt_tasksim.concept_nodes import grasp_features
 from bt_tasksim.concept_nodes.grasp_features import ACROSS, ALONG, HASTE, SCALE
-from bt_tasksim.concept_nodes.grasp_landing import STANDS, Landing, advance, landing, paced
+from bt_tasksim.concept_nodes.grasp_landing import STANDS, Landing, landing, paced
 from bt_tasksim.concept_nodes.grasp_memory import GraspMemory
 from bt_tasksim.concept_nodes.grasp_pose import half_extent
 from bt_tasksim.concept_nodes.limits import gentler
@@ -80,7 +80,7 @@ def feeling(seen: Seen, memory: GraspMemory, target: str, palm: Landing) -> Arra
     share = gentler(seen.tool)
     share = xp.where(seen.model(target).jointed, RIGID * share, share)
     most = FEELING * xp.where(near, share, xp.ones_like(share))
-    pace = paced(poses.norm(advance(seen, memory)), most * seen.world.control_period)
+    pace = paced(palm.goes, most * seen.world.control_period)
     pace = xp.where(palm.near, xp.minimum(pace, palm.pace), pace)
     slower, stands = xp.minimum(pace, xp.zeros_like(pace)), xp.full_like(pace, STANDS)
     pace = xp.where(xp.any(seen.contacts, axis=-1), slower, pace)

@@ -34,6 +34,7 @@ from bt_tasksim.concept_nodes.contact_cones import (
     Floats,
     Integers,
     cone_dimensions,
+    numbers,
     unit_normals,
     vectors,
 )
@@ -79,10 +80,7 @@ def translation_normals(normals: ArrayLike) -> NDArray[np.float64]:
     Raises:
         InputError: The shape is wrong, or a normal is zero or not finite.
     """
-    try:
-        array = np.asarray(normals, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("contact normals are no numbers; give an array of shape (n, 3)") from None
+    array = numbers("contact normals", normals, "give an array of shape (n, 3)")
     if array.size == 0:
         return np.zeros((0, 3))
     if array.ndim != 2 or array.shape[1] != 3:
@@ -111,15 +109,19 @@ def rotation_normals(
     """
     unit = translation_normals(normals)
     about = vectors("the centre", centre, (3,))
-    at = vectors("contact points", points, (-1, 3)) if np.size(points) else np.zeros((0, 3))
-    if not 0.0 <= lever < math.inf:
-        raise InputError(f"the lever of a rotation is {lever} m; give a finite one that is not negative")
+    at = vectors("contact points", points, (-1, 3))
+    _check_lever(lever)
     if len(at) != len(unit):
         raise InputError(f"{len(unit)} contact normals but {len(at)} contact points; give one point each")
     moments = np.cross(at - about, unit)
     arms = np.linalg.norm(moments, axis=1)
     keep = arms > lever
     return np.asarray(moments[keep] / arms[keep][:, None], dtype=np.float64)
+
+
+def _check_lever(lever: float) -> None:
+    if not 0.0 <= lever < math.inf:
+        raise InputError(f"the lever of a rotation is {lever} m; give a finite one that is not negative")
 
 
 def dimensions(normals: ArrayLike, tolerance: float = EXACT) -> Dimensions:
@@ -223,9 +225,9 @@ def rotation_states(
             f"{normals.shape} contact normals, {points.shape} points and {centres.shape} centres do not fit: "
             "give a point for each normal, and a centre for each set"
         )
-    finite = np.isfinite(centres).all() and np.isfinite(np.where(there[..., None], points, 0.0)).all()
-    if not finite or not 0.0 <= lever < math.inf:
-        raise InputError("contact points, centres and the lever of a rotation have to be finite numbers")
+    _check_lever(lever)
+    if not (np.isfinite(centres).all() and np.isfinite(points[there]).all()):
+        raise InputError("contact points and the centres of rotations have to be finite numbers")
     moments = np.cross(points - centres[:, None], unit_normals(normals, there))
     arms = np.linalg.norm(moments, axis=2)
     there = there & (arms > lever)

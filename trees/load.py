@@ -19,11 +19,10 @@ from bt_tasksim.concept.leaf import ConceptNode, ModelLeaf
 from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.core.errors import InputError, nearest
 from bt_tasksim.core.former import advice
-from bt_tasksim.core.named_data import named_data
 from bt_tasksim.core.own_files import code_of
 from bt_tasksim.core.plugins import line_in
 from bt_tasksim.policy.policy import concept_name
-from bt_tasksim.robot.description import RobotDescription, load_robot
+from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene.scene import Scene, WorldSource
 from bt_tasksim.trees.check import check_tree
 from bt_tasksim.trees.named_files import scene_beside
@@ -308,8 +307,6 @@ def _from_xml(
         return TreeSource(path.stem, build, world)
     named = scene or scene_of_tree(path)
     if named is None:
-        if robot is not None:
-            named_data("robot", robot, RobotDescription)  # an unknown one is said to be that
         fitting = [name for name in scenarios() if _fits(root, name, robot)]
         if not fitting:
             objects, places = names_in(root)

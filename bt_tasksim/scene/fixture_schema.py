@@ -31,14 +31,14 @@ Colour = Annotated[tuple[Share, Share, Share], Field(strict=False), sized(3)]
 
 def _opening(value: object) -> object:
     """Check that a value is one number or two: of a union nothing better would be said."""
-    numbers = list(value) if isinstance(value, (list, tuple)) else [value, value]
-    fits = len(numbers) == 2
-    for number in numbers:
-        if isinstance(number, bool) or not isinstance(number, (int, float)) or not abs(number) <= 100.0:
-            fits = False
-    if not fits:
+    numbers = value if isinstance(value, list | tuple) else (value, value)
+    if len(numbers) != 2 or not all(_is_opening(number) for number in numbers):
         raise ValueError("should be a number or two, the lower one first, from -100 to 100")
     return value
+
+
+def _is_opening(number: object) -> bool:
+    return isinstance(number, int | float) and not isinstance(number, bool) and abs(number) <= 100.0
 
 
 class BoxEntry(Model):

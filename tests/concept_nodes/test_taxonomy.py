@@ -247,6 +247,7 @@ UP, ASIDE = [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]]
         (lambda: rotation_state(UP, ASIDE, [np.nan, 0.0, 0.0]), "the centre: .* not finite"),
         (lambda: rotation_state(UP, ASIDE, [0.0]), "the centre: shape"),
         (lambda: rotation_state(UP, [[1.0, 0.0]], [0.0, 0.0, 0.0]), "contact points: shape"),
+        (lambda: rotation_state(UP, [[1.0, 0.0], [1.0]], [0.0, 0.0, 0.0]), "contact points: no numbers"),
         (lambda: rotation_state(UP, ASIDE, [0.0, 0.0, 0.0], lever=np.nan), "lever"),
         (lambda: translation_state([["up", "down", "left"]]), "no numbers"),
         (lambda: contact_state((1.5, 0.5, 1)), "must add up to 3"),

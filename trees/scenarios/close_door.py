@@ -12,8 +12,6 @@ from bt_tasksim.trees import sequence
 
 FAR = 0.36
 """Metres before its base at which a hand may rest and be clear of the door where that usually stands."""
-
-
 WIDE = 0.9
 """Radians beyond which a door does not stand open before a hand that rests farther out."""
 
