@@ -14,11 +14,12 @@ from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
 from bt_tasksim.concept_nodes.holding import NOT_HELD, off_handle
 from bt_tasksim.concept_nodes.joint_conditions import value_of
-from bt_tasksim.concept_nodes.joint_force import arm_of, force_against, lever_of
+from bt_tasksim.concept_nodes.joint_force import distance_of, force_against, reach_of
 from bt_tasksim.concept_nodes.joint_values import nearer_stop
 from bt_tasksim.concept_nodes.limits import PART_FORCE_LIMIT
 from bt_tasksim.concept_nodes.pressing import Pressing
 from bt_tasksim.core import poses
+from bt_tasksim.core.joints import LEAST_REACH
 from bt_tasksim.core.outcomes import Possible, register_reason
 from bt_tasksim.core.poses import Array, array_namespace
 from bt_tasksim.core.registry import register
@@ -33,6 +34,9 @@ metres from which on that does not count as held."""
 PRESSES_ON, MOSTLY = 2000.0, 0.9
 """Newtons more for each metre beyond, up to that share of ``most``: a spring may be as strong as the middle
 of the limits, and would turn the part off its stop."""
+FIRST = 1.0
+"""Seconds for which it is pressed with that share at first, and which do not count: a part that seems to be
+at its stop may stand a little before it, and what is felt may be its spring."""
 NO_STOP = register_reason(
     "not_at_stop",
     "{object} stands {value} from the nearer stop of its hinge, more than {limit}: turn it there",
@@ -48,10 +52,11 @@ class HoldTurnedMemory(NamedTuple):
         value: Radians ``(N,)`` to which the part was turned at the begin.
         way: Sign ``(N,)`` of the turn onto the stop.
         grip: Pose ``(N, 7)`` of the part in the tool frame.
-        reach: Metres ``(N,)`` that the tool goes for each radian, see `joint_force.arm_of`.
+        reach: Metres ``(N,)`` that the tool goes for each radian, see `joint_force.reach_of`.
         pushed: Metres ``(N,)`` that the tool is told to go beyond the stop.
         pressed: Newtons ``(N,)`` with which it presses, smoothed.
         held: Seconds ``(N,)`` for which that has been between its limits.
+        farthest: Metres ``(N,)`` that the hand had gone at most.
     """
 
     value: Array
@@ -61,6 +66,7 @@ class HoldTurnedMemory(NamedTuple):
     pushed: Array
     pressed: Array
     held: Array
+    farthest: Array
 
 
 @register("concept")
@@ -111,35 +117,35 @@ class HoldTurned(Pressing[HoldTurnedMemory]):
         _, way = nearer_stop(value, seen.model(self.target).joints.limits)
         nothing = array_namespace(value).zeros_like(value)
         grip = poses.relative(seen.tool, seen.object(self.target))
-        start = HoldTurnedMemory(value, way, grip, nothing, nothing, nothing, nothing)
+        start = HoldTurnedMemory(value, way, grip, *(nothing,) * 5)
         felt = force_against(seen, self.target, way)
-        return start._replace(reach=arm_of(seen, self.target), pressed=felt)
+        return start._replace(reach=reach_of(seen, self.target), pressed=felt)
 
     def felt(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
         """See `Pressing.felt`."""
         return force_against(seen, self.target, memory.way)
 
     def gone(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
-        """See `Pressing.gone`: along its way, or by what it has turned.
-
-        Where it is on the axis it has no way, and where it slips on the part it does not turn.
-        """
-        key = ("gone", self.target, id(memory))  # of a memory that lives as long as what is kept with it
-        return seen.once(key, lambda: (self._gone(seen, memory), memory))[0]
-
-    def _gone(self, seen: Seen, memory: HoldTurnedMemory) -> Array:
+        """See `Pressing.gone`: along its way, or, on the axis, where it has none, by what it has turned."""
         law, xp = seen.model(self.target).joints, array_namespace(memory.way)
         free = law._replace(limits=law.limits + poses.constant(np.array([-math.pi, math.pi]), law.limits))
         turned = free.value(poses.multiply(seen.tool, memory.grip)) - memory.value
         gone = law.shift(memory.value, self._tool(seen, memory, 0.0)[:, :3], seen.tool[:, :3])
-        away = poses.norm(lever_of(seen, self.target))
-        return xp.maximum(memory.way * gone * away, memory.way * turned * memory.reach)
+        away = distance_of(seen, self.target)
+        return memory.way * xp.where(away < LEAST_REACH, turned * memory.reach, gone * away)
+
+    def advance(self, action: Array, seen: Seen, memory: HoldTurnedMemory) -> HoldTurnedMemory:
+        """See `Pressing.advance`."""
+        farthest = array_namespace(memory.way).maximum(memory.farthest, self.gone(seen, memory))
+        return super().advance(action, seen, memory._replace(farthest=farthest))
 
     def led_to(self, seen: Seen, memory: HoldTurnedMemory) -> tuple[Array, Array]:
         """See `Pressing.led_to`: more off the stop, where a spring turns it, and where it does not count."""
-        back = -self.gone(seen, memory)
+        back, first = memory.farthest - self.gone(seen, memory), seen.elapsed < FIRST
         wanted = (self.least + self.most) / 2 + PRESSES_ON * poses.clip(back - BACK, 0.0, math.inf)
-        return poses.clip(wanted, 0.0, MOSTLY * self.most), back <= OFF
+        hardest = MOSTLY * self.most + 0.0 * wanted
+        xp = array_namespace(wanted)
+        return xp.where(first, hardest, xp.minimum(wanted, hardest)), (back <= OFF) & ~first
 
     def commanded(self, seen: Seen, after: HoldTurnedMemory) -> Command:
         """A little beyond the stop."""

@@ -95,6 +95,9 @@ FURTHER = {False: 0.03, True: math.radians(20.0)}
 """Metres or radians by which it does so at most."""
 TOLERANCE = {False: 0.004, True: math.radians(1.5)}
 """Metres or radians within which a value counts as reached."""
+CLOSELY, IN_TIME = {False: 0.001, True: math.radians(0.4)}, 0.8
+"""The same within which it counts so at once, and seconds after the way's end from which on `TOLERANCE` will
+do: fingers that give way to friction come closer as the hand goes on."""
 ALLOWED = {False: 0.02, True: math.radians(8.0)}
 """Metres or radians from the wanted value that are tolerable."""
 ACCELERATION = 0.4
@@ -330,13 +333,13 @@ class OnJoint(ConceptModel[JointMemory]):
 
     def advance(self, action: Array, seen: Seen, memory: JointMemory) -> JointMemory:
         """Go on, slower where the wrist feels force, and give way aside; notice stops, and what jams."""
-        xp, period, now = array_namespace(seen.tool), seen.world.control_period, self._value(seen)
+        xp, period = array_namespace(seen.tool), seen.world.control_period
         share = self._share(seen, memory)
         progress = memory.progress + period * share
-        far = abs(self._asked(seen, memory) - now) > BEHIND[self.turns]
+        far = abs(self._asked(seen, memory) - self._value(seen)) > BEHIND[self.turns]
         at_end = (memory.late > 0.0) & (share > 0.0) & (memory.progress >= memory.path.duration)
-        short = (memory.goal - now) * PUSHES * period
-        further = memory.further + xp.where(at_end, short, xp.zeros_like(short))
+        on = period * self._goes_on(seen, memory)
+        further = memory.further + xp.where(at_end, on, xp.zeros_like(on))
         over = (progress >= memory.path.duration) | (share <= 0.0)
         return memory._replace(
             offset=self._given_way(seen, memory),
@@ -346,6 +349,10 @@ class OnJoint(ConceptModel[JointMemory]):
             behind=xp.where(far, memory.behind + period, xp.zeros_like(memory.behind)),
             late=xp.where(over, memory.late + period, xp.zeros_like(memory.late)),
         )
+
+    def _goes_on(self, seen: Seen, memory: JointMemory) -> Array:
+        """Metres or radians of the joint a second ``(N,)`` by which the hand goes on after the path's end."""
+        return PUSHES * (memory.goal - self._value(seen))
 
     def _share(self, seen: Seen, memory: JointMemory) -> Array:
         """Share ``(N,)`` of the path's own speed: less where the wrist feels force."""
@@ -405,7 +412,8 @@ class OnJoint(ConceptModel[JointMemory]):
     def done(self, seen: Seen, memory: JointMemory) -> Array:
         """The hand has come to the end of its way, and the part to its value."""
         off = abs(self._value(seen) - memory.goal)
-        return (memory.progress >= memory.path.duration) & (off <= TOLERANCE[self.turns])
+        close = (off <= CLOSELY[self.turns]) | ((off <= TOLERANCE[self.turns]) & (memory.late >= IN_TIME))
+        return (memory.progress >= memory.path.duration) & close
 
     def maintained(self, goal: str, seen: Seen, memory: JointMemory) -> Array:
         """The handle may still be in the hand."""

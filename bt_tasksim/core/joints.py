@@ -6,6 +6,7 @@ for one that turns. It is shut at its lower limit, which is 0 for most. All laws
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -23,6 +24,10 @@ SHORTEST = 1e-3
 LONGEST = {SLIDES: 2.0, TURNS: 6.0}
 """Metres or radians that a part can go at most; of what turns nearly round, estimates would not tell one end
 from the other."""
+LEAST_REACH = 0.05
+"""Metres from its axis at which, at least, a torque about a joint is taken as a force."""
+NEAR_STOP = {False: 0.015, True: math.radians(4.0)}
+"""Metres or radians from a stop, by whether it turns, within which what is felt to be stopped is there."""
 
 
 def check_way(kind: str, limits: tuple[float, float], value: tuple[float, float]) -> None:
@@ -157,3 +162,41 @@ class Joints(NamedTuple):
         a, b = arm(point), arm(moved)
         turn = xp.atan2(xp.sum(poses.cross(a, b) * axis, axis=-1), xp.sum(a * b, axis=-1))
         return xp.where(self.turns, turn, along)
+
+    def arm(self, now: Array, point: Array) -> Array:
+        """From the axis ``(..., 3)`` to points ``(..., 3)``, across the axis, robot base frame, metres.
+
+        Args:
+            now: Values ``(...)``.
+            point: The points, robot base frame.
+        """
+        at = self.pose(now)
+        axis = poses.rotate(at[..., 3:], self.axis)
+        lever = point - poses.transform(at, self.origin)
+        return lever - poses.dot(lever, axis)[..., None] * axis
+
+    def reach(self, now: Array, point: Array) -> Array:
+        """Metres ``(...)`` that a point goes for a metre of what slides, or a radian of what turns.
+
+        Of what turns it is `LEAST_REACH` at least: knobs are held on their axis. The arguments are those of
+        `arm`.
+        """
+        away = poses.clip(poses.norm(self.arm(now, point)), LEAST_REACH, math.inf)
+        return array_namespace(away).where(self.turns, away, 0.0 * away + 1.0)
+
+    def force(self, now: Array, point: Array, force: Array, torque: Array) -> Array:
+        """What pushes ``(...)`` towards larger values, at a point that goes with the part, N.
+
+        Of what turns it is the torque about the axis, over `reach`.
+
+        Args:
+            now: Values ``(...)``.
+            point: Where force and torque are told ``(..., 3)``, robot base frame, metres.
+            force: ``(..., 3)``, robot base frame, N.
+            torque: About the point ``(..., 3)``, robot base frame, Nm.
+        """
+        at = self.pose(now)
+        axis = poses.rotate(at[..., 3:], self.axis)
+        about = torque + poses.cross(point - poses.transform(at, self.origin), force)
+        turning = poses.dot(about, axis) / self.reach(now, point)
+        return array_namespace(turning).where(self.turns, turning, poses.dot(force, axis))

@@ -5,13 +5,10 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept_nodes import CloseDoor, Grasp, Release
-from bt_tasksim.planning.arm import arm_of
-from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
+from bt_tasksim.trees.resting_hand import farther_out
 
-FAR = 0.36
-"""Metres before its base at which a hand may rest and be clear of the door where that usually stands."""
 WIDE = 0.9
 """Radians beyond which a door does not stand open before a hand that rests farther out."""
 
@@ -23,8 +20,7 @@ def open_door(robot: str, value: tuple[float, float]) -> FixtureSpec:
         robot: The robot that is to close or adjust it.
         value: Between which angles it is drawn, radians.
     """
-    made = load_robot(robot)
-    farther = max(0.0, float(arm_of(made).tool(made.rest)[0]) - FAR)
+    farther = farther_out(robot)
     drawn = (value[0], min(value[1], WIDE)) if farther else value
     stands = {"value": drawn, "x": (0.66 + farther, 0.72 + farther), "heading": (-0.2, 0.2)}
     return FixtureSpec("door", parameters=stands)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from py_trees.behaviour import Behaviour
 
-from bt_tasksim.concept_nodes import Grasp, HoldTurned, TurnKnob
+from bt_tasksim.concept_nodes import Grasp, HoldTurned, TurnToStop
 from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
+from bt_tasksim.trees.resting_hand import console_at
 
-TURNS, SECONDS = 1.3, 4.0
+TURNS, SECONDS, PRESS = 1.3, 4.0, 20.0
 
 
 def scene(robot: str = "panda") -> Scene:
     """A lever that its spring turns back, on a console or on its front; sizes and place are drawn."""
     lever: dict[str, float | tuple[float, float]] = {
+        "x": console_at(robot),
         "heading": (-0.2, 0.2),
         "turns": TURNS,
         "friction": 0.3,
@@ -32,6 +34,6 @@ def build() -> Behaviour:
     return sequence(
         "hold the lever on its stop",
         Grasp("lever"),
-        TurnKnob("lever", angle=TURNS),
+        TurnToStop("lever", press=PRESS),
         HoldTurned("lever", duration=SECONDS),
     )

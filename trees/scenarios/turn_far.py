@@ -7,6 +7,7 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.concept_nodes import Grasp, Release, TurnKnob
 from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
+from bt_tasksim.trees.resting_hand import console_at
 
 ANGLES = (1.6, 3.2, 4.8)
 """Radians to which it is turned, one grasp after the other."""
@@ -16,7 +17,9 @@ def scene(robot: str = "panda") -> Scene:
     """A knob that turns by 5.6 rad, on a console; sizes, place and friction are drawn."""
     return Scene(
         robot,
-        fixtures=[FixtureSpec("knob", parameters={"turns": 5.6, "heading": (-0.2, 0.2)})],
+        fixtures=[
+            FixtureSpec("knob", parameters={"turns": 5.6, "x": console_at(robot), "heading": (-0.2, 0.2)})
+        ],
         goal=Goal("knob", relation="set", value=ANGLES[-1], angle_tolerance=0.12),
         name="turn_far",
     )

@@ -7,6 +7,7 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.concept_nodes import Grasp, Release, TurnToStop
 from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
+from bt_tasksim.trees.resting_hand import console_at
 
 TURNS = 1.4
 
@@ -15,6 +16,7 @@ def scene(robot: str = "panda") -> Scene:
     """A lever on the top of a console or on its front; sizes, place and friction are drawn."""
     stands: dict[str, float | tuple[float, float]] = {
         "value": (0.0, 0.6),
+        "x": console_at(robot),
         "heading": (-0.2, 0.2),
         "turns": TURNS,
     }

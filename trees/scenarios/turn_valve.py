@@ -7,11 +7,12 @@ from py_trees.behaviour import Behaviour
 from bt_tasksim.concept_nodes import Grasp, Release, TurnKnob
 from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
+from bt_tasksim.trees.resting_hand import console_at
 
 
 def scene(robot: str = "panda") -> Scene:
     """A valve with a wheel or a cross, on a console; sizes, place and friction are drawn."""
-    stands = {"heading": (-0.2, 0.2)}
+    stands = {"x": console_at(robot), "heading": (-0.2, 0.2)}
     return Scene(
         robot,
         fixtures=[FixtureSpec("valve", parameters=stands)],

@@ -3,7 +3,8 @@
 A part is on its joint, whose axis is calibrated; so what is seen of it is brought onto the joint. Where the
 scene does not say that the part is sensed, the robot knows how it stands at the beginning, as it was seen
 then or else as the scene says, and from then on what its hand does with it: the part goes along with fingers
-that hold it by one of its grasps, and with a fist that touches it.
+that hold it by one of its grasps, and with a fist that touches it. Fingers slip; so a part that is taken to
+be near its stop is at it once the hand feels that.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bt_tasksim.core import poses
-from bt_tasksim.core.joints import Joints
+from bt_tasksim.core.joints import NEAR_STOP, Joints
 from bt_tasksim.core.poses import Array, constant, host
 from bt_tasksim.core.world import ObjectModel, WorldState
 from bt_tasksim.scene.configuration import ActorConfiguration
@@ -31,6 +32,9 @@ SLIPPED = 0.5
 """Share of the distance of its tips from their middle to which a hand closes when a part slips out of it."""
 FIST = 0.9
 """Closure from which a hand is a fist."""
+STILL, RISES = 0.0005, 6.0
+"""Metres that fingertips go along a joint at most while the force against them grows by so many newtons,
+where the part is stopped: what rubs does not hold them with ever more, and no spring is so stiff."""
 
 
 @dataclass(eq=False)
@@ -44,6 +48,8 @@ class TrackedPart:
         told: How far it is open at the beginning ``(1,)``, as the scene says.
         value: How far it is taken to be open ``(1,)``, once somebody has looked.
         spread: Metres of the fingertips from their middle, at most, since some touch; 0 once they open.
+        gone: Metres that the tips have gone along the joint with the part since `pushed` was felt.
+        pushed: Force of the part on the hand then, towards larger values, N; None where it is not held.
     """
 
     column: int
@@ -52,6 +58,8 @@ class TrackedPart:
     told: Array
     value: Array | None = None
     spread: float = 0.0
+    gone: float = 0.0
+    pushed: float | None = None
 
     @property
     def sensed(self) -> bool:
@@ -62,11 +70,21 @@ class TrackedPart:
 
 @dataclass(frozen=True)
 class HandContact:
-    """A hand at one instant, in one world: its tips ``(n_tips, 3)``, which of them touch, its closure."""
+    """A hand at one instant, in one world.
+
+    Attributes:
+        tips: ``(n_tips, 3)``, robot base frame.
+        touching: Booleans ``(n_tips,)``.
+        closure: From 0, open, to 1.
+        tool: Pose ``(7,)`` of the tool.
+        wrench: External wrench ``(6,)`` at the tool, in its frame.
+    """
 
     tips: Array
     touching: Array
     closure: float
+    tool: Array
+    wrench: Array
 
     @property
     def spread(self) -> float:
@@ -114,10 +132,11 @@ class Parts:
         """
         if not self._any:
             return estimate
-        seen, tips, felt, shut = (np.array(host(v)) for v in (estimate, state.tips, touching, closure))
+        known = (estimate, state.tips, touching, closure, state.tool_pose, state.wrench)
+        seen, tips, felt, shut, tools, wrenches = (np.array(host(v)) for v in known)
         for i, row in enumerate(rows.tolist()):
             if self._parts[row]:
-                hand = HandContact(tips[i], felt[i], float(shut[i]))
+                hand = HandContact(tips[i], felt[i], float(shut[i]), tools[i], wrenches[i])
                 for part in self._parts[row]:
                     self._follow(part, seen[i, part.column], self._hands[row], hand)
                     if part.value is not None:
@@ -135,7 +154,8 @@ class Parts:
             return
         if before is None:
             return
-        both = before.touching & hand.touching
+        both, pushed = before.touching & hand.touching, part.pushed
+        part.pushed = None
         if int(both.sum()) > 1:
             part.spread = max(part.spread, hand.spread)
         elif hand.spread > part.spread:  # it has opened
@@ -148,7 +168,8 @@ class Parts:
             return
         moved = _moved(part.joint, part.value, was, now)
         low, high = part.joint.limits[:, 0], part.joint.limits[:, 1]
-        part.value = np.clip(part.value + moved, low, high)
+        part.value, part.pushed = np.clip(part.value + moved, low, high), pushed
+        _feel_stop(part, moved, hand)
 
 
 def _moved(joint: Joints, value: Array, was: Array, now: Array) -> Array:
@@ -163,6 +184,23 @@ def _moved(joint: Joints, value: Array, was: Array, now: Array) -> Array:
     a, b = ((tips - centre) - ((tips - centre) @ axis)[:, None] * axis for tips in (was, now))
     turn: Array = np.arctan2((np.cross(a, b) @ axis).sum(), (a * b).sum())
     return np.array([turn])
+
+
+def _feel_stop(part: TrackedPart, moved: Array, hand: HandContact) -> None:
+    """Take a part to be at the stop that it is near, where a hand that moved it by ``moved (1,)`` feels it."""
+    assert part.value is not None
+    at, joint = hand.tool[None, :3], part.joint
+    force, torque = (poses.rotate(hand.tool[None, 3:], v[None]) for v in (hand.wrench[:3], hand.wrench[3:]))
+    now = float(joint.force(part.value, at, force, torque)[0])
+    part.gone += float(moved[0] * joint.reach(part.value, at)[0])
+    if part.pushed is None or abs(part.gone) > STILL:
+        part.gone, part.pushed = 0.0, now
+        return
+    way = 1.0 if now > part.pushed else -1.0
+    stop = joint.limits[:, 0 if way > 0.0 else 1]
+    grown = min(way * now, way * (now - part.pushed))
+    if grown > RISES and abs(stop - part.value)[0] < NEAR_STOP[bool(joint.turns[0])]:
+        part.value, part.gone, part.pushed = stop.copy(), 0.0, now
 
 
 def _value(joint: Joints, seen: Array) -> Array:
