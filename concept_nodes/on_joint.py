@@ -95,7 +95,7 @@ FURTHER = {False: 0.03, True: math.radians(20.0)}
 """Metres or radians by which it does so at most."""
 TOLERANCE = {False: 0.004, True: math.radians(1.5)}
 """Metres or radians within which a value counts as reached."""
-CLOSELY, IN_TIME = {False: 0.001, True: math.radians(0.4)}, 0.8
+CLOSELY, IN_TIME = {False: 0.001, True: math.radians(0.4)}, 1.6
 """The same within which it counts so at once, and seconds after the way's end from which on `TOLERANCE` will
 do: fingers that give way to friction come closer as the hand goes on."""
 ALLOWED = {False: 0.02, True: math.radians(8.0)}

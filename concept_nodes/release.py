@@ -259,12 +259,17 @@ def _opened(view: WorldView, target: str) -> Array:
 
     One of two sides opens no wider than it may without touching anything else, or another wall of what it
     holds: in the hole of a ring a finger would meet the far side. A jaw that swings sweeps things aside on
-    its way, so there each amount has to be clear up to the last.
+    its way, so there each amount has to be clear up to the last; so have many fingers of other walls of what
+    they hold, as the spokes of a wheel.
     """
     robot, closure = view.robot, float(view.robot.closure(view.hand))
-    if robot.many_fingers:
-        return robot.hand_open
     walls = _other_walls(view, target)
+    if robot.many_fingers and not walls:
+        return robot.hand_open
+    if robot.many_fingers:
+        hands = [robot.hand_position(np.array([share * closure])) for share in SHUT]
+        clear = itertools.takewhile(lambda hand: _apart(view, hand, walls), hands[-2::-1])
+        return [hands[-1], *clear][-1]
     if standing_side(robot) is None:
         hands = [robot.hand_position(np.array([share * closure])) for share in SHUT]
         return next((hand for hand in hands[:-1] if _has_room(view, target, hand, walls)), hands[-1])
@@ -278,7 +283,12 @@ def _has_room(view: WorldView, target: str, hand: Array, walls: list[Thing]) -> 
     finder = view.finder(hand=hand, leave=Leave(hand={target}), closer=TOUCHING)
     if not finder.collisions.free(finder.start):
         return False
-    return not walls or HandCollisions(bodies_of(view.robot), hand, walls).free(view.tool)
+    return not walls or _apart(view, hand, walls)
+
+
+def _apart(view: WorldView, hand: Array, walls: list[Thing]) -> bool:
+    """The hand would touch no other wall of what it holds."""
+    return HandCollisions(bodies_of(view.robot), hand, walls).free(view.tool)
 
 
 def _other_walls(view: WorldView, target: str) -> list[Thing]:

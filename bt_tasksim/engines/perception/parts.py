@@ -187,7 +187,7 @@ def _moved(joint: Joints, value: Array, was: Array, now: Array) -> Array:
 
 
 def _feel_stop(part: TrackedPart, moved: Array, hand: HandContact) -> None:
-    """Take a part to be at the stop that it is near, where a hand that moved it by ``moved (1,)`` feels it."""
+    """Take a part to be at the stop that it is near, where the hand that moved it so feels it."""
     assert part.value is not None
     at, joint = hand.tool[None, :3], part.joint
     force, torque = (poses.rotate(hand.tool[None, 3:], v[None]) for v in (hand.wrench[:3], hand.wrench[3:]))
