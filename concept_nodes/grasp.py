@@ -34,7 +34,7 @@ from bt_tasksim.concept_nodes.grasp_pose import (
     on_object,
     resting_place,
 )
-from bt_tasksim.concept_nodes.holding import HOLDING, tool_distance
+from bt_tasksim.concept_nodes.holding import EMPTY, HOLDING, tool_distance
 from bt_tasksim.concept_nodes.limits import FORCE_LIMIT, force_at_wrist, strain
 from bt_tasksim.concept_nodes.touching import touched
 from bt_tasksim.concept_nodes.view import WorldView, host_numbers, put_down, views
@@ -81,8 +81,6 @@ its full speed 137 to 140, since what is light tilts in it; the Panda 187 and 18
 FLATTEST = 0.3
 """Cosine between an approach and straight down onto a support below which a wrong height is corrected less
 and less."""
-EMPTY = 0.97
-"""Share of its grip beyond which a hand has nothing between its fingers."""
 PUSHED = 0.06
 """Metres by which a grasp may push the object, as it is seen."""
 TIPPED = math.radians(20.0)

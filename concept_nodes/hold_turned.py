@@ -11,7 +11,7 @@ from bt_tasksim.concept.contact import ContactChange, ContactState
 from bt_tasksim.concept.parameters import Newtons, ObjectName, Seconds
 from bt_tasksim.concept.presentation import Presentation
 from bt_tasksim.concept.seen import Known, Seen
-from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
+from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, about_handle, at_handle
 from bt_tasksim.concept_nodes.holding import NOT_HELD, off_handle
 from bt_tasksim.concept_nodes.joint_conditions import value_of
 from bt_tasksim.concept_nodes.joint_force import distance_of, force_against, reach_of
@@ -153,7 +153,7 @@ class HoldTurned(Pressing[HoldTurnedMemory]):
 
     def maintained(self, goal: str, seen: Seen, memory: HoldTurnedMemory) -> Array:
         """The handle may still be in the hand."""
-        return at_handle(seen, self.target)
+        return about_handle(seen, self.target)
 
     def sufficient_cost(self, known: Known, memory: HoldTurnedMemory) -> Array:
         """How far the part truly is from its stop, over what counts as there."""

@@ -12,6 +12,8 @@ from bt_tasksim.core.units import METRES
 NOT_HELD = register_reason("not_held", "{object} is not held ({distance} from the tool)", distance=METRES)
 HOLDING = "holding"
 """Name of the goal that `Grasp` reaches, `Pick`, `Bring` and `Place` maintain, and `Release` ends."""
+EMPTY = 0.97
+"""Share of its grip beyond which a hand has nothing between its fingers."""
 REACH = 0.03
 """Metres by which the estimate of something that is held may lie outside the grasp."""
 BETWEEN = 0.003

@@ -15,7 +15,7 @@ from bt_tasksim.concept.model import ConceptModel
 from bt_tasksim.concept.parameters import MetresPerSecond, Newtons, ObjectName
 from bt_tasksim.concept.seen import Known, Seen
 from bt_tasksim.concept_nodes.closer import TOUCHING, VERY_CLOSE, with_room
-from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, at_handle
+from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, about_handle, at_handle
 from bt_tasksim.concept_nodes.holding import HOLDING, NOT_HELD, off_handle
 from bt_tasksim.concept_nodes.joint_way import JointWay, gone_anyhow, keeps_clear, pivots
 from bt_tasksim.concept_nodes.limits import force_at_tool, force_at_wrist, strain
@@ -417,7 +417,7 @@ class OnJoint(ConceptModel[JointMemory]):
 
     def maintained(self, goal: str, seen: Seen, memory: JointMemory) -> Array:
         """The handle may still be in the hand."""
-        return at_handle(seen, self.target)
+        return about_handle(seen, self.target)
 
     def necessary_cost(self, seen: Seen, memory: JointMemory) -> Array:
         """How far the value is from the wanted one, metres or radians."""

@@ -71,9 +71,9 @@ BARELY = 0.002
 wrong as that."""
 UNMOVED = (0.01, math.radians(10.0))
 """Metres and radians by which fingers that open move what they let go of, at most."""
-PRESSES = 0.6
-"""Share of the force limit from which on a hand that has parted its fingers draws back at once as it opens,
-since they stand on something."""
+PRESSES, PARTED = 0.4, 0.1
+"""Share of the force limit from which on a hand whose fingers have parted by so much of their closure draws
+back at once as it opens, since they stand on something."""
 AT = 0.004
 """Metres within which the hand is at a piece of what it holds, and that it stays away from others."""
 UP = np.array([0.0, 0.0, 1.0])
@@ -176,7 +176,7 @@ class Release(ConceptModel[ReleaseMemory]):
         slack = xp.where(memory.end > 0.0, slack, xp.full_like(slack, OPEN))
         open_now = (seen.elapsed > self.opening) & (seen.closure < memory.end + slack)
         open_now = open_now | (seen.elapsed > self.opening + STUCK)
-        parted = seen.closure < memory.held - OPEN
+        parted = seen.closure < memory.held - PARTED
         open_now = open_now | (parted & (force_at_wrist(seen) > PRESSES * self.force_limit))
         begun = xp.where(open_now, xp.zeros_like(memory.opened), memory.opened)
         going = memory.opened >= 0.0

@@ -72,7 +72,7 @@ RAISED = 0.003
 """Metres above that to which it is brought where the arm cannot lead it over an edge."""
 TURN = 0.7
 """Radians a second at which it is tipped."""
-YIELDS, SOFTLY = 1.0, 0.015
+YIELDS, SOFTLY, STRONGEST = 1.0, 0.015, 4.0
 """N beyond those at the begin from which on what is tipped gives way upwards; and metres a second for each N
 above that: at a lever of a tenth of a metre a few newtons turn a thing between two fingers."""
 DOWN, DEEPEST = 0.015, 0.010
@@ -263,7 +263,7 @@ class Tipping(ConceptModel[TipMemory]):
         low = poses.clip(memory.floor + CLEAR - self._lowest(seen), -LOW, LOW)
         baseline = xp.where(ends_now, xp.minimum(force, memory.baseline), memory.baseline)
         pressed = force - baseline
-        yields = SOFTLY * poses.clip(pressed - YIELDS, 0.0, 20.0)
+        yields = SOFTLY * poses.clip(pressed - YIELDS, 0.0, STRONGEST)
         felt = xp.where(ended & (pressed > self.press), memory.felt + 1.0, xp.zeros_like(memory.felt))
         falls = xp.where(ended & (felt == 0.0), xp.full_like(yields, -DOWN), xp.zeros_like(yields))
         rises = yields + poses.clip(low, 0.0, LOW)

@@ -9,7 +9,7 @@ from bt_tasksim.scene import FixtureSpec, Goal, Scene
 from bt_tasksim.trees import sequence
 from bt_tasksim.trees.resting_hand import farther_out
 
-WIDE = 0.9
+WIDE = 0.8
 """Radians beyond which a door does not stand open before a hand that rests farther out."""
 
 

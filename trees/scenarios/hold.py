@@ -5,8 +5,9 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept_nodes import Grasp, Hold, Place, Release, SlideToStop
-from bt_tasksim.scene import Goal, ObjectSpec, Scene
+from bt_tasksim.scene import Goal, Scene
 from bt_tasksim.trees import sequence
+from bt_tasksim.trees.scenarios.slide_to_stop import block_on_ledge
 
 FORWARD = (1.0, 0.0, 0.0)
 SECONDS = 3.0
@@ -18,16 +19,7 @@ def scene(robot: str = "panda") -> Scene:
     return Scene(
         robot,
         fixtures=["ledge"],
-        objects={
-            "block": ObjectSpec(
-                kinds=("box", "cube"),
-                on="ledge",
-                centre=(-0.01, 0.0),
-                area=(0.05, 0.12),
-                yaw=0.3,
-                size=((0.042, 0.042, 0.045), (0.055, 0.060, 0.075)),
-            )
-        },
+        objects={"block": block_on_ledge(robot)},
         goals=[
             Goal("block", "ledge", relation="held_against", when="kept", duration=SECONDS),
             Goal("block", "ledge", relation="against"),

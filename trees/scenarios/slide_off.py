@@ -5,12 +5,18 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 
 from bt_tasksim.concept_nodes import Grasp, Place, Release, SlideOff
+from bt_tasksim.robot.description import load_robot
 from bt_tasksim.scene import Goal, ObjectSpec, Scene
 from bt_tasksim.trees import sequence
+from bt_tasksim.trees.scenarios.slide_to_stop import LONG
+
+RIM = 0.1498
+"""Metres from the middle of the board to a hair before its rim."""
 
 
 def scene(robot: str = "panda") -> Scene:
     """A board with a rim, and a block against that."""
+    length = LONG[0] if load_robot(robot).many_fingers else 0.05
     return Scene(
         robot,
         fixtures=["ledge"],
@@ -18,10 +24,10 @@ def scene(robot: str = "panda") -> Scene:
             "block": ObjectSpec(
                 kinds=("box",),
                 on="ledge",
-                centre=(0.1248, 0.0),
+                centre=(RIM - length / 2, 0.0),
                 area=(0.0, 0.12),
                 yaw=0.0,
-                size=((0.05, 0.042, 0.045), (0.05, 0.060, 0.075)),
+                size=((length, 0.042, 0.045), (length, 0.060, 0.075)),
             )
         },
         goals=[

@@ -30,6 +30,9 @@ ASIDE, TURNED = 0.002, math.radians(2.0)
 """Metres and radians by which good estimates are wrong."""
 SLIPPED = 0.5
 """Share of the distance of its tips from their middle to which a hand closes when a part slips out of it."""
+ABOUT = 1.02
+"""The same to which it may open while fingers that held a part, and are not felt now, are about it still:
+what moves in a soft hand is touched by no fingertip for an instant."""
 FIST = 0.9
 """Closure from which a hand is a fist."""
 STILL, RISES = 0.0005, 6.0
@@ -48,6 +51,7 @@ class TrackedPart:
         told: How far it is open at the beginning ``(1,)``, as the scene says.
         value: How far it is taken to be open ``(1,)``, once somebody has looked.
         spread: Metres of the fingertips from their middle, at most, since some touch; 0 once they open.
+        about: Fingers that held it are about it.
         gone: Metres that the tips have gone along the joint with the part since `pushed` was felt.
         pushed: Force of the part on the hand then, towards larger values, N; None where it is not held.
     """
@@ -58,6 +62,7 @@ class TrackedPart:
     told: Array
     value: Array | None = None
     spread: float = 0.0
+    about: bool = False
     gone: float = 0.0
     pushed: float | None = None
 
@@ -156,15 +161,19 @@ class Parts:
             return
         both, pushed = before.touching & hand.touching, part.pushed
         part.pushed = None
+        part.about &= SLIPPED * part.spread <= hand.spread <= ABOUT * part.spread
         if int(both.sum()) > 1:
             part.spread = max(part.spread, hand.spread)
+        elif part.about:
+            both = np.ones_like(both)
         elif hand.spread > part.spread:  # it has opened
             part.spread = 0.0
         if not both.any() or hand.spread < SLIPPED * part.spread:
             return
         pose = part.joint.pose(part.value)[0]
         was, now = before.tips[both], hand.tips[both]
-        if not _moves(part.model, pose, before, both):
+        part.about = _holds(part.model, pose, before, both)
+        if not part.about and not _pushes(part.model, pose, before, both):
             return
         moved = _moved(part.joint, part.value, was, now)
         low, high = part.joint.limits[:, 0], part.joint.limits[:, 1]
@@ -219,17 +228,19 @@ def _value(joint: Joints, seen: Array) -> Array:
     return np.clip(found, joint.limits[:, 0], joint.limits[:, 1])
 
 
-def _moves(model: ObjectModel, pose: Array, hand: HandContact, touching: Array) -> bool:
-    """Whether a hand moves a part along: it holds it, or touches it as a fist."""
+def _holds(model: ObjectModel, pose: Array, hand: HandContact, touching: Array) -> bool:
+    """Whether a hand holds a part by one of its grasps."""
     solid = model.solid
-    if solid is None:
+    if solid is None or int(touching.sum()) < 2 or not len(solid.grips.points):
         return False
-    if int(touching.sum()) > 1 and len(solid.grips.points):
-        middle = hand.tips.mean(axis=0)
-        away = poses.transform(pose[None], solid.grips.points) - middle
-        if float(np.linalg.norm(away, axis=-1).min()) < HELD:
-            return True
-    if hand.closure < FIST:
+    away = poses.transform(pose[None], solid.grips.points) - hand.tips.mean(axis=0)
+    return float(np.linalg.norm(away, axis=-1).min()) < HELD
+
+
+def _pushes(model: ObjectModel, pose: Array, hand: HandContact, touching: Array) -> bool:
+    """Whether a fist touches a part."""
+    solid = model.solid
+    if solid is None or hand.closure < FIST:
         return False
     local = poses.transform(poses.inverse(pose)[None], hand.tips[touching])
     return any(_distance(piece, local) < TOUCHED for piece in solid.pieces)

@@ -37,7 +37,7 @@ class Robot:
         grip = self.world.objects[0].grasps[0]
         return poses.transform(self.pose(value), np.array(grip.point))
 
-    def sees(self, value, at=FAR, force=0.0, shut=False, apart=0.016):
+    def sees(self, value, at=FAR, force=0.0, shut=False, apart=0.016, push=(0.0, 0.0, 0.0)):
         """The value that it takes the part to have."""
         pose = np.full(7, np.nan) if value is None else self.pose(value)
         hand = ROBOT.hand_closed if shut else ROBOT.hand_open
@@ -47,7 +47,7 @@ class Robot:
             joint_velocity=np.zeros(9),
             joint_effort=np.zeros(9),
             tip_force=np.full((2, 3), force),
-            wrench=np.zeros(6),
+            wrench=np.concatenate([np.array(push), np.zeros(3)]),
             tool_pose=poses.pose(np.array(at)),
             tips=np.array([at, at]) + np.array([[0, 0, apart / 2], [0, 0, -apart / 2]]),
             objects=pose[None],
@@ -89,9 +89,41 @@ def test_it_goes_along_with_fingers_that_hold_its_handle(fixture, way):
     for value in np.linspace(0.0, way, 9):
         found = robot.sees(0.0, robot.grasp(value), force=1.0)
     assert found == pytest.approx(way, abs=1e-6)
-    for value in np.linspace(way, 0.0, 9):  # let go: it stays
+    for value in np.linspace(way, way / 2, 9):  # in a soft hand, which does not open: not felt, and held
         found = robot.sees(0.0, robot.grasp(value), force=0.0)
-    assert found == pytest.approx(way, abs=1e-6)
+    assert found == pytest.approx(way / 2, abs=1e-6)
+    for value in np.linspace(way / 2, 0.0, 9):  # let go: it stays
+        found = robot.sees(0.0, robot.grasp(value), force=0.0, apart=0.05)
+    assert found == pytest.approx(way / 2, abs=1e-6)
+
+
+@pytest.mark.parametrize(("fixture", "off"), [("drawer", 0.008), ("door", 0.05)])
+@pytest.mark.parametrize("stopped", [True, False])
+def test_a_stop_that_the_hand_feels_says_where_it_stands(fixture, off, stopped):
+    robot = Robot(fixture=fixture)
+    robot.sees(4 * off)
+    for value in np.linspace(4 * off, off, 9):
+        robot.sees(0.0, robot.grasp(value), force=1.0)
+    at, ahead = robot.grasp(off), robot.grasp(off - 1e-3) - robot.grasp(off)
+    for newtons in np.linspace(0.0, 12.0, 7):  # of the part on the hand, against its way, or along it
+        push = -ahead / np.linalg.norm(ahead) * newtons * (1.0 if stopped else -1.0)
+        found = robot.sees(0.0, at, force=1.0, push=push)
+    assert found == pytest.approx(0.0 if stopped else off, abs=1e-6)
+
+
+def test_what_rubs_or_is_far_from_its_stop_is_not_taken_to_be_stopped():
+    robot = Robot(friction=5.0)
+    robot.sees(0.1)
+    for k, value in enumerate(np.linspace(0.1, 0.004, 49)):  # 5 N all the way, and more every now and then
+        found = robot.sees(
+            0.0, robot.grasp(value), force=1.0, push=np.array([-5.0 - 3.0 * (k % 2), 0.0, 0.0])
+        )
+    assert found == pytest.approx(0.004, abs=1e-6)
+    robot = Robot()
+    robot.sees(0.1)
+    for newtons in np.linspace(0.0, 30.0, 9):
+        found = robot.sees(0.0, robot.grasp(0.1), force=1.0, push=np.array([-newtons, 0.0, 0.0]))
+    assert found == pytest.approx(0.1, abs=1e-6)
 
 
 def test_it_stays_where_fingers_slip_off_it_and_close_on_one_another():
