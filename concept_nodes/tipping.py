@@ -72,9 +72,10 @@ RAISED = 0.003
 """Metres above that to which it is brought where the arm cannot lead it over an edge."""
 TURN = 0.7
 """Radians a second at which it is tipped."""
-YIELDS, SOFTLY, STRONGEST = 1.0, 0.015, 4.0
-"""N beyond those at the begin from which on what is tipped gives way upwards; and metres a second for each N
-above that: at a lever of a tenth of a metre a few newtons turn a thing between two fingers."""
+YIELDS, SOFTLY, STRONGEST = 1.0, 0.015, 5.0
+"""N beyond those at the begin from which on what is tipped gives way upwards; metres a second for each N
+above that: at a lever of a tenth of a metre a few newtons turn a thing between two fingers; and N that count
+at most: an arm that gives way to all at once springs off the surface."""
 DOWN, DEEPEST = 0.015, 0.010
 """Metres a second at which it is put down in the end, and how far at most below where it should stand."""
 RIGHTS, RIGHTING, RIGHTED = 1.2, 3.0, math.radians(25.0)
