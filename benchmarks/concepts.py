@@ -1,6 +1,6 @@
 """How often each concept's scenario succeeds, and how gently.
 
-    python -m benchmarks.concepts --block B0011                          # everything: hours
+    python -m benchmarks.concepts --block B0012                          # everything: hours
     python -m benchmarks.concepts --only push slide --engines mujoco     # a look, on development seeds
     python -m benchmarks.concepts --only make_room pour_a_cup --engines twin --episodes 6
 

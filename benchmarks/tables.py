@@ -63,6 +63,8 @@ APART = (
 """How results begin whose tables are made in `learned_tables`, `robot_tables`, `any_tree_tables`,
 `concept_tables` and `experiments.pages`."""
 NOT_YET = "not measured yet"
+GIVEN_UP = ("B0011",)
+"""Blocks that were not measured to their end: no table mixes their rows with those of later ones."""
 SPENT = 50_000
 """First seed of results that do not say it: measured again and again, see ``docs/evaluation.md``."""
 
@@ -70,11 +72,12 @@ SPENT = 50_000
 def load(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
     """Results by name; those of a later block before those of an earlier one, and of none.
 
-    Those of blocks are there by block and name, too, such as ``B0003/any_tree-panda``.
+    Those of blocks are there by block and name, too, such as ``B0003/any_tree-panda``; those of blocks that
+    were given up only so.
     """
     blocks = sorted(folder.glob("B[0-9][0-9][0-9][0-9]/*.json"))
     found = {p: json.loads(p.read_text(encoding="utf-8")) for p in (*sorted(folder.glob("*.json")), *blocks)}
-    return {p.stem: found[p] for p in found} | {f"{p.parent.name}/{p.stem}": found[p] for p in blocks}
+    return {p.stem: found[p] for p in found if p.parent.name not in GIVEN_UP} | {f"{p.parent.name}/{p.stem}": found[p] for p in blocks}
 
 
 def names(results: dict[str, Any]) -> list[str]:

@@ -1,7 +1,7 @@
 """Random chores over all concepts, trees made in the obvious way, and what becomes of them.
 
     python -m benchmarks.chores --episodes 20                        # development seeds
-    python -m benchmarks.chores --block B0011 --episodes 100 --engines mujoco
+    python -m benchmarks.chores --block B0012 --episodes 100 --engines mujoco
     python -m benchmarks.chores --only 900012 --kinds pour carry     # one of them again
 
 Each draw is a task of its own (`benchmarks.chores.draw`). Draws that fail are given to an oracle, which has

@@ -65,5 +65,5 @@ def test_the_ledge_is_in_its_slot():
 
 
 def test_a_block_is_measured_with_all_kinds(capsys):
-    assert command.main(["--block", "B0011", "--kinds", "carry"]) == 2
+    assert command.main(["--block", "B0012", "--kinds", "carry"]) == 2
     assert "leave out --kinds" in capsys.readouterr().err
