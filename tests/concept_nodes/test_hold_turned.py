@@ -1,5 +1,6 @@
 """Pressing what turns against the stop of its hinge."""
 
+import numpy as np
 import pytest
 from draws import successes
 from py_trees.common import Status
@@ -12,6 +13,8 @@ from bt_tasksim.execution.pipelines import EngineOptions
 from bt_tasksim.execution.runner import Runner
 from bt_tasksim.scene import FixtureSpec, Goal, ObjectSpec, Scene
 from bt_tasksim.trees import sequence
+from tests.bt_tasksim.scene.states import drawn, state
+from tests.concept_nodes.test_agreement_with_goals import seen_exactly
 
 LEVER = FixtureSpec("lever", parameters={"turns": 1.3, "facing": "up", "spring": 0.6})
 CUP = {"cup": ObjectSpec(kinds=("cup",), on="table", centre=(-0.1, -0.25), area=(0.0, 0.0))}
@@ -44,6 +47,20 @@ def test_a_knob_is_held_on_its_stop_by_the_torque_about_its_axis():
 
     (result,) = successes(run, range(3, 6), n=1)
     assert result.status == Status.SUCCESS
+
+
+def test_it_is_pressed_onto_its_stop_before_that_counts_and_harder_where_it_goes_back():
+    configuration, model = drawn(Scene(fixtures=[LEVER]))
+    seen = seen_exactly(model, state(configuration))
+    seen.observation.wrench = np.zeros((1, 6))
+    holds = HoldTurned.value(target="lever")
+    memory = holds.begin(seen)
+    found = []
+    for elapsed, farthest in ((0.0, 0.0), (2.0, 0.0), (2.0, 0.003), (2.0, 0.01)):
+        seen.elapsed = np.array([elapsed])
+        force, counts = holds.led_to(seen, memory._replace(farthest=np.array([farthest])))
+        found.append((float(force[0]), bool(counts[0])))
+    assert found == [(18.0, False), (12.0, True), (pytest.approx(16.0), True), (18.0, False)]
 
 
 @pytest.mark.parametrize(

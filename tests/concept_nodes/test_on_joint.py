@@ -15,13 +15,13 @@ from bt_tasksim.concept_nodes import (
     PressButton,
     Release,
 )
-from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART
+from bt_tasksim.concept_nodes.handle import NO_PART, OTHER_PART, about_handle, at_handle
 from bt_tasksim.concept_nodes.holding import NOT_HELD
 from bt_tasksim.concept_nodes.limits import WRIST_STRAINED
-from bt_tasksim.concept_nodes.on_joint import FURTHER, JAMMED, NOT_THERE, TOO_FAR, JointMemory
+from bt_tasksim.concept_nodes.on_joint import FURTHER, IN_TIME, JAMMED, NOT_THERE, TOO_FAR, JointMemory
 from bt_tasksim.concept_nodes.press_button import AROUND, FIST, LEANS, LEVEL, _fists
 from bt_tasksim.concept_nodes.press_button import JAMMED as BUTTON_JAMS
-from bt_tasksim.concept_nodes.to_stop import GENTLY
+from bt_tasksim.concept_nodes.to_stop import GENTLY, SEARCHES
 from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import GOAL_LOST, NO_WAY
 from bt_tasksim.core.resources import asset
@@ -156,6 +156,45 @@ def test_a_stop_is_felt(pressed, ticks):
             felt = tick
         memory = shuts.advance(None, seen, memory)
     assert felt == ticks
+
+
+def test_a_stop_that_is_not_felt_is_looked_for_a_little_way_on():
+    """Where the part seems to be shut the hand has come to the end of its way, and nothing holds it up."""
+    shuts, (seen, remembered) = CloseDrawer.value(target="drawer"), hand_on_the_drawer(0.0)
+    memory = remembered(np.zeros(1))
+    memory = memory._replace(progress=memory.path.duration, late=np.array([IN_TIME]))
+    ends = []
+    while not shuts.done(seen, memory) and len(ends) < 200:
+        memory = shuts.advance(None, seen, memory)
+        ends.append(float(shuts.command(None, seen, memory).tool[0, 0] - seen.tool[0, 0]))
+    assert ends[-1] == pytest.approx(SEARCHES, abs=1e-3), "inwards, away from the robot"
+    assert max(np.diff([0.0, *ends])) <= 1.01 * GENTLY * seen.world.control_period
+    felt, _ = hand_on_the_drawer(30.0)
+    memory = remembered(np.zeros(1))._replace(progress=memory.progress, late=memory.late)
+    assert shuts.done(felt, memory) and not shuts.done(seen, memory)
+
+
+@pytest.mark.parametrize(("late", "off", "done"), [(0.1, 0.0, True), (0.1, 0.003, False), (2.0, 0.003, True)])
+def test_a_part_is_given_time_to_come_closer_to_what_is_asked(late, off, done):
+    pulls = AdjustDrawer.value(target="drawer", distance=off)
+    seen, remembered = hand_on_the_drawer(0.0)
+    memory = remembered(np.array([off]))
+    assert pulls.done(seen, memory._replace(progress=memory.path.duration, late=np.array([late]))) == done
+
+
+def test_a_handle_is_held_while_the_fingers_are_about_it_though_none_is_felt():
+    seen, _ = hand_on_the_drawer(0.0)
+    handle = poses.transform(seen.object("drawer")[:, None, :], seen.model("drawer").handles)[:, :1, :]
+    held = []
+    for tips, closure, felt in ((handle, 0.5, True), (handle, 0.5, False), (handle, 1.0, False)):
+        seen.observation.tips = np.repeat(tips, 2, axis=1)
+        seen.observation.closure = np.array([closure])
+        seen.observation.contacts = np.full((1, 2), felt)
+        held.append((bool(at_handle(seen, "drawer")[0]), bool(about_handle(seen, "drawer")[0])))
+    assert held == [(True, True), (False, True), (False, False)]
+    seen.observation.tips = seen.observation.tips + 0.1
+    seen.observation.closure = np.array([0.5])
+    assert not about_handle(seen, "drawer")[0]
 
 
 def test_a_part_that_has_stayed_behind_is_taken_on_beyond_the_end_of_the_way():

@@ -15,6 +15,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.errors import NoWayError
 from bt_tasksim.core.outcomes import TIMED_OUT
 from bt_tasksim.core.world import Obstacle
+from bt_tasksim.robot.description import load_robot
 from bt_tasksim.robot.kinematics.hand import SLIDE
 from bt_tasksim.scene.spatial_laws import Hollow, PlacedObject, beyond_hollow
 
@@ -208,6 +209,28 @@ def test_a_hand_of_two_fingers_opens_no_wider_than_it_has_room(toy, beside, all_
     opened = float(view.robot.closure(_opened(view, "cup")))
     held = float(view.robot.closure(view.hand))
     assert (opened == 0.0) == all_the_way and opened < held
+
+
+def test_a_hand_of_many_fingers_opens_as_far_as_other_walls_let_it(toy, monkeypatch):
+    """Each amount on its way has to be clear: the fingers swing through all of them."""
+    module = sys.modules[_opened.__module__]
+    stage = start(toy, Release("cup"))
+    (view,) = views(stage.context.seen(ONE, np.zeros(1)))
+    robot = load_robot("xarm7_ability")
+    view = view._replace(robot=robot, hand=robot.hand_position(np.array([0.8])))
+
+    def opened(in_the_way):
+        def apart(view, hand, walls):
+            return abs(float(robot.closure(hand)) - in_the_way) > 0.05
+
+        monkeypatch.setattr(module, "_apart", apart)
+        return float(robot.closure(_opened(view, "cup")))
+
+    monkeypatch.setattr(module, "_other_walls", lambda view, target: ["a spoke"])
+    found = [opened(closure) for closure in (-1.0, 0.2, 0.4)]
+    assert found == pytest.approx([0.0, 0.4, 0.6], abs=0.02)
+    monkeypatch.setattr(module, "_other_walls", lambda view, target: [])
+    assert robot.closure(_opened(view, "cup")) == 0.0, "without walls nothing is asked"
 
 
 @pytest.mark.parametrize(
