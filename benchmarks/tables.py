@@ -77,7 +77,8 @@ def load(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
     """
     blocks = sorted(folder.glob("B[0-9][0-9][0-9][0-9]/*.json"))
     found = {p: json.loads(p.read_text(encoding="utf-8")) for p in (*sorted(folder.glob("*.json")), *blocks)}
-    return {p.stem: found[p] for p in found if p.parent.name not in GIVEN_UP} | {f"{p.parent.name}/{p.stem}": found[p] for p in blocks}
+    alone = {p.stem: found[p] for p in found if p.parent.name not in GIVEN_UP}
+    return alone | {f"{p.parent.name}/{p.stem}": found[p] for p in blocks}
 
 
 def names(results: dict[str, Any]) -> list[str]:

@@ -14,6 +14,7 @@ from bt_tasksim.core.world import PlaceModel
 from bt_tasksim.scene.configuration import ActorConfiguration
 from bt_tasksim.scene.outlines import distance, rectangle
 from bt_tasksim.scene.relations import relation_named
+from bt_tasksim.scene.relations.base import Presence
 from bt_tasksim.scene.relations.joint_goals import JointGoal
 from bt_tasksim.scene.spatial_laws import SUNK
 from bt_tasksim.scene.specs import Goal
@@ -21,8 +22,6 @@ from bt_tasksim.scene.specs import Goal
 if TYPE_CHECKING:
     from bt_tasksim.scene.scene import Scene
 
-CARRIED = ("on", "anywhere", "inside")
-"""Relations in which the reference bears the object."""
 SLENDER = 0.7
 """Share of half a bounding box's shorter side that is surely solid about its middle, of what stands there."""
 
@@ -155,7 +154,7 @@ def _circle(goals: Sequence[Goal]) -> list[str]:
     """Objects each of which is to bear the one before it, the first one again at the end; or none."""
     below: dict[str, list[str]] = {}
     for goal in goals:
-        if goal.relation in CARRIED:
+        if relation_named(goal.relation).presence == Presence.BORNE:
             below.setdefault(goal.object, []).append(goal.place)
     for start in below:
         path, waiting = {start: [start]}, [start]

@@ -10,13 +10,14 @@ import numpy as np
 
 from bt_tasksim.checking.part_reach import part_tool_poses
 from bt_tasksim.checking.report import ERROR, WARNING, Report
-from bt_tasksim.checking.scene_goals import CARRIED
 from bt_tasksim.core import poses
 from bt_tasksim.core.poses import Array
 from bt_tasksim.core.world import ObjectModel, PlaceModel
 from bt_tasksim.robot.description import RobotDescription, load_robot
 from bt_tasksim.scene.configuration import ActorConfiguration, ObjectActor
 from bt_tasksim.scene.grips import WIDER, Grips, fits_between
+from bt_tasksim.scene.relations import relation_named
+from bt_tasksim.scene.relations.base import Presence
 from bt_tasksim.scene.shapes import ShapeSize, resting_height
 from bt_tasksim.scene.specs import STARTS, Goal
 
@@ -26,10 +27,6 @@ if TYPE_CHECKING:
 
 ACROSS = 0.5
 """Largest cosine between the direction in which a hand comes and that in which its fingers close."""
-STANDS = (*CARRIED, "inserted")
-"""Relations in which the object needs room on the place, or in it."""
-THERE = (*STANDS, "pressed")
-"""Those in which it has to come to the place: of others, that says how it is turned or what is beside it."""
 TURNS = 4
 """Headings of an object at its goal that are tried; as many turns about the axis of a round one."""
 
@@ -110,11 +107,12 @@ def check_goals(scene: Scene, worlds: Sequence[ActorConfiguration], report: Repo
             places = {place.name: place for place in world.places}
             if goal.place not in places or goal.object not in scene.object_names:
                 continue
-            if goal.relation not in THERE:
+            presence = relation_named(goal.relation).presence
+            if presence < Presence.THERE:
                 continue
             known += 1
             actor, place = _actor(world, goal.object), places[goal.place]
-            small += goal.relation in STANDS and not (_passed(goal, place) or _fits(actor.model(), place))
+            small += presence >= Presence.WITHIN and not (_passed(goal, place) or _fits(actor.model(), place))
             far += not _any_reached(robot, _at_goal(robot, actor, place))
         where = f"goal of '{goal.object}'"
         if small:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS
-from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, Presence
 from bt_tasksim.scene.spatial_laws import is_on
 from bt_tasksim.scene.specs import Goal
 
@@ -30,6 +30,8 @@ TILTED_ON_IT = register_reason("tilted_on_it", "{object} is tilted on {place} by
 @register("goal relation", "anywhere")
 class Anywhere(GoalRelation):
     """See the file."""
+
+    presence = Presence.BORNE
 
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 from collections.abc import Collection
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import ClassVar
 
 import numpy as np
@@ -180,6 +181,19 @@ class Placement:
     angle_error: float
 
 
+class Presence(IntEnum):
+    """How an object is at the place that its goal names; each includes those above it but the first."""
+
+    ELSEWHERE = 0
+    """It need not come there: the goal says how it is turned, or what is beside it."""
+    THERE = 1
+    """It comes there."""
+    WITHIN = 2
+    """It needs room on it, or in it."""
+    BORNE = 3
+    """The place bears it."""
+
+
 class GoalRelation(abc.ABC):
     """A relation of an object to a place or to another object, judged by the physics state.
 
@@ -192,6 +206,8 @@ class GoalRelation(abc.ABC):
     """The object may be in the hand at the end, or let go."""
     needs_place: ClassVar[bool] = True
     """A goal names a place or an object besides."""
+    presence: ClassVar[Presence] = Presence.ELSEWHERE
+    """How the object is at the place, which `bt_tasksim.checking` looks at before anything runs."""
     position_tolerance: ClassVar[float] = Goal.position_tolerance
     """Metres that a goal allows where it does not say."""
     angle_tolerance: ClassVar[float] = Goal.angle_tolerance

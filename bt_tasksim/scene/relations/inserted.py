@@ -9,7 +9,7 @@ from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES
 from bt_tasksim.scene.hole_laws import in_hole
-from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, Presence
 from bt_tasksim.scene.specs import Goal
 
 IS_INSERTED = register_reason(
@@ -30,6 +30,8 @@ NOT_INSERTED = register_reason(
 @register("goal relation", "inserted")
 class Inserted(GoalRelation):
     """See the file; `Goal.position_tolerance` is how far it may be from the stop."""
+
+    presence = Presence.WITHIN
 
     position_tolerance = 0.01
 

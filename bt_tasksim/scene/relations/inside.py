@@ -13,7 +13,7 @@ from bt_tasksim.core import poses
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES
-from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, Presence
 from bt_tasksim.scene.spatial_laws import beyond_walls
 from bt_tasksim.scene.specs import Goal
 
@@ -28,6 +28,8 @@ NOT_INSIDE = register_reason(
 @register("goal relation", "inside")
 class Inside(GoalRelation):
     """See the file."""
+
+    presence = Presence.BORNE
 
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""

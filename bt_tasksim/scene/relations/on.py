@@ -12,7 +12,7 @@ from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES, RADIANS
 from bt_tasksim.scene.relations.anywhere import ON_SOMETHING_ELSE
-from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, lean, turn
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, Presence, lean, turn
 from bt_tasksim.scene.spatial_laws import is_on
 from bt_tasksim.scene.specs import Goal
 
@@ -36,6 +36,8 @@ TILTED_OR_TURNED = register_reason(
 @register("goal relation", "on")
 class On(GoalRelation):
     """See the file."""
+
+    presence = Presence.BORNE
 
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
         """See `GoalRelation.evaluate`."""

@@ -10,7 +10,7 @@ import numpy as np
 from bt_tasksim.core.outcomes import register_reason
 from bt_tasksim.core.registry import register
 from bt_tasksim.core.units import METRES
-from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, lean
+from bt_tasksim.scene.relations.base import FinalState, GoalRelation, Placement, Presence, lean
 from bt_tasksim.scene.specs import Goal
 
 IS_PRESSED = register_reason(
@@ -28,6 +28,7 @@ NOT_TOUCHING = register_reason(
 class Pressed(GoalRelation):
     """See the file."""
 
+    presence = Presence.THERE
     in_hand = True
 
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:
