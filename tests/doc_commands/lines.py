@@ -55,7 +55,8 @@ QUICK = {
     "benchmarks.planning": "--quick",
     "benchmarks.batch": "--quick --worlds 2 --episodes 2 --trees 20 --longest 1",
     "benchmarks.chores": "--episodes 1 --seed 910000 --kinds carry --oracle 0",
-    "benchmarks.concepts": "--only grasp_then_pick --robots panda --engines sapien --episodes 1 --workers 1",
+    "benchmarks.concepts": "--only grasp_then_pick --robots panda --engines sapien --episodes 1 --workers 1 "
+    "--seed 910000",
     "benchmarks.decomposition": "--seeds 1",
     "benchmarks.experiments": "--pictures pictures",
     "benchmarks.gap": "--episodes 1 --scenarios shelf_to_shelf --grasps programmed --engines sapien",
