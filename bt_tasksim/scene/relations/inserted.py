@@ -32,7 +32,6 @@ class Inserted(GoalRelation):
     """See the file; `Goal.position_tolerance` is how far it may be from the stop."""
 
     presence = Presence.WITHIN
-
     position_tolerance = 0.01
 
     def evaluate(self, goal: Goal, final: FinalState) -> Placement:

@@ -119,6 +119,9 @@ def test_what_rubs_or_is_far_from_its_stop_is_not_taken_to_be_stopped():
             0.0, robot.grasp(value), force=1.0, push=np.array([-5.0 - 3.0 * (k % 2), 0.0, 0.0])
         )
     assert found == pytest.approx(0.004, abs=1e-6)
+    for newtons in np.linspace(5.0, 10.0, 9):  # what sticks takes some more before it goes on
+        found = robot.sees(0.0, robot.grasp(0.004), force=1.0, push=np.array([-newtons, 0.0, 0.0]))
+    assert found == pytest.approx(0.004, abs=1e-6)
     robot = Robot()
     robot.sees(0.1)
     for newtons in np.linspace(0.0, 30.0, 9):
