@@ -148,6 +148,13 @@ def test_goals_that_exclude_each_other_are_named(goals, words):
     assert re.search(words, what), what
 
 
+@pytest.mark.parametrize("relation", ["on", "anywhere", "inside"])
+def test_what_bears_one_another_goes_round_in_a_circle(relation):
+    bowls = {name: ObjectSpec("bowl", on="table") for name in ("a", "b")}
+    found = together([Goal("a", "b", relation), Goal("b", "a", relation)], **bowls)
+    assert any("round in a circle" in what for what in found), found
+
+
 @pytest.mark.parametrize(
     "goals",
     [
